@@ -24,6 +24,7 @@ from assembly.linear.assemblies import (
     solve_each,
 )
 from assembly.linear.closure import checked_size, linearise
+from assembly.linear.device import assemble_on_device
 from assembly.linear.fallback import (
     CannotAssemble,
     reference_assembly,
@@ -186,7 +187,8 @@ def _solve_compiled(
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
     elif errors.any():  # else nothing has to move, and zeros are the answer
-        if assemble_side_by_side(structure, T, errors, mismatch, out):
+        given = structure, T, errors, mismatch, out
+        if assemble_on_device(*given) or assemble_side_by_side(*given):
             _solve_left(structure, T, errors, mismatch, out)
         else:
             _by_numba(structure, T, errors, mismatch, out)

@@ -8,6 +8,7 @@ point solved alone, in a batch or in another order has the same answer to the la
 """
 
 import ctypes
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +25,10 @@ _ARRAYS = (
 )  # fmt: skip
 _COUNTS = ("n", "closures", "np", "ny", "ng", "nu", "cones", "nq")
 _KEPT = 64  # robots whose arrays' addresses are known
-_known: dict[int, tuple[Structure, "_Robot"]] = {}
+_known: dict[int, tuple[Structure, "RobotRecord"]] = {}
 
 
-class _Robot(ctypes.Structure):
+class RobotRecord(ctypes.Structure):
     """``Robot`` of lanes.cpp: the fields of a structure, and how many there are."""
 
     _fields_ = (
@@ -38,12 +39,13 @@ class _Robot(ctypes.Structure):
     )
 
 
-class _Points(ctypes.Structure):
-    """``Points`` of lanes.cpp."""
+class PointsRecord(ctypes.Structure):
+    """``Points`` of lanes.cpp; ``erring`` may be left out."""
 
     _fields_ = (
         ("count", ctypes.c_int64), ("T", ctypes.c_void_p), ("errors", ctypes.c_void_p),
         ("mismatch", ctypes.c_void_p), ("own_errors", ctypes.c_int64),
+        ("erring", ctypes.c_void_p),
     )  # fmt: skip
 
 
@@ -147,7 +149,7 @@ def _side_by_side(
     if library is None:
         return False
     T, errors, mismatch = points
-    given = _Points(len(T), *map(_address, points), len(errors) > 1)
+    given = PointsRecord(len(T), *map(_address, points), len(errors) > 1)
     rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
     getattr(library, name)(*map(ctypes.byref, (_robot(structure), given, *rows)))
     return True
@@ -160,18 +162,33 @@ def _address(array: NDArray | int) -> int | None:
     return address(array) if array.size else None
 
 
-def _robot(structure: Structure) -> _Robot:
+def _robot(structure: Structure) -> RobotRecord:
     """A structure's addresses; it is kept as long as they are."""
     known = _known.get(id(structure))
     if known is None:
         if len(_known) >= _KEPT:
             _known.clear()
-        s = structure
-        counts = (
-            len(s.on_path), s.patterns.shape[1], len(s.patterns), len(s.springs),
-            len(s.groups) - 1, len(s.cone_frame), len(s.starts) - 1, len(s.free_frame),
-        )  # fmt: skip
-        arrays = [address(getattr(s, name)) for name in _ARRAYS]
-        robot = _Robot(s.size, s.platform, *arrays, *counts)
+        robot = robot_record(structure, address)
         known = _known[id(structure)] = structure, robot
     return known[1]
+
+
+def robot_record(
+    structure: Structure, addressed: Callable[[NDArray], int]
+) -> RobotRecord:
+    """What C++ reads of a robot.
+
+    Args:
+        structure: the robot.
+        addressed: where the numbers of one of its arrays are.
+
+    Returns:
+        Addresses, good as long as the numbers stay there.
+    """
+    s = structure
+    counts = (
+        len(s.on_path), s.patterns.shape[1], len(s.patterns), len(s.springs),
+        len(s.groups) - 1, len(s.cone_frame), len(s.starts) - 1, len(s.free_frame),
+    )  # fmt: skip
+    arrays = [addressed(getattr(s, name)) for name in _ARRAYS]
+    return RobotRecord(s.size, s.platform, *arrays, *counts)

@@ -58,6 +58,11 @@ def by_numba() -> Generator[None, None, None]:
         _refused.reset(token)
 
 
+def numba_alone() -> bool:
+    """Whether callers asked for numba, see :func:`by_numba`."""
+    return _refused.get()
+
+
 def load_library(source: str) -> ctypes.CDLL | None:
     """The library of a source file, compiled before if it has to be.
 
@@ -90,7 +95,7 @@ def _library(source: str) -> ctypes.CDLL | None:
 
 def _kept_at(source: str) -> tuple[str, Path]:
     """Digest and place of a library."""
-    digest = _digest(source)
+    digest = digest_of(source)
     return digest, folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
 
 
@@ -150,8 +155,15 @@ def _processor() -> str:
     return " ".join(said)
 
 
-def _digest(source: str) -> str:
-    """Of all that the machine code depends on."""
+def digest_of(source: str) -> str:
+    """Digest of all that a source file's machine code depends on.
+
+    Args:
+        source: as for :func:`load_library`.
+
+    Returns:
+        16 hexadecimal digits.
+    """
     parts = [" ".join(_OPTIONS), _processor()]
     package = _ROOT / Path(source).parts[0]
     for file in (_ROOT / source, *sorted(package.glob("*/cpp/*.h"))):

@@ -41,7 +41,7 @@ private:
 
 // Lanes where clearances or errors enter rows that no spring enters.
 inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
-    std::vector<Real> most(np), sizes(nu);
+    Array<Real> most(np), sizes(nu);
     for (int g = 0; g < np; ++g)
         for (int i = rank; slot[g] >= 0 && i < count; ++i)
             for (int a = 0; a < 6; ++a)

@@ -33,11 +33,13 @@ struct Robot {
     int64_t n, closures, np, ny, ng, nu, cones, nq;
 };
 
-// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors.
+// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (n,)
+// whether a frame errs at any point, which is found out where nobody says it.
 struct Points {
     int64_t count;
     const double *T, *errors, *mismatch;
     int64_t own_errors;
+    const bool *erring;
 };
 
 // A closure that a frame enters, and the sign.
@@ -54,8 +56,8 @@ public:
 protected:
     const Robot &s;
     const int n, m, np, ng, nu, nq;
-    std::vector<std::vector<Entry>> patterns;
-    std::vector<bool> felt, erring;  // frames
+    Array<Array<Entry>> patterns;
+    Array<bool> felt, erring;  // frames
     Table P;                       // (n, 18) the three turns of each frame: `column`
     Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
     Row known;
@@ -87,7 +89,8 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
     for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
     for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
     // a frame without errors at any point adds exact zeros
-    const int64_t sets = points.own_errors ? points.count : 1;
+    for (int j = 0; points.erring && j < n; ++j) erring[j] = points.erring[j];
+    const int64_t sets = points.erring ? 0 : points.own_errors ? points.count : 1;
     for (int64_t i = 0; i < sets * n; ++i)
         for (int axis = 0; axis < 6; ++axis)
             if (points.errors[6 * i + axis] != 0.0) erring[i % n] = true;

@@ -26,8 +26,8 @@ inline int rank_of_first(Whole ranks, Whole lanes) {
 }
 
 // Places of the patterns with clearances; -1 for the others.
-inline std::vector<int> loose_patterns(const Robot &s) {
-    std::vector<int> slot(s.np, -1);
+inline Array<int> loose_patterns(const Robot &s) {
+    Array<int> slot(s.np, -1);
     int next = 0;
     for (int c = 0; c < s.nu; ++c) {
         int &own = slot[s.pattern_of[s.cone_frame[c]]];
@@ -43,11 +43,11 @@ public:
 
 protected:
     const Cones cones;
-    std::vector<int> slot;  // of the patterns with clearances, in parts; else -1
+    Array<int> slot;  // of the patterns with clearances, in parts; else -1
     Triangle free, springs;  // F; Y with Z beside it
     Table L, parts;          // parts: Z's rows, for a screw of each pattern
     Programme programme;
-    std::vector<Real *> Z;  // rows beside Y's
+    Array<Real *> Z;  // rows beside Y's
     int widest;             // most springs of a group, at least six
 
     Whole triangulate_free(Real tolerance);

@@ -21,7 +21,7 @@ protected:
 
     struct Ranks { int free; Whole same, unclear; };
     Ranks eliminate_free(Real tolerance, Whole asked);
-    Whole triangulate_rows(int count, const std::vector<Whole> *held);
+    Whole triangulate_rows(int count, const Array<Whole> *held);
     void orthonormal_rows(int count);
 };
 
@@ -41,7 +41,7 @@ inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
 
 // The rows brought to a triangle, without the columns held; the rank of each lane, -1
 // where it is unclear.
-inline Whole Rows::triangulate_rows(int count, const std::vector<Whole> *held) {
+inline Whole Rows::triangulate_rows(int count, const Array<Whole> *held) {
     for (int i = 0; i < count; ++i) {
         std::copy(programme.M[i], programme.M[i] + nu, rows.F[i]);
         rows.F[i][nu] = -programme.h[i];

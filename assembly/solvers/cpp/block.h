@@ -1,16 +1,18 @@
 // Blocks of problems that stand side by side, and what a library says of itself.
 #pragma once
 
-#include <numeric>
-
 #include "real.h"
 
+#ifdef __CUDACC_RTC__
+#define EXPORTED extern "C" __global__
+#else
 #define EXPORTED extern "C" __attribute__((visibility("default")))
 
 #ifndef SOURCE_DIGEST
 #define SOURCE_DIGEST ""
 #endif
 EXPORTED const char *source_digest() { return SOURCE_DIGEST; }
+#endif
 
 // The points of one block of lanes.
 struct Block {
@@ -27,6 +29,7 @@ struct Block {
     }
 };
 
+#ifndef ON_DEVICE
 // 0 .. count - 1.
 inline std::vector<int64_t> all_of(int64_t count) {
     std::vector<int64_t> all(count);
@@ -49,3 +52,4 @@ inline void in_blocks(const std::vector<int64_t> &points, Solve solve) {
         while (any(pending)) pending = solve(block, pending);
     }
 }
+#endif

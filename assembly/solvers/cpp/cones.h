@@ -65,7 +65,7 @@ private:
     const Cones &k;
     System system;
     Table B;
-    std::vector<Head> heads;
+    Array<Head> heads;
     Row z0, z1, u, du, dz0, dz1, f, y, right, residual, start, old;
     Table wide;  // of the balls: w, and room for l and t of the correction
 

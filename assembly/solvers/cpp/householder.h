@@ -4,9 +4,6 @@
 // Sources: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4.
 #pragma once
 
-#include <algorithm>
-#include <utility>
-
 #include "real.h"
 
 constexpr double CLEAR = 10.0;  // within this factor of the threshold a rank is in doubt
@@ -15,7 +12,7 @@ constexpr double CLEAR = 10.0;  // within this factor of the threshold a rank is
 struct Triangle {
     Table F;
     Row turns, diagonal;  // factors of the reflectors; of the triangle
-    std::vector<Whole> order;  // original rows in their new order
+    Array<Whole> order;  // original rows in their new order
     Triangle(int rows, int columns)
         : F(rows, columns), turns(rows), diagonal(rows), order(rows) {}
 };
@@ -80,7 +77,7 @@ inline void exchange(Real **rows, int step, Whole at, int width) {
 inline Whole triangulate(
     Triangle &T, int p, int m, Real relative, Real floor, double clean, int width) {
     Real **F = T.F.rows();
-    std::vector<Real> sizes(p);
+    Array<Real> sizes(p);
     for (int i = 0; i < p; ++i) {
         T.order[i] = whole(i);
         sizes[i] = inner(F[i], F[i], m);

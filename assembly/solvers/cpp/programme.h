@@ -4,17 +4,14 @@
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 #pragma once
 
-#include <algorithm>
-#include <numeric>
-
 #include "real.h"
 
 // The cones' columns: discs of two columns each first, then intervals of one, then balls
 // of more.
 struct Cones {
     int discs = 0, intervals = 0, count = 0, nu = 0;
-    std::vector<int> balls;       // columns of each
-    std::vector<int64_t> column;  // (nu,) as the robot counts them
+    Array<int> balls;       // columns of each
+    Array<int64_t> column;  // (nu,) as the robot counts them
 
     Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
         const auto add = [&](int c) {
@@ -30,7 +27,7 @@ struct Cones {
     }
 
     // So many discs, then intervals, then balls of so many columns each.
-    Cones(int discs, int intervals, const std::vector<int> &balls)
+    Cones(int discs, int intervals, const Array<int> &balls)
         : discs(discs), intervals(intervals), count(discs + intervals + int(balls.size())),
           nu(std::accumulate(balls.begin(), balls.end(), 2 * discs + intervals)),
           balls(balls) {}

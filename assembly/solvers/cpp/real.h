@@ -4,9 +4,16 @@
 // finished is frozen by masks.  So an answer does not depend on its neighbours.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <vector>
+#include "standard.h"
+
+#ifdef ON_DEVICE  // or its simulation
+#include "arena.h"
+#include "one_lane.h"
+
+inline Real real(double value) { return value; }
+inline Whole whole(int64_t value) { return value; }
+#else
+template <typename T> using Array = std::vector<T>;
 
 #if defined(FEW_LANES)
 constexpr int LANES = 2;  // where few problems come at once
@@ -23,8 +30,6 @@ typedef int64_t Whole __attribute__((vector_size(8 * LANES)));  // or a mask: 0 
 
 inline Real real(double value) { return value - Real{}; }
 inline Whole whole(int64_t value) { return value - Whole{}; }
-inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
-inline Real larger(Real a, Real b) { return a > b ? a : b; }
 
 inline Real root(Real x) {
     for (int l = 0; l < LANES; ++l) x[l] = __builtin_sqrt(x[l]);
@@ -39,6 +44,10 @@ inline Real once(Real x) {
 #endif
     return x;
 }
+#endif
+
+inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
+inline Real larger(Real a, Real b) { return a > b ? a : b; }
 
 inline bool any(Whole mask) {
     int64_t bits = 0;
@@ -57,11 +66,11 @@ public:
     Real *const *rows() const { return at.data(); }
 
 private:
-    std::vector<Real> numbers;
-    std::vector<Real *> at;
+    Array<Real> numbers;
+    Array<Real *> at;
 };
 
-typedef std::vector<Real> Row;
+typedef Array<Real> Row;
 
 // Inner products of R rows with x over the columns from .. to, in partial sums that
 // hide the latency of one: 8 / R for each row.

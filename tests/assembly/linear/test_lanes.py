@@ -353,7 +353,7 @@ def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
     made = Path(load_library(SOURCE)._name)
     monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.setattr(libraries, "_digest", lambda source: "0" * 16)
+    monkeypatch.setattr(libraries, "digest_of", lambda source: "0" * 16)
     shutil.copy(made, tmp_path / f"lanes.{'0' * 16}.so")
     libraries._library.cache_clear()
     try:
