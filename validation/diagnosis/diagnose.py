@@ -13,6 +13,7 @@ Order of things, each opened once:
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,8 @@ from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, screws_of
 from validation.diagnosis.teaching import cost_of, taught
 
-_PASSES = 8  # of leaving out rows, believing repeats, and finite geometric errors
+_PASSES = 8  # of believing repeats, and finite geometric errors
+_TURNS = 6  # of leaving out rows, in each
 _LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
 _BENDS = 3  # times that what finite geometric errors add is found anew
 _SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step towards the errors found
@@ -77,17 +79,12 @@ def diagnose(
     learned: tuple[Learned, ...] = ()
     straight: _Straight | None = None
     for _ in range(_PASSES):
+        some = partial(select, update=update, finite=finite)
+        selection, outliers = _without_outliers(
+            campaign, conditions, rows.fitted, (outliers, impossible), some
+        )
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
-        selection = select(fitting, conditions.take(used), update, finite=finite)
-        left = selection.behind.left(selection.fit.residual)
-        far = np.zeros_like(outliers)
-        called = int((outliers & ~impossible).sum())
-        most = max(0, len(campaign) // BLUNDERS - called)
-        far[used] = outlying(fitting, left, most, worst=True)
-        if far.any():
-            outliers |= far
-            continue
         if bends < _BENDS:
             bent = _with_errors(campaign, conditions, used, selection, complete)
             if bent is not conditions:
@@ -133,6 +130,35 @@ def diagnose(
             finite=finite,
         )
     )
+
+
+def _without_outliers(
+    campaign: Campaign, conditions: Conditions, fitted: NDArray,
+    left_out: tuple[NDArray, NDArray], selected: Callable[..., Selection],
+) -> tuple[Selection, NDArray]:  # fmt: skip
+    """The selection on rows (R,) without those far off, and which these are.
+
+    The farthest are left out first and the others looked at again without them; what is
+    far off after some turns, all at once.
+
+    Returns:
+        The selection, and (R,) bool.
+    """
+    outliers, impossible = left_out
+    for turn in range(_TURNS + 1):
+        used = fitted & ~outliers
+        selection = selected(campaign.take(used), conditions.take(used))
+        if turn == _TURNS:
+            break
+        left = selection.behind.left(selection.fit.residual)
+        called = int((outliers & ~impossible).sum())
+        most = max(0, len(campaign) // BLUNDERS - called)
+        far = outlying(campaign.take(used), left, most, worst=turn < _TURNS - 1)
+        if not far.any():
+            break
+        outliers = outliers.copy()
+        outliers[used] = far
+    return selection, outliers
 
 
 @dataclass(frozen=True, eq=False)

@@ -172,7 +172,7 @@ class Evidence:
         shows, squares = np.ones(2 * len(self.terms)), np.diag(self._gram)
         for g in np.unique(self._group[mask & (self._group >= 0)]):
             shown = float(np.mean(squares[mask & (self._group == g)]))
-            shows[g] = 1 / np.sqrt(shown) if shown else 1.0
+            shows[g] = 1 / np.sqrt(shown) if shown > 0.0 else 1.0
         return shows
 
     def _equations(self, mask: NDArray, along: NDArray) -> Equations:

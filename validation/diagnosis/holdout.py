@@ -9,6 +9,7 @@ from validation.campaign.campaign import Campaign
 
 _FEWEST = 8  # configurations from which blocks can be kept aside
 _SHARE = 4  # one block in this many
+SPANS = "spans of time"
 _TAIL = 4.0  # degrees of freedom of Student's t
 
 
@@ -63,7 +64,7 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     time = campaign.covariates.get("time", np.arange(len(campaign)))
     order = np.argsort(np.argsort(time, kind="stable"))
     count = min(2 * _FEWEST, len(campaign))
-    return order * count // len(campaign), "spans of time"
+    return order * count // len(campaign), SPANS
 
 
 def gain_over_blocks(

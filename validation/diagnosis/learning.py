@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import (
     Candidate,
@@ -25,6 +27,7 @@ from validation.diagnosis.candidates import (
 from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.forms_tried import all_shapes, first_shapes
 from validation.diagnosis.remainder import (
+    PROVEN,
     Remainder,
     Unexplained,
     function_term,
@@ -40,6 +43,7 @@ _SURE = 3.0  # in score: what a function must be worth
 _SPLINE = 3.0  # in score: by which a form without a name must be better
 _EQUAL = 3.0  # in score: places that do as well
 _LARGE = 100  # unknowns of one size, from which turning them pays
+_CLOCK = 0.999  # correlation with time of what counts it
 _NOISE = 0.05  # probability above which what is left is noise
 
 
@@ -68,6 +72,8 @@ class Lesson:
         prior: of all of them.
         left: [-] squared whitened residual that stays.
         unknowns: [-] that the readings say, effects among them.
+        forecast: [-] cost of what is foretold of other spans of time, where rows
+            follow one another: their errors are not independent, and a fit tells less.
     """
 
     learned: tuple[Learned, ...]
@@ -75,10 +81,13 @@ class Lesson:
     prior: Prior
     left: float
     unknowns: float
+    forecast: float | None
 
     @property
     def cost(self) -> float:
         """[-] least is best."""
+        if self.forecast is not None:
+            return self.forecast
         return cost(len(self.terms[0].columns), self.left, self.unknowns)
 
 
@@ -245,9 +254,14 @@ def learn(
             break
         school.believe([function])
     update("functions learned", MOST, MOST)
-    unknowns = school.effects.shape[1] + school.unknowns
+    judged = school.part(_JUDGED)
     return Lesson(
-        tuple(school.learned), tuple(school.terms), school.prior, school.left, unknowns
+        learned=tuple(school.learned),
+        terms=tuple(school.terms),
+        prior=school.prior,
+        left=school.left,
+        unknowns=school.effects.shape[1] + school.unknowns,
+        forecast=judged.forecast() if judged.successive else None,
     )
 
 
@@ -282,12 +296,61 @@ def _best(
         return None
     unnamed = np.array([one.shape.form == "spline" for one in refined])
     worth = judged.worths(refined) - _SPLINE * unnamed
-    best = int(np.argmax(worth))
     tried = len(looked) * max(1, len(refined) // len(chosen))
-    gain = worth[best] - np.log(tried) - 0.5 * np.log(judged.count)
-    if gain < _SURE:
+    gains = worth - np.log(tried) - 0.5 * np.log(judged.count)
+    sure = np.flatnonzero(gains >= _SURE)
+    if not len(sure):
         return None
-    near = np.flatnonzero(worth > worth[best] - _EQUAL)
+    best = int(np.argmax(worth))
+    if judged.successive:
+        best = int(sure[_simplest(judged, [refined[i] for i in sure], worth[sure])])
+    near = np.flatnonzero(np.abs(worth - worth[best]) < _EQUAL)
     others = dict.fromkeys(refined[i].parts for i in near[np.argsort(-worth[near])])
     same = tuple(parts for parts in others if parts != refined[best].parts)
-    return Learned(refined[best], same, float(gain))
+    return Learned(refined[best], same, float(gains[best]))
+
+
+def _simplest(judged: Remainder, refined: Sequence[Candidate], worth: NDArray) -> int:
+    """Which form, of those that foretell other spans of time nearly as well as any.
+
+    Errors of rows that follow one another are not independent, so that evidence prefers
+    what is large; of the forms within a standard error of the best forecast, block by
+    block, that with the fewest unknowns.  Time by itself stands for whatever changed
+    meanwhile, and is heard where nothing that was measured foretells anything.
+
+    Returns:
+        Its place.
+
+    Sources:
+        Breiman, Friedman, Olshen, Stone (1984), Classification and regression trees,
+        section 3.4.3.
+    """
+    first: dict[tuple[object, ...], int] = {}
+    for i in np.argsort(-worth, kind="stable").tolist():
+        one = refined[i]
+        # other places do the same there
+        first.setdefault((one.kind, one.parts[0].variable, one.shape), i)
+    gains = {i: judged.gain(refined[i]) for i in first.values()}
+    proven = {i: gain for i, (gain, error) in gains.items() if gain > PROVEN * error}
+    if not proven:
+        return int(np.argmax(worth))
+    rows = judged.sensitivities
+    conditions = rows.conditions.take(rows.rows)
+    measured = [i for i in proven if not _follows_time(conditions, refined[i])]
+    asked = measured or list(proven)
+    most = max(asked, key=lambda i: proven[i])
+    behind = {i: judged.gain(refined[most], refined[i]) for i in asked}
+    near = [i for i, (gain, error) in behind.items() if gain <= error]
+    return min(near, key=lambda i: (_unknowns(refined[i]), -worth[i]))
+
+
+def _unknowns(one: Candidate) -> int:
+    """How many numbers a form has, with those that were tried one by one."""
+    return len(one.shape.names) + len(one.shape.given)
+
+
+def _follows_time(conditions: Conditions, one: Candidate) -> bool:
+    """Whether a candidate depends on time alone, or on what counts the rows."""
+    variables = (variable(conditions, part.variable) for part in one.parts)
+    time = conditions.time
+    return all(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK for x in variables)

@@ -38,11 +38,14 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.blocks import Block, Blocks
 from validation.diagnosis.candidates import Candidate, Sensitivities
 from validation.diagnosis.evidence import Evidence, Prior, sizes_in_use
-from validation.diagnosis.holdout import blocks_of, gain_over_blocks
+from validation.diagnosis.holdout import SPANS, blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
 _FOLDS = 5
-_PROVEN = 2.0  # standard errors by which a fold's rows must be foretold better
+PROVEN = 2.0  # standard errors by which a fold's rows must be foretold better
+_ROUNDED = 10.0  # times the least eigenvalue, where that is negative
+_LARGEST = 100.0  # times the residual: what an unknown may do
+_CLEAR = 1e6  # [sigma] above which squares beside those of noise are lost to rounding
 _FLAT = 1e4  # [sigma] size of unknowns of effects in a fold
 _SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # of a block, where its columns have norm 1
 
@@ -97,6 +100,7 @@ class Remainder:
         self.campaign, self.sensitivities = campaign, sensitivities
         self.count = int(cells.sum())
         self._all, self._cells = left, cells
+        self._known_errors: dict[Candidate, NDArray] = {}
         self._prior, self._noise = prior, noise
         Q = np.linalg.qr(left.effects[cells])[0]
 
@@ -133,15 +137,20 @@ class Remainder:
         """What a block of columns is worth beside what is known."""
         if block.size == 0.0:
             return -np.inf
-        values, vectors = np.linalg.eigh(block.gram / (block.size * self._noise) ** 2)
+        values, vectors = _seen(block.gram / (block.size * self._noise) ** 2)
         along = (vectors.T @ block.along / block.size) ** 2
         t = (_SIZES[:, None] * self._noise) ** 2
-        grown = 1 + t * np.maximum(values, 0.0)
+        grown = 1 + t * values
         left = self._squares - (along * t / grown).sum(axis=1)
         # the noise is what this candidate leaves, and no less than sigma says
         noise = np.clip(left / self.count, self._noise**-2.0, 1.0)
         gains = self._squares - left / noise - self.count * np.log(noise)
         return float((gains - np.log(grown).sum(axis=1)).max() / 2)
+
+    @property
+    def successive(self) -> bool:
+        """Whether rows that are foretold are apart from others in time only."""
+        return blocks_of(self.campaign)[1] == SPANS
 
     def foretells(self, one: Candidate) -> bool:
         """Whether a candidate foretells rows that it was not fitted to.
@@ -150,46 +159,123 @@ class Remainder:
             one: any.
 
         Returns:
-            Whether errors in folds over blocks of rows fall, beside all that is
-            known fitted anew in each.
+            Whether errors fall by more than twice what they scatter.
         """
-        where = blocks_of(self.campaign)[0][np.nonzero(self.campaign.cells)[0]]
-        names = np.random.default_rng(1).permutation(np.unique(where))
-        if len(names) < 2:
-            return False
-        folds = np.array_split(names, min(_FOLDS, len(names)))
-        parts = [np.flatnonzero(np.isin(where, fold)) for fold in folds]
-        order = np.concatenate(parts)  # fold after fold: each is a slice
-        X, known = self._beside(one, order)
-        z = self._all.residual[self._cells][order]
-        ends = np.cumsum([0, *map(len, parts)])
-        without, beside = _foretold(X, z, ends, known) / self._noise**2
-        gain, error = gain_over_blocks(without, beside, where[order])
-        return gain > _PROVEN * error
+        gain, error = self.gain(one)
+        return gain > PROVEN * error
 
-    def _beside(self, one: Candidate, order: NDArray) -> tuple[NDArray, int]:
-        """Columns (N, k) of unknowns of size one, cells in some order.
+    def gain(
+        self, one: Candidate, other: Candidate | None = None
+    ) -> tuple[float, float]:
+        """How much likelier a candidate makes rows that it was not fitted to.
+
+        Args:
+            one: any.
+            other: than by this one; than by neither if absent.
 
         Returns:
-            The columns, a candidate's last, and how many are not the candidate's.
+            :func:`.holdout.gain_over_blocks` in folds over blocks of rows, beside all
+            that is known, fitted anew in each; zeros if there is but one block.
         """
+        folds = self._folds()
+        if len(folds) < 2:
+            return 0.0, 0.0
+        where = self._blocks_of_cells()[np.concatenate(folds)]
+        without, beside = self._errors(one)
+        if other is not None:
+            without = self._errors(other)[1]
+        return gain_over_blocks(without, beside, where)
+
+    def _errors(self, one: Candidate) -> NDArray:
+        """(2, N) squared errors in folds without and with a candidate, found once."""
+        if one not in self._known_errors:
+            folds = self._folds()
+            columns = self._columns(one, np.concatenate(folds))
+            self._known_errors[one] = self._foretold(folds, columns)
+        return self._known_errors[one]
+
+    def forecast(self) -> float:
+        """What all that is known makes of rows that it was not fitted to.
+
+        Returns:
+            Errors in folds over blocks of rows, each fitted anew to the others, as a
+            cost by Student's t, least is best; zero if there is but one block.
+        """
+        folds = self._folds()
+        if len(folds) < 2:
+            return 0.0
+        nothing = np.zeros((self.count, 0))
+        squares = self._foretold(folds, nothing)[0] * self._noise**2
+        return -gain_over_blocks(np.zeros_like(squares), squares, np.zeros(self.count))[
+            0
+        ]
+
+    def _blocks_of_cells(self) -> NDArray:
+        """(N,) block of every reading."""
+        return blocks_of(self.campaign)[0][np.nonzero(self.campaign.cells)[0]]
+
+    def _folds(self) -> list[NDArray]:
+        """Readings of each fold: some of the blocks, in an order drawn once."""
+        where = self._blocks_of_cells()
+        names = np.random.default_rng(1).permutation(np.unique(where))
+        parts = np.array_split(names, min(_FOLDS, len(names)))
+        return [np.flatnonzero(np.isin(where, part)) for part in parts]
+
+    def _foretold(self, folds: Sequence[NDArray], further: NDArray) -> NDArray:
+        """Errors in folds by what is known, and with further columns (N, m) beside it.
+
+        Returns:
+            (2, N) squares over that of the noise, fold after fold.
+        """
+        order = np.concatenate(folds)
+        X = self._beside(order, further)
+        z = self._all.residual[self._cells][order]
+        ends = np.cumsum([0, *map(len, folds)])
+        known = X.shape[1] - further.shape[1]
+        return _foretold(X, z, ends, known) / self._noise**2
+
+    def _columns(self, one: Candidate, order: NDArray) -> NDArray:
+        """(N, m) columns of a candidate's unknowns of size one, cells in some order."""
         B = in_cells(self.sensitivities, one, self.campaign)
-        B = B[order] * self._likeliest(one, B)
+        return B[order] * self._likeliest(one, B)
+
+    def _beside(self, order: NDArray, further: NDArray) -> NDArray:
+        """(N, k) columns of all unknowns of size one, further ones last."""
         cells = np.flatnonzero(self._cells)[order]
         effects = self._all.effects[cells]
         norm = np.linalg.norm(effects, axis=0)
         flat = effects * (_FLAT / np.where(norm > 0, norm, 1.0))
-        X = self._all.scaled(self._prior, cells, flat, B)
-        return X, X.shape[1] - B.shape[1]
+        X = self._all.scaled(self._prior, cells, flat, further)
+        # larger ones are flat already, and lost to rounding in their products
+        norm = np.sqrt(np.einsum("ij,ij->j", X, X))
+        most = _LARGEST * float(np.linalg.norm(self._all.residual))
+        most = min(max(_FLAT, most), _CLEAR)
+        X *= np.minimum(1.0, most / np.where(norm > 0, norm, 1.0))
+        return X
 
     def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:
         """(m,) likeliest sizes of a candidate's unknowns."""
         axis = self.sensitivities.axes(one)
         ((_, block),) = self._blocks.of([one])
-        gram = block.gram / self._noise**2
+        values, vectors = _seen(block.gram / self._noise**2)
+        gram, seen = (vectors * values) @ vectors.T, vectors @ vectors.T
         evidence = Evidence([function_term("", axis, B)], self.count, gram)
-        prior = evidence.best_of(block.along, self._squares)
+        prior = evidence.best_of(seen @ block.along, self._squares)
         return sizes_in_use(evidence.terms, prior)
+
+
+def _seen(gram: NDArray) -> tuple[NDArray, NDArray]:
+    """Directions in which a block (m, m) differs from what is known.
+
+    What a block shares with what is known cancels, but for rounding: as negative as the
+    least eigenvalue, others are as large.
+
+    Returns:
+        (k,) eigenvalues and (m, k) eigenvectors.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    clear = values > _ROUNDED * max(0.0, -values[0])
+    return values[clear], vectors[:, clear]
 
 
 def in_cells(

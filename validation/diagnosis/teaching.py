@@ -1,25 +1,26 @@
 """Functions learned beside the library's best set, or instead of it.
 
-What the library leaves is searched twice: after its best set, and from the declared
-machine as if there were no library.  The simpler story of both is kept, if it foretells
-what was kept aside better than the library alone.
+What the library leaves is searched after its best set, after that set without effects
+of time alone, and from the declared machine as if there were no library.  The simplest
+story is kept, if it foretells what was kept aside better than the library alone.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects import LIBRARY
 from assembly.measurement.conditions import Conditions
 from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.background import background
 from validation.diagnosis.candidates import Sensitivities
-from validation.diagnosis.holdout import blocks_of, gain_over_blocks
+from validation.diagnosis.holdout import SPANS, blocks_of, gain_over_blocks
 from validation.diagnosis.kept_aside import FittedModel
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, cost, learn, term_name
-from validation.diagnosis.refit import refit, with_clearance_held
+from validation.diagnosis.learning import Learned, Lesson, cost, learn, term_name
+from validation.diagnosis.refit import Fit, refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.remainder import Unexplained
 from validation.diagnosis.responses import responses
@@ -54,44 +55,97 @@ def taught(
     fitting, some = campaign.take(used), conditions.take(used)
     left = selection.behind.left(selection.fit.residual)
     unknowns = selection.unknowns + round(selection.behind.unknowns)
-    if lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT:
+    enough = lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT
+    if enough and not _timed(campaign, selection):
         return selection, ()
     response = responses(conditions)
     sensitivities = Sensitivities(conditions, campaign.robot, response)
-    device = [device_frame(some)] if campaign.registration == "unknown" else []
-    begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
-    alone = refit(fitting, some, device, begin)
-    stories = [(alone, selection.columns[:, : len(begin)])]
-    if selection.sets[0].members and selection.sets[0].rank:
-        raw = selection.behind.raw(selection.fit.residual)
-        stories.append((replace(selection.fit, residual=raw), selection.columns))
-    best, lesson, fit = 0, None, alone
-    for k, (story, columns) in enumerate(stories):
-        left_over = Unexplained(selection.terms, story.residual, columns)
-        new = learn(campaign, used, sensitivities, left_over, update, known)
-        if lesson is None or new.cost < lesson.cost:
-            best, lesson, fit = k, new, story
-    assert lesson is not None
+    best: tuple[_Story, Lesson] | None = None
+    for story in _stories(fitting, some, selection):
+        left_over = Unexplained(selection.terms, story.fit.residual, story.columns)
+        lesson = learn(campaign, used, sensitivities, left_over, update, known)
+        if best is None or lesson.cost < best[1].cost:
+            best = story, lesson
+    assert best is not None
+    story, lesson = best
     if not lesson.learned:
         return selection, ()
     behind = background(lesson.terms, lesson.prior)
     fit = refit(
         fitting,
-        with_clearance_held(some, fit),
-        fit.hypotheses,
-        fit.values,
+        with_clearance_held(some, story.fit),
+        story.fit.hypotheses,
+        story.fit.values,
         behind=behind,
     )
     told = replace(selection, fit=fit, behind=behind, terms=lesson.terms)
-    if best == 0:
-        nothing = selection.screen.fit(())
-        told = replace(told, sets=[nothing, *selection.sets], unknowns=len(begin))
+    if story.members != selection.sets[0].members:
+        own = selection.screen.fit(story.members)
+        device = selection.unknowns - selection.sets[0].rank
+        told = replace(told, sets=[own, *selection.sets], unknowns=own.rank + device)
     held = with_clearance_held(conditions, selection.fit)
     before = FittedModel(held, response, selection.fit, selection.behind)
     after = FittedModel(conditions, response, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
         return selection, ()
     return told, lesson.learned
+
+
+@dataclass(frozen=True, eq=False)
+class _Story:
+    """Effects of the library beside which functions are looked for.
+
+    Attributes:
+        members: their hypotheses among those scored.
+        fit: of them.
+        columns: (N, k) whitened change of the readings per unknown.
+    """
+
+    members: tuple[int, ...]
+    fit: Fit
+    columns: NDArray
+
+
+def _stories(fitting: Campaign, some: Conditions, selection: Selection) -> list[_Story]:
+    """No effect at all; the best set; that set without effects of time alone."""
+    device = [device_frame(some)] if fitting.registration == "unknown" else []
+    members, fit, columns = selection.sets[0].members, selection.fit, selection.columns
+    begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
+    alone = refit(fitting, some, device, begin)
+    stories = [_Story((), alone, columns[:, : len(begin)])]
+    if not (members and selection.sets[0].rank):
+        return stories
+    raw = replace(fit, residual=selection.behind.raw(fit.residual))
+    stories.append(_Story(members, raw, columns))
+    # what changes in time by itself stands for whatever changed meanwhile
+    effects = selection.screen.effects
+    timeless = tuple(i for i in members if not _of_time(effects[i]))
+    if 0 < len(timeless) < len(members):
+        hypotheses = [h for h in fit.hypotheses if not _of_time(h.effect)]
+        kept = np.repeat(
+            [not _of_time(h.effect) for h in fit.hypotheses],
+            [len(h.slots) for h in fit.hypotheses],
+        )
+        again = refit(fitting, some, hypotheses, fit.values[kept])
+        stories.append(_Story(timeless, again, columns[:, kept]))
+    return stories
+
+
+def _timed(campaign: Campaign, selection: Selection) -> bool:
+    """Whether effects of time alone were fitted to rows that follow one another.
+
+    They fit whatever changes slowly, and foretell little of it.
+
+    Returns:
+        Whether there is such an effect in the best set.
+    """
+    effects = (selection.screen.effects[i] for i in selection.sets[0].members)
+    return blocks_of(campaign)[1] == SPANS and any(map(_of_time, effects))
+
+
+def _of_time(effect: str) -> bool:
+    """Whether nothing but time drives an effect of the library."""
+    return effect in LIBRARY and LIBRARY[effect].needs == ("time",)
 
 
 def cost_of(selection: Selection) -> float:

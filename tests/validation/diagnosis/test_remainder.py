@@ -116,6 +116,45 @@ def test_nothing_known_can_be_worth_anything():
     assert worth(here, E) == pytest.approx(0.0, abs=1e-4)
 
 
+def test_a_block_that_is_known_but_for_rounding_is_worth_nothing():
+    """Large unknowns: what cancels leaves products of either sign, and no news."""
+    rng = np.random.default_rng(13)
+    campaign = SimpleNamespace(
+        cells=np.ones((ROWS, 6), bool), sigma=np.ones((ROWS, 6)),
+        configuration=np.arange(ROWS),
+    )  # fmt: skip
+    J = 1e7 * rng.normal(size=(CELLS, 4))
+    J[:, 3] = J[:, 0] + 1e-3 * rng.normal(size=CELLS)
+    term = SmallTerm(GEOMETRY, np.arange(4), np.array([0, 1, 3, 4]), J,
+                     np.full(4, np.nan), -np.inf)  # fmt: skip
+    prior = Prior((np.ones(4, bool),), {GEOMETRY: (3.0, 3.0)}, 0.0, 0.0)
+    z = J @ rng.normal(size=4) + rng.normal(size=CELLS)
+    left = Unexplained([term], z, np.zeros((CELLS, 0)))
+    here = Remainder(campaign, AnyColumns(), left, np.ones(CELLS, bool), prior, 1.0)
+    known = here.sensitivities.candidate(J[:, :3] @ rng.normal(size=(3, 3)))
+    assert here.worths([known])[0] < 3.0
+    gain, error = here.gain(known)
+    assert gain <= 2 * error + 3.0
+
+
+def test_a_forecast_is_the_cost_of_what_the_other_folds_say():
+    """By the posterior mean of all unknowns, one linear system for each fold."""
+    rng = np.random.default_rng(14)
+    here, z, E, _ = remainder(rng)
+    J = here._all.terms[0].columns * np.array(SCALES)[[0, 0, 1, 1]]
+    flat = E / np.linalg.norm(E, axis=0) * 1e4
+    X = np.hstack([J, flat])
+    rows = np.repeat(np.arange(ROWS), 6)
+    parts = np.array_split(np.random.default_rng(1).permutation(np.arange(ROWS)), 5)
+    expected = 0.0
+    for part in parts:
+        apart = np.isin(rows, part)
+        A = X[~apart].T @ X[~apart] + np.eye(X.shape[1])
+        x = np.linalg.solve(A, X[~apart].T @ z[~apart])
+        expected += 5 * np.log1p((z - X @ x)[apart] ** 2 / 4).sum()
+    assert here.forecast() == pytest.approx(expected, rel=1e-6)
+
+
 def test_noise_beyond_sigma_makes_a_candidate_worth_less():
     """The same readings in a sigma three times as large: a ninth of the squares."""
     worths = []
@@ -162,7 +201,7 @@ class _Endless:
         self.learned += functions
 
     def part(self, most):
-        return SimpleNamespace(foretells=lambda candidate: True)
+        return SimpleNamespace(foretells=lambda candidate: True, successive=False)
 
 
 @pytest.fixture

@@ -1,0 +1,96 @@
+"""Readings of one place that follow one another while temperatures change."""
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.model.robot import Frame, Robot
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import corrected, table
+
+ROWS, STEP, SIGMA = 240, 60.0, 2e-6
+BED, FRAME = 0.9e-6, -16e-6  # [m/K]
+SLOW = 1.5e-6  # [m] of noise correlated over 10 minutes
+
+
+def lagged(x, time_constant):
+    """What follows x with a delay of first order."""
+    y = np.empty_like(x)
+    y[0] = x[0]
+    for i in range(1, len(x)):
+        y[i] = y[i - 1] + (x[i] - y[i - 1]) * (1 - np.exp(-STEP / time_constant))
+    return y
+
+
+def diagnosed(tmp_path, read, covariates, sigma=SIGMA):
+    """A z axis that stands still: its readings and what was measured beside them."""
+    frames = Frame("z", joint="prismatic", actuated=True), Frame("nozzle", "z")
+    write_robot(Robot("axis", "nozzle", frames), tmp_path / "robot.toml")
+    (tmp_path / "campaign.toml").write_text(
+        'robot = "robot.toml"\nmeasurements = "rows.csv"\nregistration = "known"\n'
+        f"[noise]\nrotation = 1.0\nposition = {sigma}\n"
+    )
+    head = ",".join(["id", "q.z", "meas.tz", *(f"cov.{name}" for name in covariates)])
+    rows = np.column_stack([np.zeros(len(read)), read, *covariates.values()])
+    lines = [f"m{i}," + ",".join(f"{x:.9g}" for x in row) for i, row in enumerate(rows)]
+    (tmp_path / "rows.csv").write_text("\n".join([head, *lines]) + "\n")
+    return diagnose(read_campaign(tmp_path))
+
+
+@pytest.fixture(scope="module")
+def heated(tmp_path_factory):
+    """A bed heated twice, and the frame after it, move the nozzle in proportion."""
+    rng = np.random.default_rng(3)
+    time = STEP * np.arange(ROWS)
+    asked = np.select([time < 600, time < 5400, time < 9000], [0.0, 60.0, 20.0], 80.0)
+    bed = lagged(asked, 300.0) + 0.05 * rng.normal(size=ROWS)
+    chamber = lagged(0.3 * bed, 2500.0) + 0.05 * rng.normal(size=ROWS)
+    frame = lagged(0.5 * chamber, 1500.0) + 0.03 * rng.normal(size=ROWS)
+    slow = lagged(rng.normal(size=ROWS), 600.0)
+    noise = SLOW * slow / slow.std() + SIGMA * rng.normal(size=ROWS)
+    covariates = {"time": time, "bed": bed, "chamber": chamber, "frame": frame}
+    folder = tmp_path_factory.mktemp("heated")
+    read = BED * bed + FRAME * frame + noise
+    return diagnosed(folder, read, covariates), noise
+
+
+def test_the_causes_are_learned_in_their_simplest_form(heated):
+    """Noise correlated in time makes splines and functions of time likelier.
+
+    The gain of the bed: to five of its standard errors by the noise, 2.5 um, whose
+    correlation leaves of the 180 rows fitted some forty that are independent.
+    """
+    diagnosis, _ = heated
+    functions = corrected(diagnosis).functions
+    learned = {one.variables[0]: one for one in functions}
+    assert set(learned) == {"cov.bed", "cov.frame"}
+    assert all(one.form == "powers" for one in functions)
+    (value,) = learned["cov.bed"].parameters.values()
+    spread = 15.0  # K rms of the bed's temperature about its mean and what frames say
+    assert value == pytest.approx(BED, abs=5 * 2.5e-6 / spread / np.sqrt(40))
+
+
+def test_spans_of_time_kept_aside_are_foretold_to_the_noise(heated):
+    """60 rows, some fifteen of them independent: within half of the noise in them."""
+    diagnosis, noise = heated
+    kept = ~diagnosis.split.fitted
+    left = np.sqrt(np.mean(noise[kept] ** 2))
+    assert diagnosis.before.position > 7 * left
+    assert diagnosis.after.position < 1.5 * left
+
+
+def test_many_blunders_do_not_keep_from_learning(tmp_path):
+    """Eleven, each two thirds of the one before: left out one after another."""
+    rng = np.random.default_rng(9)
+    warm = np.sin(np.linspace(0, 20, 320))
+    read = 80e-6 * warm**2 + 1e-6 * rng.normal(size=320)
+    where = rng.choice(320, 11, replace=False)
+    read[where] += 2e-2 * 0.62 ** np.arange(11)
+    diagnosis = diagnosed(tmp_path, read, {"bed": warm}, sigma=1e-6)
+    fitted = set(where[diagnosis.split.fitted[where]].tolist())
+    assert len(fitted) >= 7  # the others are kept aside
+    assert fitted <= set(np.flatnonzero(diagnosis.outliers).tolist())
+    (learned,) = table(diagnosis)["learned"]
+    assert learned["variables"] == ["cov.bed"]
+    assert diagnosis.trimmed[1].normalised < 1 + 4 / np.sqrt(2 * 80)
