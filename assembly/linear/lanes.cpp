@@ -1,29 +1,10 @@
 // Problems (22), without loads, (21) and (27), and the classical compliance, several
 // postures side by side.
+#include "cpp/assembled.h"
 #include "cpp/compliances.h"
-#include "cpp/energies.h"
-#include "cpp/margins.h"
 #include "cpp/pose_errors.h"
 
 constexpr size_t AT_ONCE = 1024;  // points whose reachable sets are kept together
-
-// Solves every point, as assemble_all of compiled_energy.py does.
-EXPORTED void assemble_all(
-    const Robot *robot, const Points *points, Solutions *out) {
-    Energies energies(*robot, *points);
-    in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
-        return energies.solve(*points, block, pending, *out);
-    });
-}
-
-// Margins of every point of a robot without springs, as compiled_zone.py's all_margins.
-EXPORTED void all_margins(
-    const Robot *robot, const Points *points, Margins *out) {
-    ZoneMargins zone(*robot, *points);
-    in_blocks(all_of(points->count), [&](const Block &block, Whole pending) {
-        return zone.margins(*points, block, pending, *out);
-    });
-}
 
 // Bounds of the largest pose errors of the points whose outcome is SOLVED, as
 // compiled_reach.py's bound_all.

@@ -18,6 +18,7 @@ from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
 from forcefit.native.libraries import address, load_library
 
 SOURCE = "assembly/linear/lanes.cpp"
+FEW_LANES = "assembly/linear/few_lanes.cpp"  # (22) and (21) of one or two points
 _ARRAYS = (
     "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
     "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis", "cone_size",
@@ -145,10 +146,11 @@ def _side_by_side(
 ) -> bool:  # fmt: skip
     """Call a function of the library on every point; whether it did."""
     # tables are what its other arguments point to: addresses of arrays, in their order
-    library = load_library(SOURCE)
+    T, errors, mismatch = points
+    few = len(T) <= 2 and name in {"assemble_all", "all_margins"}
+    library = load_library(FEW_LANES if few else SOURCE)
     if library is None:
         return False
-    T, errors, mismatch = points
     given = PointsRecord(len(T), *map(_address, points), len(errors) > 1)
     rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
     getattr(library, name)(*map(ctypes.byref, (_robot(structure), given, *rows)))

@@ -28,17 +28,19 @@ from numpy.typing import NDArray
 from forcefit.inputs.locking import locked_file
 
 _ROOT = Path(__file__).parents[2]
-# lanes must not depend on each other: nothing that lets sums be reordered; of what -O3
-# adds only whole loops undone matter to speed, and the rest takes a fifth longer
+# lanes must not depend on each other, nor answers on how many lanes there are: nothing
+# that lets sums be reordered, products and sums rounded one by one (which takes no
+# longer); of what -O3 adds only whole loops undone matter to speed, and the rest takes
+# a fifth longer
 _OPTIONS = (
-    "-std=c++17", "-O2", "-fpeel-loops", "-march=native", "-fno-math-errno",
-    "-fvisibility=hidden", "-shared", "-fPIC",
+    "-std=c++17", "-O2", "-fpeel-loops", "-march=native", "-ffp-contract=off",
+    "-fno-math-errno", "-fvisibility=hidden", "-shared", "-fPIC",
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
 # what nearly every command that needs one of them needs
 _TOGETHER = {
     "assembly/linear/lanes.cpp", "assembly/kinematics/continuation.cpp",
-    "assembly/solvers/one_problem.cpp",
+    "assembly/linear/few_lanes.cpp",
 }  # fmt: skip
 _LONGEST = 120  # [s] a compiler may take
 # what /proc/cpuinfo says of processors of one kind
