@@ -30,20 +30,19 @@ from validation.diagnosis.lack_of_fit import (
     lack_of_fit,
     outlying,
 )
-from validation.diagnosis.learning import Learned
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
 from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, screws_of
-from validation.diagnosis.teaching import cost_of, taught
+from validation.diagnosis.teaching import NOTHING, cost_of, taught
 
 _PASSES = 8  # of believing repeats, and finite geometric errors
 _TURNS = 6  # of leaving out rows, in each
 _LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
 _BENDS = 3  # times that what finite geometric errors add is found anew
 _SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step towards the errors found
-_BENT = 0.1  # [sigma] change of what finite geometric errors add that is looked at
+_BENT = 0.1  # of what is left, or of sigma: change of what finite errors add
 
 
 def diagnose(
@@ -76,7 +75,7 @@ def diagnose(
     impossible = impossible_rows(campaign)
     outliers = impossible.copy()
     factor, inflation, bends = np.ones(6), 1.0, 0
-    learned: tuple[Learned, ...] = ()
+    learned = NOTHING
     straight: _Straight | None = None
     for _ in range(_PASSES):
         some = partial(select, update=update, finite=finite)
@@ -95,12 +94,16 @@ def diagnose(
         selection, learned = taught(
             campaign, conditions, used, selection, update, known
         )
-        if learned and straight is not None and np.array_equal(used, straight.used):
+        if (
+            learned.functions
+            and straight is not None
+            and np.array_equal(used, straight.used)
+        ):
             # errors may have stood for what was learned, and finite ones hide it
             other, same = taught(
                 campaign, straight.conditions, used, straight.selection, update, learned
             )
-            if same and cost_of(other) < cost_of(selection):
+            if same.functions and cost_of(other) < cost_of(selection):
                 conditions, selection = straight.conditions, other
         left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
@@ -126,7 +129,7 @@ def diagnose(
             noise_factor=factor,
             inflation=inflation,
             selection=selection,
-            learned=learned,
+            learned=learned.functions,
             finite=finite,
         )
     )
@@ -200,6 +203,8 @@ def _with_errors(
 
     if not any(term.name == GEOMETRY for term in behind.terms):
         return conditions
+    stays = behind.left(selection.fit.residual)
+    limit = _BENT * max(1.0, float(np.sqrt(np.mean(stays**2))))
     known = [np.zeros(len(term)) for term in behind.terms]
     lost, left = at(known)[0], raw
     for _ in range(_PASSES):
@@ -211,7 +216,7 @@ def _with_errors(
                 break
         else:
             break
-        if np.abs(there - left).max(initial=0.0) < _BENT:
+        if np.abs(there - left).max(initial=0.0) < limit:
             break
         conditions, known, lost, left = bent, values, trial, there
     return conditions

@@ -26,6 +26,7 @@ from validation.diagnosis.candidates import (
 )
 from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.forms_tried import all_shapes, first_shapes
+from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.remainder import (
     PROVEN,
     Remainder,
@@ -254,14 +255,14 @@ def learn(
             break
         school.believe([function])
     update("functions learned", MOST, MOST)
-    judged = school.part(_JUDGED)
+    successive = blocks_of(school.fitting)[1] == SPANS
     return Lesson(
         learned=tuple(school.learned),
         terms=tuple(school.terms),
         prior=school.prior,
         left=school.left,
         unknowns=school.effects.shape[1] + school.unknowns,
-        forecast=judged.forecast() if judged.successive else None,
+        forecast=school.part(_JUDGED).forecast() if successive else None,
     )
 
 

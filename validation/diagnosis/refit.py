@@ -28,6 +28,9 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_CALLS = 30
+_SHORT = (
+    1e-3  # relative step below which slopes are taken anew rather than it is halved
+)
 _MOST_ROUNDS = 8  # each from slopes taken where the last one ended
 _TINY = 1e-300
 _FAINT = 0.01  # [sigma] over all readings, of unknowns that may as well be zero
@@ -326,7 +329,7 @@ def _refit(
             fitted = least_squares(
                 lambda x: left_at(with_seen(x)), scaled[seen],
                 jac=_Secants(lambda x: left_at(with_seen(x)), J[:, seen]),
-                bounds=bounds, max_nfev=_MOST_CALLS, xtol=1e-8, ftol=_CONVERGED,
+                bounds=bounds, max_nfev=_MOST_CALLS, xtol=_SHORT, ftol=_CONVERGED,
                 gtol=1e-10, x_scale="jac",
             )  # fmt: skip
             scaled = with_seen(fitted.x)

@@ -1,8 +1,9 @@
 """Functions learned beside the library's best set, or instead of it.
 
-What the library leaves is searched after its best set, after that set without effects
-of time alone, and from the declared machine as if there were no library.  The simplest
-story is kept, if it foretells what was kept aside better than the library alone.
+What the library leaves is searched after its best set, and from the declared machine as
+if there were no library; where rows follow one another, after the best set without
+effects of time alone, too.  The simplest story is kept, if it foretells what was kept
+aside better than the library alone.
 """
 
 from dataclasses import dataclass, replace
@@ -36,8 +37,8 @@ def taught(
     used: NDArray,
     selection: Selection,
     update: Update,
-    known: tuple[Learned, ...] | None = None,
-) -> tuple[Selection, tuple[Learned, ...]]:
+    known: "Taught | None" = None,
+) -> "tuple[Selection, Taught]":
     """Learn what the library leaves, where that is more than noise.
 
     Args:
@@ -46,30 +47,33 @@ def taught(
         used: mask (R,) of the rows fitted.
         selection: what the library says of them.
         update: told what is done, how much of it and of how much.
-        known: functions found with a smaller sigma, beside which none is looked for.
+        known: what was learned with a smaller sigma: no other functions are looked
+            for, and no other story.
 
     Returns:
-        The selection with the functions behind its effects, or what was given, and the
-        functions.
+        The selection with the functions behind its effects, or what was given, and what
+        was learned.
     """
     fitting, some = campaign.take(used), conditions.take(used)
     left = selection.behind.left(selection.fit.residual)
     unknowns = selection.unknowns + round(selection.behind.unknowns)
     enough = lack_of_fit(fitting, left, unknowns).probability > SIGNIFICANT
     if enough and not _timed(campaign, selection):
-        return selection, ()
+        return selection, NOTHING
     response = responses(conditions)
     sensitivities = Sensitivities(conditions, campaign.robot, response)
     best: tuple[_Story, Lesson] | None = None
+    functions = None if known is None else known.functions
     for story in _stories(fitting, some, selection):
+        if known is not None and known.kind != story.kind:
+            continue
         left_over = Unexplained(selection.terms, story.fit.residual, story.columns)
-        lesson = learn(campaign, used, sensitivities, left_over, update, known)
+        lesson = learn(campaign, used, sensitivities, left_over, update, functions)
         if best is None or lesson.cost < best[1].cost:
             best = story, lesson
-    assert best is not None
+    if best is None or not best[1].learned:
+        return selection, NOTHING
     story, lesson = best
-    if not lesson.learned:
-        return selection, ()
     behind = background(lesson.terms, lesson.prior)
     fit = refit(
         fitting,
@@ -87,8 +91,24 @@ def taught(
     before = FittedModel(held, response, selection.fit, selection.behind)
     after = FittedModel(conditions, response, fit, behind, lesson.learned)
     if not _foretells(campaign, ~used, before, after):
-        return selection, ()
-    return told, lesson.learned
+        return selection, NOTHING
+    return told, Taught(lesson.learned, story.kind)
+
+
+@dataclass(frozen=True, eq=False)
+class Taught:
+    """What was learned, and beside what.
+
+    Attributes:
+        functions: in the order found.
+        kind: of the story that they belong to.
+    """
+
+    functions: tuple[Learned, ...]
+    kind: str
+
+
+NOTHING = Taught((), "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +116,13 @@ class _Story:
     """Effects of the library beside which functions are looked for.
 
     Attributes:
+        kind: in a word.
         members: their hypotheses among those scored.
         fit: of them.
         columns: (N, k) whitened change of the readings per unknown.
     """
 
+    kind: str
     members: tuple[int, ...]
     fit: Fit
     columns: NDArray
@@ -112,22 +134,22 @@ def _stories(fitting: Campaign, some: Conditions, selection: Selection) -> list[
     members, fit, columns = selection.sets[0].members, selection.fit, selection.columns
     begin = np.concatenate([np.zeros(0), *(h.start for h in device)])
     alone = refit(fitting, some, device, begin)
-    stories = [_Story((), alone, columns[:, : len(begin)])]
+    stories = [_Story("alone", (), alone, columns[:, : len(begin)])]
     if not (members and selection.sets[0].rank):
         return stories
     raw = replace(fit, residual=selection.behind.raw(fit.residual))
-    stories.append(_Story(members, raw, columns))
+    stories.append(_Story("beside", members, raw, columns))
     # what changes in time by itself stands for whatever changed meanwhile
     effects = selection.screen.effects
     timeless = tuple(i for i in members if not _of_time(effects[i]))
-    if 0 < len(timeless) < len(members):
+    if blocks_of(fitting)[1] == SPANS and 0 < len(timeless) < len(members):
         hypotheses = [h for h in fit.hypotheses if not _of_time(h.effect)]
         kept = np.repeat(
             [not _of_time(h.effect) for h in fit.hypotheses],
             [len(h.slots) for h in fit.hypotheses],
         )
         again = refit(fitting, some, hypotheses, fit.values[kept])
-        stories.append(_Story(timeless, again, columns[:, kept]))
+        stories.append(_Story("timeless", timeless, again, columns[:, kept]))
     return stories
 
 

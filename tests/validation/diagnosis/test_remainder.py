@@ -192,6 +192,7 @@ class _Endless:
     """Rows that never become noise, and foretell whatever is asked."""
 
     done, terms, prior, left, unknowns = False, (), None, 1.0, 0.0
+    fitting = SimpleNamespace(configuration=np.arange(ROWS))
     effects = np.zeros((1, 0))
 
     def __init__(self, *given):
