@@ -35,7 +35,7 @@ from validation.diagnosis.registration import register
 from validation.diagnosis.selection import Selection, Update, select
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, screws_of
-from validation.diagnosis.teaching import NOTHING, cost_of, taught
+from validation.diagnosis.teaching import NOTHING, Taught, cost_of, taught
 
 _PASSES = 8  # of believing repeats, and finite geometric errors
 _TURNS = 6  # of leaving out rows, in each
@@ -94,17 +94,10 @@ def diagnose(
         selection, learned = taught(
             campaign, conditions, used, selection, update, known
         )
-        if (
-            learned.functions
-            and straight is not None
-            and np.array_equal(used, straight.used)
-        ):
-            # errors may have stood for what was learned, and finite ones hide it
-            other, same = taught(
-                campaign, straight.conditions, used, straight.selection, update, learned
+        if straight is not None and np.array_equal(used, straight.used):
+            conditions, selection = _straighter(
+                campaign, straight, conditions, selection, learned, update
             )
-            if same.functions and cost_of(other) < cost_of(selection):
-                conditions, selection = straight.conditions, other
         left = selection.behind.left(selection.fit.residual)
         larger = believed_noise(fitting, left)
         lack = lack_of_fit(
@@ -177,6 +170,28 @@ class _Straight:
     conditions: Conditions
     used: NDArray
     selection: Selection
+
+
+def _straighter(
+    campaign: Campaign, straight: _Straight, conditions: Conditions,
+    selection: Selection, learned: Taught, update: Update,
+) -> tuple[Conditions, Selection]:  # fmt: skip
+    """The same functions without finite errors, if they cost less there.
+
+    Errors may have stood for what was learned, and finite ones hide it.
+
+    Returns:
+        Conditions and selection with them, or those given.
+    """
+    if not learned.functions:
+        return conditions, selection
+    other, same = taught(
+        campaign, straight.conditions, straight.used, straight.selection, update,
+        learned,
+    )  # fmt: skip
+    if same.functions and cost_of(other) < cost_of(selection):
+        return straight.conditions, other
+    return conditions, selection
 
 
 def _with_errors(
