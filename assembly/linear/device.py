@@ -59,14 +59,7 @@ def assemble_on_device(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: Solutions,
 ) -> bool:  # fmt: skip
-    """Solve (22) at every point; see :class:`~assembly.linear.solutions.Solutions`.
-
-    Args:
-        structure: the robot.
-        T: (k, n, 4, 4) frames.
-        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
-        mismatch: (k,) [rad, m] nominal closure error of the frames.
-        out: arrays to fill.
+    """Solve (22) at every point, as :func:`.lanes.assemble_side_by_side` does.
 
     Returns:
         Whether it did; not where there is no device, or points are few.
@@ -78,14 +71,7 @@ def margins_on_device(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray],
 ) -> bool:  # fmt: skip
-    """Margins (21) of all points, with their lower bounds.
-
-    Args:
-        structure: the robot, without springs.
-        T: (k, n, 4, 4) frames.
-        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
-        mismatch: (k,) [rad, m] nominal closure error of the frames.
-        out: (k,) margins, their bounds and outcomes to fill.
+    """Margins (21) of all points, as :func:`.lanes.margins_side_by_side` finds them.
 
     Returns:
         Whether it did, as above.
