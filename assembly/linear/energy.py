@@ -7,7 +7,7 @@ this does not cover, or where its certificate falls short, is solved by
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import overload
 
 import numpy as np
@@ -136,7 +136,7 @@ def _solve_one(
 def _compiled_assembly(posture: Posture) -> Assembly | None:
     """One posture without loads; None where it is left to the fallback."""
     robot = posture.robot
-    size = checked_size(robot)
+    rounding = _rounding_of(robot)
     joints, _ = structure_of(robot)
     out = _solve_compiled(
         robot, posture.transforms[None], robot.errors[None],
@@ -144,8 +144,7 @@ def _compiled_assembly(posture: Posture) -> Assembly | None:
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
         return None
-    residual = out.residual + closure_rounding(robot.errors, joints, size)
-    drop_zeros(out.energy, out.bound, out.multipliers, residual)
+    drop_zeros(out.energy, out.bound, out.multipliers, out.residual + rounding)
     multipliers = out.multipliers[0]
     assembly = Assembly(
         linearisation=linearise(posture),
@@ -163,6 +162,13 @@ def _compiled_assembly(posture: Posture) -> Assembly | None:
         energy=float(out.energy[0]), platform_screw=out.platform_screw[0]
     )
     return assembly
+
+
+@lru_cache(maxsize=32)  # of one robot at many postures
+def _rounding_of(robot: Robot) -> float:
+    """[rad, lengths] what rounding may leave open in a robot's closures."""
+    joints, _ = structure_of(robot)
+    return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
 def _solve_compiled(
@@ -211,9 +217,9 @@ def _solve_left(
     out: Solutions,
 ) -> None:  # fmt: skip
     """By numba what side by side was not certified; rounding there is another."""
-    left = np.flatnonzero(out.outcome >= COMPILED)
-    if not len(left):
+    if out.outcome.max(initial=0) < COMPILED:
         return
+    left = np.flatnonzero(out.outcome >= COMPILED)
     again = Solutions._make(rows[left] if len(rows) else rows for rows in out)
     own = errors[left] if len(errors) > 1 else errors
     _by_numba(structure, T[left], own, mismatch[left], again)

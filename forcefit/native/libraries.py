@@ -88,7 +88,7 @@ def _library(source: str) -> ctypes.CDLL | None:
     compiler = next(filter(None, map(shutil.which, _COMPILERS)), None)
     if compiler is None:
         return None
-    if source in _TOGETHER:  # others take less than a second
+    if source in _TOGETHER:  # others take two seconds or less
         announce()
     with ThreadPoolExecutor() as pool:  # each waits for a compiler
         sources = _TOGETHER if source in _TOGETHER else {source}
