@@ -28,6 +28,7 @@ import os
 for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
     os.environ[f"{name}_NUM_THREADS"] = "1"
 
+import gc
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -46,6 +47,7 @@ from assembly.linear import reference
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import reference_assembly, reference_margin
+from assembly.linear.lanes import FEW_LANES
 from assembly.linear.moving_clearances import Asked
 from assembly.linear.pose_error import bound_pose_error, reference_pose_error
 from assembly.linear.reduction import reduce_problem
@@ -53,7 +55,7 @@ from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from assembly.solvers import conic
-from forcefit.native.libraries import by_numba
+from forcefit.native.libraries import by_numba, load_library
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways
@@ -82,6 +84,8 @@ def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
 def timed(solve: Callable[..., object], postures: Iterable) -> float:
     """Processor time a point [us], failures included; those are counted."""
     failed = count = 0
+    gc.collect()
+    gc.disable()  # as timeit does: a collection takes as long as a thousand calls
     start = time.process_time()
     for one in postures:
         count += 1
@@ -90,6 +94,7 @@ def timed(solve: Callable[..., object], postures: Iterable) -> float:
         except RuntimeError:
             failed += 1
     taken = (time.process_time() - start) / count * 1e6
+    gc.enable()
     if failed:
         print(f"  ({failed} of {count} failed in the next row)")
     return taken
@@ -337,6 +342,7 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
 
 def main() -> None:
     """Print everything."""
+    load_library(FEW_LANES)  # as `forcefit warm-up` does
     robot = paper_robot()
     postures = workspace(robot)
     print(f"{robot.name}, {len(postures)} points, one core")

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
 from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
-from forcefit.native.libraries import address, load_library
+from forcefit.native.libraries import address, library_at_hand, load_library
 
 SOURCE = "assembly/linear/lanes.cpp"
-FEW_LANES = "assembly/linear/few_lanes.cpp"  # (22) and (21) of one or two points
+# (22) and (21) of one or two points, with the same bits: `forcefit warm-up` compiles
+# it, and no command waits for it
+FEW_LANES = "assembly/linear/few_lanes.cpp"
 _ARRAYS = (
     "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
     "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis", "cone_size",
@@ -148,7 +150,7 @@ def _side_by_side(
     # tables are what its other arguments point to: addresses of arrays, in their order
     T, errors, mismatch = points
     few = len(T) <= 2 and name in {"assemble_all", "all_margins"}
-    library = load_library(FEW_LANES if few else SOURCE)
+    library = (few and library_at_hand(FEW_LANES)) or load_library(SOURCE)
     if library is None:
         return False
     given = PointsRecord(len(T), *map(_address, points), len(errors) > 1)

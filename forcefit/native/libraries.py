@@ -40,7 +40,7 @@ _COMPILERS = ("c++", "g++", "clang++")
 # what nearly every command that needs one of them needs
 _TOGETHER = {
     "assembly/linear/lanes.cpp", "assembly/kinematics/continuation.cpp",
-    "assembly/linear/few_lanes.cpp",
+    "assembly/solvers/one_problem.cpp",
 }  # fmt: skip
 _LONGEST = 120  # [s] a compiler may take
 # what /proc/cpuinfo says of processors of one kind
@@ -76,6 +76,25 @@ def load_library(source: str) -> ctypes.CDLL | None:
         The library; None where there is no compiler, or it cannot compile it.
     """
     return None if _refused.get() else _library(source)
+
+
+def library_at_hand(source: str) -> ctypes.CDLL | None:
+    """The library of a source file, if it was compiled before.
+
+    Args:
+        source: as above.
+
+    Returns:
+        The library; None where it would have to be compiled now.
+    """
+    return None if _refused.get() else _at_hand(source)
+
+
+@cache
+def _at_hand(source: str) -> ctypes.CDLL | None:
+    """The library that is on disk, or None, found out once."""
+    digest, path = _kept_at(source)
+    return _loaded(path, digest) if path.exists() else None
 
 
 @cache

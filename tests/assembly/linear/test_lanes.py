@@ -11,11 +11,13 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import energy, zone
+from assembly.linear import lanes as lanes_of
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
 from assembly.linear.fallback import reference_assembly, reference_margin
 from assembly.linear.lanes import (
+    FEW_LANES,
     SOURCE,
     assemble_side_by_side,
     margins_side_by_side,
@@ -360,3 +362,42 @@ def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
         assert load_library(SOURCE) is None
     finally:
         libraries._library.cache_clear()
+
+
+@needs_compiler
+@pytest.mark.parametrize("kappa", [0.1, 0.5, 1.0])
+def test_two_lanes_have_the_bits_of_many(grid, kappa, monkeypatch):
+    """Products and sums are rounded one by one, whatever the registers hold."""
+    two = load_library(FEW_LANES)
+    robot, postures = grid
+    T, mismatch = stack(postures)
+    errors = kappa * robot.errors
+    many = minimise_energies(robot, T, errors, mismatch)
+    margins = zone_margins(robot, T, "rigid", mismatch, errors)
+    asked = []
+
+    def at_hand(source):
+        asked.append(source)
+        return two
+
+    monkeypatch.setattr(lanes_of, "library_at_hand", at_hand)
+    for i in range(0, len(T), 3):
+        some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
+        one = minimise_energies(*some)
+        for row in ROWS:
+            assert np.array_equal(getattr(one, row)[0], getattr(many, row)[i]), row
+        one = zone_margins(robot, T[i : i + 1], "rigid", mismatch[i : i + 1], errors)
+        assert one.margin[0] == margins.margin[i]
+        assert one.bound[0] == margins.bound[i]
+    assert set(asked) == {FEW_LANES}
+
+
+def test_no_command_waits_for_what_is_not_needed(monkeypatch):
+    """Two lanes are compiled by whoever asks for it, and never on the way."""
+    monkeypatch.setattr(libraries, "_compile", None)
+    libraries._at_hand.cache_clear()
+    monkeypatch.setattr(libraries, "_kept_at", lambda source: ("0", Path("nowhere")))
+    assert libraries.library_at_hand(FEW_LANES) is None
+    libraries._at_hand.cache_clear()
+    with by_numba():
+        assert libraries.library_at_hand(FEW_LANES) is None
