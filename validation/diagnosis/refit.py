@@ -5,13 +5,12 @@ Sources:
     (Broyden's update of slopes).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
@@ -23,16 +22,12 @@ from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.background import NOTHING, Background
 from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.least_squares import least_squares
 from validation.diagnosis.scoring import FINITE
 from validation.diagnosis.signatures import UNSEEN, whiten
 
 _STEP = 1e-4  # of an unknown's size, for derivatives
-_MOST_CALLS = 30
-_SHORT = (
-    1e-3  # relative step below which slopes are taken anew rather than it is halved
-)
-_MOST_ROUNDS = 8  # each from slopes taken where the last one ended
-_TINY = 1e-300
+_MOST_ROUNDS = 8  # times that slopes are taken anew
 _FAINT = 0.01  # [sigma] over all readings, of unknowns that may as well be zero
 _CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
 _MOST_DEFECTS = 5
@@ -109,30 +104,6 @@ class Fit:
             J[:, i] = (ends[0] - ends[1]) / (2 * step)
         std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
         return [(n, v, float(s)) for (n, v), s in zip(value.items(), std, strict=True)]
-
-
-class _Secants:
-    """Slopes along the steps of a fit, updated instead of taken again."""
-
-    def __init__(self, left: Callable[[NDArray], NDArray], J: NDArray) -> None:
-        """Slopes are known where the fit begins.
-
-        Args:
-            left: residual (N,) of unknowns (k,).
-            J: (N, k) its slopes there.
-        """
-        self._left, self._J = left, J
-        self._at: tuple[NDArray, NDArray] | None = None
-
-    def __call__(self, x: NDArray) -> NDArray:
-        """(N, k) slopes at the next place: what they say of the last step is right."""
-        now = self._left(x)
-        if self._at is not None:
-            step, change = x - self._at[0], now - self._at[1]
-            wrong = change - self._J @ step
-            self._J = self._J + np.outer(wrong, step / max(step @ step, _TINY))
-        self._at = x.copy(), now
-        return self._J
 
 
 def _public(
@@ -323,20 +294,13 @@ def _refit(
         # begins there but for rounding would end there
         if np.linalg.norm(J[:, seen] * scaled[seen]) < _FAINT:
             scaled[seen] = np.clip(0.0, *bounds)
-        first = left_at(scaled)
-        before = float(first @ first)
-        for _ in range(_MOST_ROUNDS if len(seen) else 0):
-            fitted = least_squares(
-                lambda x: left_at(with_seen(x)), scaled[seen],
-                jac=_Secants(lambda x: left_at(with_seen(x)), J[:, seen]),
-                bounds=bounds, max_nfev=_MOST_CALLS, xtol=_SHORT, ftol=_CONVERGED,
-                gtol=1e-10, x_scale="jac",
+        if len(seen):
+            least = least_squares(
+                lambda x: left_at(with_seen(x)),
+                lambda x: slopes(with_seen(x), seen.tolist()),
+                (scaled[seen], J[:, seen]), bounds, _CONVERGED, _MOST_ROUNDS,
             )  # fmt: skip
-            scaled = with_seen(fitted.x)
-            if before - 2 * fitted.cost <= _CONVERGED * before:
-                break
-            before = 2 * fitted.cost
-            J[:, seen] = slopes(scaled, seen.tolist())
+            scaled, J[:, seen] = with_seen(least.x), least.slopes
     J /= size
     scale = np.sqrt(np.einsum("ij,ij->j", J, J))
     scale[scale == 0] = 1.0
