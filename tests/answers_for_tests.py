@@ -70,7 +70,7 @@ LEFT_OUT = (
     "seconds", "version", "sha256", "created", "path", "solver", "residual", "gap",
     "excess", "stationarity", "mismatch", "linearisation_error", "cuts",
 )  # fmt: skip
-EIGENVECTORS = ("/behind/axes", "/behind/turn")  # of either sign
+EIGENVECTORS = ("/behind/turn",)  # of either sign
 STEADY = 3e-8  # relative change of an answer so moved that is none
 SMALLEST = 1e-8  # in SI: what is smaller is compared with it
 PRINTED = "--print"  # the answers, instead of storing them

@@ -9,9 +9,11 @@ symbol  code             shape   meaning
 ======  ===============  ======  =====================================================
 J       ``columns``      (N, k)  change of the whitened readings per small unknown
 S       ``size``         (k,)    standard deviations of the prior
-U, l    ``axes, gains``  (N, r)  J S = U sqrt(l) V', so that C = I + U l U'
+V, l    ``turn, gains``  (k, r)  J S = U sqrt(l) V', so that C = I + U l U'
 W                        (N, N)  C^-1/2 = I - U (1 - 1/sqrt(1 + l)) U'
 ======  ===============  ======  =====================================================
+
+U f(l) U' = J S V f(l)/l V' S J' without U (N, r), which would be as large as J.
 """
 
 from collections.abc import Sequence
@@ -34,8 +36,7 @@ class Background:
         terms: those in use, each with the unknowns in use.
         size: (k,) [rad, m, rad/(N m), m/N] standard deviations of all priors.
         scales: of rotations and of translations that were asked for, by term.
-        axes: (N, r) orthonormal.
-        gains: (r,) variances along them, of noise 1.
+        gains: (r,) variances along orthonormal axes U, of noise 1.
         turn: (k, r) orthonormal: unknowns over their size along those axes.
         score: what the terms cost, to be added to a score: -ln det C / 2 - penalties.
     """
@@ -43,7 +44,6 @@ class Background:
     terms: tuple[SmallTerm, ...]
     size: NDArray
     scales: dict[str, tuple[float, float]]
-    axes: NDArray
     gains: NDArray
     turn: NDArray
     score: float
@@ -61,7 +61,7 @@ class Background:
         if not len(self.gains):
             return columns
         shrink = 1 - 1 / np.sqrt(1 + self.gains)
-        away = self.axes @ (shrink * (self.axes.T @ columns).T).T
+        away = self._along(shrink / self.gains, columns)
         return np.subtract(columns, away, out=away)
 
     def raw(self, whitened: NDArray) -> NDArray:
@@ -69,7 +69,7 @@ class Background:
         if not len(self.gains):
             return whitened
         grow = np.sqrt(1 + self.gains) - 1
-        return whitened + self.axes @ (grow * (self.axes.T @ whitened))
+        return whitened + self._along(grow / self.gains, whitened)
 
     def left(self, whitened: NDArray) -> NDArray:
         """What the most probable small unknowns leave of a residual r.
@@ -86,8 +86,23 @@ class Background:
         """The most probable unknowns of every term, from W r (N,)."""
         if not self.terms:
             return []
-        along = self.axes.T @ whitened * np.sqrt(self.gains / (1 + self.gains))
-        return self._by_term(self.size * (self.turn @ along))
+        return self._by_term(self._seen(1 / np.sqrt(1 + self.gains), whitened))
+
+    def _seen(self, share: NDArray, columns: NDArray) -> NDArray:
+        """(k,) or (k, m) unknowns S V share V' S J' of columns."""
+        size, share = (
+            x.reshape(-1, *[1] * (columns.ndim - 1)) for x in (self.size, share)
+        )
+        shown = np.concatenate([term.columns.T @ columns for term in self.terms])
+        return size * (self.turn @ (share * (self.turn.T @ (size * shown))))
+
+    def _along(self, share: NDArray, columns: NDArray) -> NDArray:
+        """J S V share V' S J' times columns (N,) or (N, m)."""
+        unknowns = self._by_term(self._seen(share, columns))
+        total = self.terms[0].columns @ unknowns[0]
+        for term, own in zip(self.terms[1:], unknowns[1:], strict=True):
+            total += term.columns @ own
+        return total
 
     def lost(self, raw: NDArray, values: Sequence[NDArray]) -> float:
         """Twice the negative logarithm of how likely unknowns are, but for a constant.
@@ -129,7 +144,6 @@ NOTHING = Background(
     terms=(),
     size=np.zeros(0),
     scales={},
-    axes=np.zeros((0, 0)),
     gains=np.zeros(0),
     turn=np.zeros((0, 0)),
     score=0.0,
@@ -151,21 +165,14 @@ def background(terms: Sequence[SmallTerm], prior: Prior) -> Background:
     if not kept:
         return NOTHING
     size = np.concatenate([sizes_of(term, prior.scales[term.name]) for term in kept])
-    scaled = np.empty((len(kept[0].columns), len(size)), order="F")
-    ends = np.cumsum([len(term) for term in kept])[:-1]
-    for part, own, term in zip(
-        np.split(scaled, ends, axis=1), np.split(size, ends), kept, strict=True
-    ):
-        np.multiply(term.columns, own, out=part)
-    gains, turn = np.linalg.eigh(scaled.T @ scaled)
+    gram = np.block([[one.columns.T @ other.columns for other in kept] for one in kept])
+    gains, turn = np.linalg.eigh(size[:, None] * gram * size)
     shown = gains > _FAINT
     gains, turn = gains[shown], turn[:, shown]
-    axes = scaled @ (turn / np.sqrt(gains))
     return Background(
         terms=tuple(kept),
         size=size,
         scales=prior.scales,
-        axes=axes,
         gains=gains,
         turn=turn,
         score=prior.cost,
