@@ -68,16 +68,16 @@ def least_squares(
     r = residual(x)
     squares, taken, fresh = float(r @ r), 0, True
     damping, growth = _DAMPING, 2.0
-    while True:
+    last = False
+    while not last:
         d, promised = _step(J, r, damping, (bounds[0] - x, bounds[1] - x))
         enough = promised <= converged * squares
-        if enough and (fresh or taken == most):
-            break
+        last = enough and (fresh or taken == most)
         gain = -1.0
-        if not enough:
+        if last or not enough:
             trial = np.clip(x + d, *bounds)
             after = residual(trial)
-            gain = (squares - float(after @ after)) / promised
+            gain = (squares - float(after @ after)) / max(promised, _TINY)
             if gain > 0:
                 J = _updated(J, trial - x, after - r)
                 x, r, squares, fresh = trial, after, float(after @ after), False
@@ -85,7 +85,7 @@ def least_squares(
                 growth = 2.0
             elif fresh or taken == most:
                 damping, growth = max(damping, _FIRST) * growth, 2 * growth
-        if gain < _POOR and not fresh and taken < most:
+        if gain < _POOR and not (fresh or last) and taken < most:
             J, taken, fresh = slopes(x), taken + 1, True
     return LeastSquares(x, r, J)
 

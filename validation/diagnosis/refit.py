@@ -29,7 +29,7 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 _STEP = 1e-4  # of an unknown's size, for derivatives
 _MOST_ROUNDS = 8  # times that slopes are taken anew
 _FAINT = 0.01  # [sigma] over all readings, of unknowns that may as well be zero
-_CONVERGED = 1e-6  # of the squares: a thousandth of one where there are a thousand
+_CONVERGED = 0.1  # of the mean square that is left: a third of a standard deviation
 _MOST_DEFECTS = 5
 _SAME_DEFECT = 0.1  # [sigma] largest change of what finite motions add to a reading
 _LOST = 1e3  # [sigma] a reading that the model has no answer for
@@ -298,7 +298,7 @@ def _refit(
             least = least_squares(
                 lambda x: left_at(with_seen(x)),
                 lambda x: slopes(with_seen(x), seen.tolist()),
-                (scaled[seen], J[:, seen]), bounds, _CONVERGED, _MOST_ROUNDS,
+                (scaled[seen], J[:, seen]), bounds, _CONVERGED / len(measured), _MOST_ROUNDS,
             )  # fmt: skip
             scaled, J[:, seen] = with_seen(least.x), least.slopes
     J /= size
