@@ -298,7 +298,8 @@ def _refit(
             least = least_squares(
                 lambda x: left_at(with_seen(x)),
                 lambda x: slopes(with_seen(x), seen.tolist()),
-                (scaled[seen], J[:, seen]), bounds, _CONVERGED / len(measured), _MOST_ROUNDS,
+                (scaled[seen], J[:, seen]), bounds,
+                _CONVERGED / len(measured), _MOST_ROUNDS,
             )  # fmt: skip
             scaled, J[:, seen] = with_seen(least.x), least.slopes
     J /= size
