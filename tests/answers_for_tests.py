@@ -69,8 +69,8 @@ NUDGE = 1e-12  # relative, of inputs
 LEFT_OUT = (
     "seconds", "version", "sha256", "created", "path", "solver", "residual", "gap",
     "excess", "stationarity", "mismatch", "linearisation_error", "cuts",
+    "behind",  # eigenvectors are of either sign, and a rank that numbers decide
 )  # fmt: skip
-EIGENVECTORS = ("/behind/turn",)  # of either sign
 STEADY = 3e-8  # relative change of an answer so moved that is none
 SMALLEST = 1e-8  # in SI: what is smaller is compared with it
 PRINTED = "--print"  # the answers, instead of storing them
@@ -116,9 +116,8 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
         for name, one in value.items():
             # equal joints of another robot come from a cache with that robot
             cached = name == "robot" and place.endswith("/joints")
-            signed = f"{place}/{name}".endswith(EIGENVECTORS)
             left_out = any(word in str(name) for word in LEFT_OUT)
-            if not (cached or signed or left_out):
+            if not (cached or left_out):
                 # what is named by its number or its frame is gathered
                 own = name if str(name).isidentifier() else ""
                 _gather(one, f"{place}/{own}", to, above)
