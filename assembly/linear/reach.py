@@ -47,6 +47,9 @@ if TYPE_CHECKING:
     from assembly.solvers.support import ConvexBody
 
 READINGS = ("frozen", "free", "budget")
+# by which squares of cones may be exceeded: solutions are hardly better, and a cone that
+# stays on its bound would end the step of all others
+_EXCESS = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +162,10 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones."""
+        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones.
+
+        The rows to rounding, cones to 5e-9 of their clearance.
+        """
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
@@ -168,8 +174,9 @@ class ReachableSet:
             np.bincount(group, one * other)
             for one, other in ((step, step), (start, step), (start, start))
         )
-        beyond = aa + 2.0 * ab + bb > 1.0
-        aa, ab, room = aa[beyond], ab[beyond], np.maximum(1.0 - bb[beyond], 0.0)
+        most = 1.0 + _EXCESS
+        beyond = aa + 2.0 * ab + bb > most
+        aa, ab, room = aa[beyond], ab[beyond], np.maximum(most - bb[beyond], 0.0)
         shares = (np.sqrt(ab**2 + aa * room) - ab) / aa
         return self.centre + self.map @ (shares.min(initial=1.0) * step)
 

@@ -136,8 +136,7 @@ def _distribute(
 
     def submit() -> None:
         nonlocal flying
-        # each time anew: clusters grow and shrink
-        threads = max(1, sum(client.nthreads().values()))
+        threads = _threads(client)
         while flying < _IN_FLIGHT * threads and (some := list(islice(blocks, size))):
             tasks = [(block, sweep.points(block)) for block in some]
             waiting.add(client.submit(solve_task, *question, tasks, pure=False))
@@ -162,6 +161,16 @@ def _distribute(
     if times:
         median = sorted(times)[len(times) // 2]
         report(f"{len(times)} tasks, {median:.2g} s each")
+
+
+def _threads(client: "distributed.Client") -> int:
+    """Of all workers, asked each time anew: clusters grow and shrink."""
+    from distributed.comm import CommClosedError
+
+    try:
+        return max(1, sum(client.nthreads().values()))
+    except OSError as error:  # a scheduler that is gone refuses to be asked, too
+        raise CommClosedError(str(error)) from error
 
 
 def _check_workers(client: "distributed.Client") -> None:
