@@ -127,7 +127,7 @@ class Evidence:
             priors = [self._fitted(chosen, along, squares) for chosen in choices]
             return max(priors, key=lambda prior: prior.evidence)
         on = [bool(used.any()) for used in start.used]
-        priors = [self._fitted(on, along, squares, start)]
+        priors = [self._surely_fitted(on, along, squares, start)]
         for k in np.flatnonzero(~np.array(self._sure, dtype=bool)):
             other = [o ^ (i == k) for i, o in enumerate(on)]
             with suppress(np.linalg.LinAlgError):  # it would show by rounding alone
@@ -135,6 +135,29 @@ class Evidence:
                 if near > priors[0].evidence - _NEAR:
                     priors.append(self._fitted(other, along, squares, start))
         return max(priors, key=lambda prior: prior.evidence)
+
+    def _surely_fitted(
+        self, chosen: Sequence[bool], along: NDArray, squares: float, start: Prior
+    ) -> Prior:
+        """The likeliest sizes of terms that are in use, whatever rounding says.
+
+        Nearly equal columns of large unknowns leave products that are not positive
+        definite: the nearest ones that are semidefinite stand for them.
+
+        Returns:
+            The prior.
+
+        Sources:
+            Higham (1988), Computing a nearest symmetric positive semidefinite matrix,
+            Linear Algebra Appl. 103, 103.
+        """
+        try:
+            return self._fitted(chosen, along, squares, start)
+        except np.linalg.LinAlgError:
+            values, vectors = np.linalg.eigh(self._gram)
+            self._gram = (vectors * np.maximum(values, 0.0)) @ vectors.T
+            self._apart = np.zeros(len(self._gram), dtype=bool)
+            return self._fitted(chosen, along, squares, start)
 
     def _at_a_glance(
         self, chosen: Sequence[bool], near: Prior, along: NDArray, squares: float

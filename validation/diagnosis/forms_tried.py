@@ -10,6 +10,7 @@ from assembly.model.robot import Robot
 
 KNOTS = 7
 MANY = 150  # rows from which many waves a turn are looked for
+LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5  # of the span of time
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateSh
         span = float(np.ptp(conditions.time))
         shapes += [
             CandidateShape("lag", ("gain", "start"), (("time_constant", part * span),))
-            for part in (0.02, 0.05, 0.1, 0.2, 0.5)
+            for part in LAGS
         ]
     if len(np.unique(x)) > KNOTS:
         ends = (("first", low), ("last", high))

@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import (
     Candidate,
@@ -28,13 +26,13 @@ from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.forms_tried import all_shapes, first_shapes
 from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.remainder import (
-    PROVEN,
     Remainder,
     Unexplained,
     function_term,
     in_cells,
 )
 from validation.diagnosis.small_terms import SmallTerm
+from validation.diagnosis.spans import simplest
 
 MOST = 4  # functions that are learned
 _LOOKED = 1200  # readings that a first look takes
@@ -44,7 +42,6 @@ _SURE = 3.0  # in score: what a function must be worth
 _SPLINE = 3.0  # in score: by which a form without a name must be better
 _EQUAL = 3.0  # in score: places that do as well
 _LARGE = 100  # unknowns of one size, from which turning them pays
-_CLOCK = 0.999  # correlation with time of what counts it
 _NOISE = 0.05  # probability above which what is left is noise
 
 
@@ -245,15 +242,12 @@ def learn(
     names = variables_of(sensitivities.conditions.take(used))
     every = list(places_of(campaign.robot, names))
     school.believe(known or ())
-    for turn in range(MOST if known is None else 0):
-        update("functions learned", turn, MOST)
-        if school.done:
+    while known is None and len(school.learned) < MOST and not school.done:
+        update("functions learned", len(school.learned), MOST)
+        functions = _best(school, school.part(_JUDGED), every)
+        if not functions:
             break
-        judged = school.part(_JUDGED)
-        function = _best(school, judged, every)
-        if function is None or not judged.foretells(function.candidate):
-            break
-        school.believe([function])
+        school.believe(functions[: MOST - len(school.learned)])
     update("functions learned", MOST, MOST)
     successive = blocks_of(school.fitting)[1] == SPANS
     return Lesson(
@@ -275,8 +269,8 @@ def _best(
     school: _School,
     judged: Remainder,
     every: Sequence[tuple[str, tuple[CandidatePart, ...]]],
-) -> Learned | None:
-    """The likeliest function, of those worth it."""
+) -> list[Learned]:
+    """The likeliest function, of those worth it; where rows follow one another, two."""
     sensitivities = school.sensitivities
     looked = [
         Candidate(parts, kind, shape)
@@ -294,64 +288,30 @@ def _best(
         for shape in all_shapes(fitted, parts[0].variable, kind)
     ]
     if not refined:
-        return None
+        return []
     unnamed = np.array([one.shape.form == "spline" for one in refined])
     worth = judged.worths(refined) - _SPLINE * unnamed
     tried = len(looked) * max(1, len(refined) // len(chosen))
     gains = worth - np.log(tried) - 0.5 * np.log(judged.count)
     sure = np.flatnonzero(gains >= _SURE)
     if not len(sure):
-        return None
-    best = int(np.argmax(worth))
+        return []
+    best = [int(np.argmax(worth))]
     if judged.successive:
-        best = int(sure[_simplest(judged, [refined[i] for i in sure], worth[sure])])
+        some = simplest(judged, [refined[i] for i in sure], worth[sure])
+        best = [int(sure[i]) for i in some]
+    elif not judged.foretells((refined[best[0]],)):
+        return []
+    return [
+        Learned(refined[i], _equivalent(refined, worth, i), float(gains[i]))
+        for i in best
+    ]
+
+
+def _equivalent(
+    refined: Sequence[Candidate], worth: NDArray, best: int
+) -> tuple[tuple[CandidatePart, ...], ...]:
+    """Places and variables that do as well as a candidate's own."""
     near = np.flatnonzero(np.abs(worth - worth[best]) < _EQUAL)
     others = dict.fromkeys(refined[i].parts for i in near[np.argsort(-worth[near])])
-    same = tuple(parts for parts in others if parts != refined[best].parts)
-    return Learned(refined[best], same, float(gains[best]))
-
-
-def _simplest(judged: Remainder, refined: Sequence[Candidate], worth: NDArray) -> int:
-    """Which form, of those that foretell other spans of time nearly as well as any.
-
-    Errors of rows that follow one another are not independent, so that evidence prefers
-    what is large; of the forms within a standard error of the best forecast, block by
-    block, that with the fewest unknowns.  Time by itself stands for whatever changed
-    meanwhile, and is heard where nothing that was measured foretells anything.
-
-    Returns:
-        Its place.
-
-    Sources:
-        Breiman, Friedman, Olshen, Stone (1984), Classification and regression trees,
-        section 3.4.3.
-    """
-    first: dict[tuple[object, ...], int] = {}
-    for i in np.argsort(-worth, kind="stable").tolist():
-        one = refined[i]
-        # other places do the same there
-        first.setdefault((one.kind, one.parts[0].variable, one.shape), i)
-    gains = {i: judged.gain(refined[i]) for i in first.values()}
-    proven = {i: gain for i, (gain, error) in gains.items() if gain > PROVEN * error}
-    if not proven:
-        return int(np.argmax(worth))
-    rows = judged.sensitivities
-    conditions = rows.conditions.take(rows.rows)
-    measured = [i for i in proven if not _follows_time(conditions, refined[i])]
-    asked = measured or list(proven)
-    most = max(asked, key=lambda i: proven[i])
-    behind = {i: judged.gain(refined[most], refined[i]) for i in asked}
-    near = [i for i, (gain, error) in behind.items() if gain <= error]
-    return min(near, key=lambda i: (_unknowns(refined[i]), -worth[i]))
-
-
-def _unknowns(one: Candidate) -> int:
-    """How many numbers a form has, with those that were tried one by one."""
-    return len(one.shape.names) + len(one.shape.given)
-
-
-def _follows_time(conditions: Conditions, one: Candidate) -> bool:
-    """Whether a candidate depends on time alone, or on what counts the rows."""
-    variables = (variable(conditions, part.variable) for part in one.parts)
-    time = conditions.time
-    return all(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK for x in variables)
+    return tuple(parts for parts in others if parts != refined[best].parts)

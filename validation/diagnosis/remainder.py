@@ -42,7 +42,7 @@ from validation.diagnosis.holdout import SPANS, blocks_of, gain_over_blocks
 from validation.diagnosis.small_terms import SmallTerm
 
 _FOLDS = 5
-PROVEN = 2.0  # standard errors by which a fold's rows must be foretold better
+_PROVEN = 2.0  # standard errors by which a fold's rows must be foretold better
 _ROUNDED = 10.0  # times the least eigenvalue, where that is negative
 _LARGEST = 100.0  # times the residual: what an unknown may do
 _CLEAR = 1e6  # [sigma] above which squares beside those of noise are lost to rounding
@@ -100,7 +100,7 @@ class Remainder:
         self.campaign, self.sensitivities = campaign, sensitivities
         self.count = int(cells.sum())
         self._all, self._cells = left, cells
-        self._known_errors: dict[Candidate, NDArray] = {}
+        self._known_errors: dict[tuple[Candidate, ...], NDArray] = {}
         self._prior, self._noise = prior, noise
         Q = np.linalg.qr(left.effects[cells])[0]
 
@@ -117,6 +117,7 @@ class Remainder:
         z = z - Q @ (Q.T @ z)
         held = (z - small @ (small.T @ z)) / noise**2
         self._squares = float(z @ held)
+        self._held, self._taken_out = held, (Q, small)
         self._blocks = Blocks(campaign, sensitivities, (Q, small), held)
 
     def worths(self, candidates: Sequence[Candidate]) -> NDArray:
@@ -132,6 +133,38 @@ class Remainder:
         for i, block in self._blocks.of(candidates):
             worths[i] = self._worth(block)
         return worths
+
+    def worths_of_pairs(
+        self, candidates: Sequence[Candidate], pairs: Sequence[tuple[int, int]]
+    ) -> NDArray:
+        """How much likelier two candidates of one size make the readings together.
+
+        Args:
+            candidates: few, for all their columns stand side by side.
+            pairs: places of two among them.
+
+        Returns:
+            (len(pairs),) logarithms.
+        """
+        blocks = [in_cells(self.sensitivities, c, self.campaign) for c in candidates]
+        # columns of two variables differ in size: those of each are made as large as 1
+        blocks = [B / max(np.linalg.norm(B), np.finfo(float).tiny) for B in blocks]
+        gram, along = self._products(blocks)
+        ends = np.cumsum([0, *(B.shape[1] for B in blocks)]).tolist()
+        columns = [np.arange(*own) for own in pairwise(ends)]
+        both = [np.append(columns[i], columns[j]) for i, j in pairs]
+        return np.array([
+            self._worth(Block(gram[np.ix_(own, own)], along[own], 1.0)) for own in both
+        ])
+
+    def _products(self, blocks: Sequence[NDArray]) -> tuple[NDArray, NDArray]:
+        """(k, k) B'P B and (k,) B'P z of columns (N, k1), (N, k2) .. side by side."""
+        B = np.hstack(blocks)
+        gram, along = B.T @ B, B.T @ self._held
+        for Y in self._taken_out:
+            shown = Y.T @ B
+            gram -= shown.T @ shown
+        return gram, along
 
     def _worth(self, block: Block) -> float:
         """What a block of columns is worth beside what is known."""
@@ -152,26 +185,26 @@ class Remainder:
         """Whether rows that are foretold are apart from others in time only."""
         return blocks_of(self.campaign)[1] == SPANS
 
-    def foretells(self, one: Candidate) -> bool:
-        """Whether a candidate foretells rows that it was not fitted to.
+    def foretells(self, some: Sequence[Candidate]) -> bool:
+        """Whether candidates foretell rows that they were not fitted to.
 
         Args:
-            one: any.
+            some: any, together.
 
         Returns:
             Whether errors fall by more than twice what they scatter.
         """
-        gain, error = self.gain(one)
-        return gain > PROVEN * error
+        gain, error = self.gain(some)
+        return gain > _PROVEN * error
 
     def gain(
-        self, one: Candidate, other: Candidate | None = None
+        self, some: Sequence[Candidate], others: Sequence[Candidate] = ()
     ) -> tuple[float, float]:
-        """How much likelier a candidate makes rows that it was not fitted to.
+        """How much likelier candidates make rows that they were not fitted to.
 
         Args:
-            one: any.
-            other: than by this one; than by neither if absent.
+            some: any, together.
+            others: than by these; than by none if empty.
 
         Returns:
             :func:`.holdout.gain_over_blocks` in folds over blocks of rows, beside all
@@ -181,18 +214,18 @@ class Remainder:
         if len(folds) < 2:
             return 0.0, 0.0
         where = self._blocks_of_cells()[np.concatenate(folds)]
-        without, beside = self._errors(one)
-        if other is not None:
-            without = self._errors(other)[1]
+        without, beside = self._errors(tuple(some))
+        if others:
+            without = self._errors(tuple(others))[1]
         return gain_over_blocks(without, beside, where)
 
-    def _errors(self, one: Candidate) -> NDArray:
-        """(2, N) squared errors in folds without and with a candidate, found once."""
-        if one not in self._known_errors:
+    def _errors(self, some: tuple[Candidate, ...]) -> NDArray:
+        """(2, N) squared errors in folds without and with candidates, found once."""
+        if some not in self._known_errors:
             folds = self._folds()
-            columns = self._columns(one, np.concatenate(folds))
-            self._known_errors[one] = self._foretold(folds, columns)
-        return self._known_errors[one]
+            order = np.concatenate(folds)
+            self._known_errors[some] = self._foretold(folds, self._columns(some, order))
+        return self._known_errors[some]
 
     def forecast(self) -> float:
         """What all that is known makes of rows that it was not fitted to.
@@ -206,9 +239,8 @@ class Remainder:
             return 0.0
         nothing = np.zeros((self.count, 0))
         squares = self._foretold(folds, nothing)[0] * self._noise**2
-        return -gain_over_blocks(np.zeros_like(squares), squares, np.zeros(self.count))[
-            0
-        ]
+        together = np.zeros(self.count)
+        return -gain_over_blocks(np.zeros_like(squares), squares, together)[0]
 
     def _blocks_of_cells(self) -> NDArray:
         """(N,) block of every reading."""
@@ -234,10 +266,10 @@ class Remainder:
         known = X.shape[1] - further.shape[1]
         return _foretold(X, z, ends, known) / self._noise**2
 
-    def _columns(self, one: Candidate, order: NDArray) -> NDArray:
-        """(N, m) columns of a candidate's unknowns of size one, cells in some order."""
-        B = in_cells(self.sensitivities, one, self.campaign)
-        return B[order] * self._likeliest(one, B)
+    def _columns(self, some: Sequence[Candidate], order: NDArray) -> NDArray:
+        """(N, m) columns of candidates' unknowns of size one, cells in some order."""
+        blocks = [in_cells(self.sensitivities, one, self.campaign) for one in some]
+        return np.hstack(blocks)[order] * self._likeliest(some, blocks)
 
     def _beside(self, order: NDArray, further: NDArray) -> NDArray:
         """(N, k) columns of all unknowns of size one, further ones last."""
@@ -253,15 +285,19 @@ class Remainder:
         X *= np.minimum(1.0, most / np.where(norm > 0, norm, 1.0))
         return X
 
-    def _likeliest(self, one: Candidate, B: NDArray) -> NDArray:
-        """(m,) likeliest sizes of a candidate's unknowns."""
-        axis = self.sensitivities.axes(one)
-        ((_, block),) = self._blocks.of([one])
-        values, vectors = _seen(block.gram / self._noise**2)
+    def _likeliest(
+        self, some: Sequence[Candidate], blocks: Sequence[NDArray]
+    ) -> NDArray:
+        """(m,) likeliest sizes of candidates' unknowns, by their columns (N, m1) .."""
+        gram, along = self._products(blocks)
+        values, vectors = _seen(gram / self._noise**2)
         gram, seen = (vectors * values) @ vectors.T, vectors @ vectors.T
-        evidence = Evidence([function_term("", axis, B)], self.count, gram)
-        prior = evidence.best_of(seen @ block.along, self._squares)
-        return sizes_in_use(evidence.terms, prior)
+        terms = [
+            function_term(str(k), self.sensitivities.axes(one), B)
+            for k, (one, B) in enumerate(zip(some, blocks, strict=True))
+        ]
+        prior = Evidence(terms, self.count, gram).best_of(seen @ along, self._squares)
+        return sizes_in_use(terms, prior)
 
 
 def _seen(gram: NDArray) -> tuple[NDArray, NDArray]:

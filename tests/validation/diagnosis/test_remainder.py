@@ -109,6 +109,35 @@ def test_worths_do_not_hang_on_company():
         assert here.worths([every[k]])[0] == pytest.approx(worths[k], rel=1e-9)
 
 
+def test_two_together_are_worth_what_their_columns_side_by_side_are():
+    """Each made as large as the other, in any order."""
+    rng = np.random.default_rng(15)
+    A, B = rng.normal(size=(CELLS, 2)), 1e3 * rng.normal(size=(CELLS, 1))
+    here = remainder(rng, signal=A @ [0.5, -0.4] + 1e-3 * B[:, 0])[0]
+    candidate = here.sensitivities.candidate
+    some = [candidate(A), candidate(np.zeros((CELLS, 1))), candidate(B)]
+    beside = np.hstack([A / np.linalg.norm(A), B / np.linalg.norm(B)])
+    worths = here.worths_of_pairs(some, [(0, 2), (2, 0), (0, 1)])
+    # a block is made as large as its largest column, which moves the sizes tried
+    scale = np.linalg.norm(beside, axis=0).max()
+    assert scale == pytest.approx(1.0)
+    assert worths[0] == pytest.approx(worth(here, beside), rel=1e-9)
+    assert worths[1] == pytest.approx(worths[0], rel=1e-9)
+    assert worths[0] > worths[2] + 3
+
+
+def test_two_foretell_what_neither_does_alone():
+    rng = np.random.default_rng(16)
+    A, B = rng.normal(size=(2, CELLS, 1))
+    here = remainder(rng, signal=2 * A[:, 0] - 1.5 * B[:, 0])[0]
+    a, b = here.sensitivities.candidate(A), here.sensitivities.candidate(B)
+    both = here.gain([a, b])[0]
+    assert both > here.gain([a])[0] + 10
+    assert both > here.gain([b])[0] + 10
+    assert here.gain([b, a])[0] == pytest.approx(both, rel=1e-6)
+    assert here.gain([a, b], [a])[0] == pytest.approx(both - here.gain([a])[0])
+
+
 def test_nothing_known_can_be_worth_anything():
     """What effects or small unknowns of any size do is no news."""
     rng = np.random.default_rng(3)
@@ -133,7 +162,7 @@ def test_a_block_that_is_known_but_for_rounding_is_worth_nothing():
     here = Remainder(campaign, AnyColumns(), left, np.ones(CELLS, bool), prior, 1.0)
     known = here.sensitivities.candidate(J[:, :3] @ rng.normal(size=(3, 3)))
     assert here.worths([known])[0] < 3.0
-    gain, error = here.gain(known)
+    gain, error = here.gain([known])
     assert gain <= 2 * error + 3.0
 
 
@@ -170,9 +199,9 @@ def test_what_acts_foretells_other_rows_and_noise_does_not():
     rng = np.random.default_rng(5)
     B = rng.normal(size=(CELLS, 2))
     here = remainder(rng, signal=B @ [1.0, -0.8])[0]
-    assert here.foretells(here.sensitivities.candidate(B))
+    assert here.foretells([here.sensitivities.candidate(B)])
     noise = here.sensitivities.candidate(rng.normal(size=(CELLS, 2)))
-    assert not here.foretells(noise)
+    assert not here.foretells([noise])
 
 
 def test_four_functions_are_learned_at_most(monkeypatch):
@@ -180,16 +209,16 @@ def test_four_functions_are_learned_at_most(monkeypatch):
     monkeypatch.setattr(learning, "_School", _Endless)
     monkeypatch.setattr(learning, "variables_of", lambda conditions: [])
     monkeypatch.setattr(learning, "places_of", lambda robot, names: [])
-    one = Learned(None, (), 9.0)
-    monkeypatch.setattr(learning, "_best", lambda *given: one)
+    three = [Learned(None, (), 9.0 - k) for k in range(3)]
+    monkeypatch.setattr(learning, "_best", lambda *given: three)
     asked = SimpleNamespace(conditions=SimpleNamespace(take=lambda rows: None))
     campaign = SimpleNamespace(robot=None)
     lesson = learn(campaign, None, asked, None, lambda *told: None)
-    assert len(lesson.learned) == 4
+    assert [one.gain for one in lesson.learned] == [9.0, 8.0, 7.0, 9.0]
 
 
 class _Endless:
-    """Rows that never become noise, and foretell whatever is asked."""
+    """Rows that never become noise."""
 
     done, terms, prior, left, unknowns = False, (), None, 1.0, 0.0
     fitting = SimpleNamespace(configuration=np.arange(ROWS))
@@ -202,7 +231,7 @@ class _Endless:
         self.learned += functions
 
     def part(self, most):
-        return SimpleNamespace(foretells=lambda candidate: True, successive=False)
+        return None
 
 
 @pytest.fixture
