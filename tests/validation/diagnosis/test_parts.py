@@ -216,6 +216,20 @@ def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
     assert std == pytest.approx(1 / np.linalg.norm(slope), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("earlier", "end"), [(None, 0.4), (-0.39, -0.4), (-1.2, 0.4), (0.41, 0.4)]
+)
+def test_a_fit_goes_on_from_an_earlier_one_if_that_leaves_less(earlier, end):
+    """Of a bar along x only x is read, L cos e: it may be turned either way."""
+    seen = np.full((1, 6), np.nan)
+    seen[0, 3] = LENGTH * (np.cos(0.4) - 1)
+    campaign = bar(measured=seen, rows=1)
+    here = replace(conditions_of(campaign), exact=True)
+    begun = None if earlier is None else np.array([earlier])
+    fit = refit(campaign, here, [TURNED], np.array([0.1]), earlier=begun)
+    assert fit.values == pytest.approx([end], rel=1e-5)
+
+
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """One standard deviation in 68 %, of 60 campaigns."""
     rng = np.random.default_rng(8)
