@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from assembly.solvers.support import ConvexBody
 
 READINGS = ("frozen", "free", "budget")
-# by which squares of cones may be exceeded: solutions are hardly better, and a cone that
-# stays on its bound would end the step of all others
+# by which squares of cones may be exceeded: solutions are hardly better, and a cone
+# that stays on its bound would end the step of all others
 _EXCESS = 1e-8
 
 
@@ -162,10 +162,8 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones.
-
-        The rows to rounding, cones to 5e-9 of their clearance.
-        """
+        """(6,) [rad, m] the screw of a nearby v that satisfies rows and cones."""
+        # rows to rounding, cones to 5e-9 of their clearance
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
