@@ -15,6 +15,7 @@ import resource
 import shutil
 import signal
 import sys
+import traceback
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -25,7 +26,7 @@ import pytest
 from benchmarks.faults import Fault
 from benchmarks.traced_tests import MEMORY, WORDS, places_of_tests, sources
 
-PASSED, FAILED = 0, 1
+PASSED, FAILED, BROKEN = 0, 1, 2
 WAITS = 10  # seconds of the clock at most for one of the processor
 # what they keep is no answer
 KEPT_CACHES = ("forcefit.native", "assembly.solvers.compiled")
@@ -78,7 +79,9 @@ class Session:
     def seen(self, fault: Fault, tests: list[str], seconds: float) -> str | None:
         """The first of these tests that fails, "" at a limit; None if all pass."""
         some = [self.items[test] for test in tests if test in self.items]
-        folder = next(iter(self.items.values())).config._tmp_path_factory.getbasetemp()
+        if not some:
+            return None
+        folder = some[0].config._tmp_path_factory.getbasetemp()
         reading, writing = os.pipe()
         child = os.fork()
         if not child:
@@ -98,12 +101,17 @@ class Session:
                         os.write(writing, self.failed.encode())
                         os._exit(FAILED)
                 code = PASSED
+            except BaseException:
+                os.write(writing, traceback.format_exc().encode())
+                code = BROKEN
             finally:
                 os._exit(code)
         os.close(writing)
         with os.fdopen(reading) as file:
             failed = file.read()
         _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status) and os.WEXITSTATUS(status) == BROKEN:
+            raise RuntimeError(failed)
         for left in folder.iterdir():
             if left.is_dir() and not left.is_symlink():
                 shutil.rmtree(left, ignore_errors=True)

@@ -144,8 +144,10 @@ def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
     """Rows in any order, at times of any steps, some of them at one time."""
     campaign = session(36, (1, 3), sessions)
     campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
-    z = 2.5 * np.linalg.cholesky(covariance_of(campaign, 0.9, 200.0)) @ rng.normal(
-        size=72
+    z = (
+        2.5
+        * np.linalg.cholesky(covariance_of(campaign, 0.9, 200.0))
+        @ rng.normal(size=72)
     )
     found, expected = noise_in_time(campaign, z), by_definition(campaign, z)
     assert (found.share, found.constant) == pytest.approx(expected[:2])
@@ -169,7 +171,9 @@ def test_points_of_a_body_have_noise_of_their_own(rng):
 def test_thirty_rows_are_enough_and_fewer_are_not(rng):
     for rows, enough in ((29, False), (30, True)):
         campaign = session(rows, range(6))
-        z = np.linalg.cholesky(covariance_of(campaign, 0.95)) @ rng.normal(size=6 * rows)
+        z = np.linalg.cholesky(covariance_of(campaign, 0.95)) @ rng.normal(
+            size=6 * rows
+        )
         assert (noise_in_time(campaign, z) is not None) == enough
 
 
