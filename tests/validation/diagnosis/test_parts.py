@@ -10,6 +10,7 @@ from scipy.stats import binom
 
 from assembly.effects.effect import Unknown
 from assembly.kinematics.posture import place_robot
+from assembly.measurement.predict import predict
 from assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
 from tests.planar_arm_for_tests import SIGMA
@@ -104,6 +105,41 @@ def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
     )  # fmt: skip
     with pytest.raises(BadInput, match="measured points off one line"):
         register(campaign, conditions_of(campaign))
+
+
+def test_a_device_is_found_beside_errors_that_the_model_knows():
+    """The declared tip is 4 mm off: that is the machine's, and not the device's."""
+    plain = bar()
+    errors = np.zeros((2, 6))
+    errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
+    robot = plain.robot.with_errors(errors)
+    turn, t = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.5, -2.0])
+    R = Rotation.from_rotvec(turn)
+    q = plain.coordinates[:, 0]
+    off = Rotation.from_rotvec(np.outer(q, [0, 0, 1])).apply(errors[1, 3:])
+    p = LENGTH * along(plain)
+    seen = np.hstack([np.full((8, 3), np.nan), R.apply(p + off) + t - p])
+    campaign = replace(bar(measured=seen), robot=robot)
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+
+
+def test_each_session_has_a_device_of_its_own():
+    """Two places in the room, two sessions; rows without any are all of one."""
+    plain, sessions = bar(), np.array(["a", "b"] * 4)
+    p, seen = LENGTH * along(plain), np.zeros((8, 6))
+    seen[:, :3] = np.nan
+    where = {"a": ([0.1, 0.2, -0.3], [1.0, 2.0, 0.5]), "b": ([0, 0, 1.0], [-1.0, 0, 0])}
+    for k, name in enumerate(sessions):
+        turn, t = where[name]
+        seen[k, 3:] = Rotation.from_rotvec(turn).apply(p[k]) + t - p[k]
+    campaign = replace(bar(measured=seen), session=sessions)
+    found = register(campaign, conditions_of(campaign))
+    left = campaign.measured - predict(found).deviation
+    assert np.abs(left[:, 3:]).max() < 1e-9
+    unknown = replace(campaign, session=np.array(["a"] * 8))
+    with pytest.raises(BadInput, match='session "b" has no row'):
+        register(unknown, conditions_of(campaign))
 
 
 # tangents
