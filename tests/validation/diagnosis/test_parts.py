@@ -20,6 +20,7 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import coarse_frame, register
+from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
@@ -178,6 +179,16 @@ def test_a_tangent_about_an_upper_bound_is_taken_below_it():
     assert max(tried) == most
     expected = 5.0 * whiten(campaign, fit_of(campaign, LENGTH))
     assert found.columns[:, 0] == pytest.approx(expected, rel=1e-6, abs=1e-3)
+
+
+def test_wrenches_are_as_small_as_their_loads():
+    """Zero is what is rounding beside the largest, and not beside 1 N."""
+    load = np.array([0, 0, 3.0, 0, 5.0, 0])
+    one = responses(conditions_of(bar(load, link=BEAM)))
+    tiny = responses(conditions_of(bar(1e-12 * load, link=BEAM)))
+    assert np.abs(one.wrenches).max() > 1.0
+    assert 1e12 * tiny.wrenches == pytest.approx(one.wrenches, rel=1e-9, abs=1e-9)
+    assert tiny.screws == pytest.approx(one.screws)
 
 
 # refit
