@@ -1,18 +1,24 @@
 """Random one-line faults in the numerical modules, and whether the tests see them.
 
-    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--seconds S]
-        [--traced FOLDER]
+    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
+        [--seconds S] [--traced FOLDER]
 
 The default tests of all folders and ``tests/test_answers.py`` run once, traced: which
 test passes which line, and how long it takes (kept in the folder after --traced, and
-traced anew where a test has changed).  Compiled loops have no lines to
-trace: tests of loops by themselves run a second time uncompiled, each for a few seconds
-at most.  Then every fault is put into a copy of the tree and the tests that pass its
-line run, in a fork of this process, which has imported all libraries: those of an
-eighth of S seconds, the nearest and shortest first, then of S seconds; the first
-failure is enough.  A fault that longer or other tests would see counts as survived.
-Faults in compiled loops are judged uncompiled, then once more compiled, by the tests
-that import their module.  Printed: the share caught, and every survivor.
+traced anew where a test has changed; what was traced of a file that has changed since
+is of no use).  Then the tests that pass a fault's line run, the nearest and shortest
+first, as many as take S seconds; the first failure is enough.  A fault that longer or
+other tests would see counts as survived.
+
+Faults within functions are exchanged in a process that has loaded everything
+(``exchanged_code.py``).  The others are put into a copy of the tree, and tests run in a
+fork of this process, which has imported all libraries: of an eighth of S seconds first.
+Compiled loops have no lines to trace: tests of loops by themselves run a second time
+uncompiled, each for a few seconds at most; faults in them are judged uncompiled, then
+once more compiled, by the tests that import their module.
+
+After --files: every fault of these files instead of COUNT that are drawn.  Printed: the
+share caught, and every survivor.
 """
 
 import argparse
