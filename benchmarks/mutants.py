@@ -177,21 +177,20 @@ def judged(
 ) -> Iterator[tuple[Fault, str | None]]:
     """Each fault with the test that sees it; first those that can be exchanged."""
     some = [fault for fault in faults if exchangeable(fault)]
-    if some:
-        reading, writing = Pipe(duplex=False)
-        child = os.fork()
-        if not child:
-            Session(tree, lambda session: send(session)).run()
-            os._exit(0)
+    reading, writing = Pipe(duplex=False)
 
-        def send(session: Session) -> None:
-            for fault in some:
-                tests = chosen(traces[False].nearest(fault), traces[False], seconds)
-                writing.send(session.seen(fault, tests, 3 * seconds))
+    def send(session: Session) -> None:
+        for fault in some:
+            tests = chosen(traces[False].nearest(fault), traces[False], seconds)
+            writing.send(session.seen(fault, tests, 3 * seconds))
 
-        writing.close()
-        yield from ((fault, reading.recv()) for fault in some)
-        os.waitpid(child, 0)
+    child = os.fork()
+    if not child:
+        Session(tree, send).run()
+        os._exit(0)
+    writing.close()
+    yield from ((fault, reading.recv()) for fault in some)
+    os.waitpid(child, 0)
     caches = Caches(tree)
     for fault in faults:
         if not exchangeable(fault):
