@@ -176,13 +176,14 @@ def judged(
     faults: list[Fault], tree: Path, traces: dict[bool, Trace], seconds: float
 ) -> Iterator[tuple[Fault, str | None]]:
     """Each fault with the test that sees it; first those that can be exchanged."""
-    some = [fault for fault in faults if exchangeable(fault)]
+    trace, some = traces[False], [fault for fault in faults if exchangeable(fault)]
+    # before the fork, which leaves the trace's data base behind
+    tests = [chosen(trace.nearest(fault), trace, seconds) for fault in some]
     reading, writing = Pipe(duplex=False)
 
     def send(session: Session) -> None:
-        for fault in some:
-            tests = chosen(traces[False].nearest(fault), traces[False], seconds)
-            writing.send(session.seen(fault, tests, 3 * seconds))
+        for one in zip(some, tests, strict=True):
+            writing.send(session.seen(*one, 3 * seconds))
 
     child = os.fork()
     if not child:
