@@ -400,3 +400,35 @@ def test_springs_of_passive_joints_leave_their_own_motion_free():
     K = with_small(robot, [springs], [np.array([1e-3, 1e-7])]).frame("hinge")
     stiffness = np.diag(K.joint_stiffness)
     assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
+
+
+def test_a_range_of_temperatures_is_left_by_half_of_it():
+    """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
+    heat = {"temperature": np.linspace(20.0, 60.0, 8)}
+    plain = bar(link=BEAM, **heat)
+    seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
+    campaign = bar(link=BEAM, measured=seen, **heat)
+    here = conditions_of(campaign)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    for fit, rival in ((longer, warmer), (warmer, longer)):
+        found = next_measurement(campaign, here, fit, [rival])
+        assert found.covariates == {"temperature": 80.0}
+
+
+def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
+    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
+    M, k = 30.0, 2e5
+    plain = bar()
+    across = np.cross([0, 0, 1], along(plain))
+    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
+    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    here = conditions_of(campaign)
+    softer, turned = (
+        refit(campaign, here, [one], np.array([start]))
+        for one, start in ((SOFTER, 1e-6), (TURNED, 0.0))
+    )
+    found = next_measurement(campaign, here, softer, [turned])
+    assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
+    assert found.load[2] < 0  # against it they are farther apart
