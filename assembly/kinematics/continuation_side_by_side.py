@@ -5,15 +5,13 @@ target in each lane of the processor's vector registers.  No lane depends on ano
 """
 
 import ctypes
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.track import Track
 from forcefit.native.libraries import address, load_library
-
-if TYPE_CHECKING:
-    from assembly.kinematics.nominal import Track
 
 SOURCE = "assembly/kinematics/continuation.cpp"
 _ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
@@ -58,7 +56,7 @@ def tree_of(fields: dict[str, Any]) -> TreeAddresses:
 
 def follow_side_by_side(
     tree: TreeAddresses, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
-    track: "Track",
+    track: Track,
 ) -> bool:  # fmt: skip
     """Follow every target along its straight line.
 

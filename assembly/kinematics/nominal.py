@@ -19,6 +19,7 @@ from assembly.kinematics.continuation_side_by_side import (
     follow_side_by_side,
     tree_of,
 )
+from assembly.kinematics.track import Track
 from assembly.model.robot import JOINTS, Robot
 
 NOT_CLOSED = "expected a configuration in which every closure holds"
@@ -39,33 +40,6 @@ class Target:
     def __len__(self) -> int:
         given = self.pose if self.pose is not None else self.coordinates
         return 0 if given is None else len(given)
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """End of the continuation to each target.
-
-    Attributes:
-        coordinates: (k, n) joint coordinates where it ends.
-        transforms: (k, n, 4, 4) frames there.
-        progress: (k,) part of the way; 1 where the target was reached.
-        closure_mismatch: (k, closures) [rad, m] largest component left open.
-    """
-
-    coordinates: NDArray
-    transforms: NDArray
-    progress: NDArray
-    closure_mismatch: NDArray
-
-    @property
-    def reached(self) -> NDArray:
-        """(k,) bool."""
-        return self.progress == 1.0
-
-    @property
-    def mismatch(self) -> NDArray:
-        """(k,) [rad, m] largest component left open in any closure."""
-        return self.closure_mismatch.max(axis=1, initial=0.0)
 
 
 def size_of(robot: Robot) -> float:

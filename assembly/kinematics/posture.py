@@ -21,7 +21,8 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.nominal import NOT_CLOSED, Target, Track, follow
+from assembly.kinematics.nominal import NOT_CLOSED, Target, follow
+from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from forcefit.inputs.display import Figures, brief, html_table, numbers, short_repr
