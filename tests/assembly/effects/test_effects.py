@@ -350,3 +350,9 @@ def test_which_joints_may_have_friction_and_which_play():
     ))  # fmt: skip
     assert elastic_joints(robot) == ("soft",)
     assert moving_joints(robot) == ("soft", "rigid")
+
+
+def test_rows_close_as_well_as_the_worst_of_them():
+    rows = here(arm()).take(np.zeros(3, dtype=int))
+    for mismatch, worst in (([0.0, 0.0, 0.0], 0.0), ([1e-9, 3e-7, 2e-8], 3e-7)):
+        assert replace(rows, mismatch=np.array(mismatch)).postures.mismatch == worst

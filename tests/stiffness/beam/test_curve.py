@@ -8,7 +8,12 @@ from scipy.integrate import quad
 
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import beam_compliance
-from stiffness.beam.curve import arc_piece, curve_compliance, straight_piece
+from stiffness.beam.curve import (
+    arc_piece,
+    curve_compliance,
+    curve_length,
+    straight_piece,
+)
 from stiffness.beam.sections import (
     Section,
     box_section,
@@ -232,3 +237,32 @@ def test_thin_sections_by_hand():
     # a web of nothing but web: the wide I's factor tends to the rectangle's
     web = i_section(0.0061, 0.1, 0.006, 1e-6, NU)
     assert web.shear_z == pytest.approx(10 * 1.3 / (12 + 11 * 0.3), rel=1e-2)
+
+
+@pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e2])
+def test_a_curve_cut_in_two_is_the_curve_wherever_it_stands(away, size):
+    """An arc in two arcs, a bar in two bars; as long as they are together."""
+    o, turn = np.array(away) * size, np.array([0.0, 0.6, 0.0])
+    centre, corner = o + [0, 0, 0.2 * size], o + [-0.3 * size, 0, 0]
+    half = arc_piece(o, centre, turn / 2, CROOKED)
+    middle = half.place(1.0)
+    end = arc_piece(o, centre, turn, CROOKED).place(1.0)
+    assert np.linalg.norm(end - centre) == pytest.approx(0.2 * size)
+    one = [
+        straight_piece(corner, o, CROOKED, [0, 1, 0]),
+        arc_piece(o, centre, turn, CROOKED),
+    ]
+    cut = [
+        straight_piece(corner, (corner + o) / 2, CROOKED, [0, 1, 0]),
+        straight_piece((corner + o) / 2, o, CROOKED, [0, 1, 0]),
+        half,
+        arc_piece(middle, centre, turn / 2, CROOKED),
+    ]
+    assert_same(curve_compliance(cut, E, NU), curve_compliance(one, E, NU), 1e-9)
+    for pieces in (one, cut):
+        assert curve_length(pieces) == pytest.approx((0.3 + 0.2 * 0.6) * size)
+    with pytest.raises(BadInput, match="piece 2 begins"):
+        curve_compliance([one[1], one[0]], E, NU)
+    with pytest.raises(BadInput, match="across the radius"):
+        arc_piece(o, centre + [0, 1e-3 * size, 0], turn, CROOKED)

@@ -9,6 +9,7 @@ from scipy import constants
 from forcefit.inputs.table import BadInput
 from stiffness.surface.surface import (
     UNITS,
+    _inside,
     check_surface,
     read_surface,
     signed_volume,
@@ -161,3 +162,16 @@ def test_a_volume_is_the_same_far_from_the_origin():
         assert volume == pytest.approx(1e-3, rel=tolerance)
         inside_out = signed_volume(points, CUBE_TRIANGLES[:, ::-1])
         assert inside_out == pytest.approx(-volume, rel=tolerance)
+
+
+def test_what_is_inside_a_surface_is_what_a_ray_leaves_an_odd_number_of_times(rng):
+    """A box of three lengths beside the origin: within all three, or outside."""
+    points = CUBE / 0.1 * [0.3, 0.2, 0.1] + [1.0, -2.0, 0.5]
+    low, high = points.min(axis=0), points.max(axis=0)
+    inside = []
+    for _ in range(60):
+        point = low + (high - low) * rng.uniform(-0.3, 1.3, 3)
+        inside.append(bool(np.all((low < point) & (point < high))))
+        for triangles in (CUBE_TRIANGLES, CUBE_TRIANGLES[:, ::-1]):
+            assert _inside(point, points, triangles) == inside[-1]
+    assert 5 < sum(inside) < 55

@@ -2,12 +2,14 @@
 
 from itertools import combinations
 from math import comb, log
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
 from assembly.effects.effect import Unknown
+from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, posterior
 from validation.diagnosis.screens import Projector, score_beside_squares
@@ -314,3 +316,20 @@ def test_an_unknown_that_leaves_its_bound_is_held_there(rng):
     rest = np.linalg.lstsq(A[:, [0, 2]], z - A[:, 1] * low[1])[0]
     assert found.values == pytest.approx([rest[0], low[1], rest[1]])
     assert found.rank == 3
+
+
+@pytest.mark.parametrize(
+    ("said", "learned", "remarks", "foretells"),
+    [
+        ("explained", (), (), True), ("learned", (1,), ("odd",), True),
+        ("outside_library", (1,), (), True), ("outside_library", (1,), ("odd",), False),
+        ("outside_library", (), (), False), ("ambiguous", (), (), False),
+    ],
+)  # fmt: skip
+def test_a_model_foretells_if_it_is_claimed_or_learned_and_sound(
+    said, learned, remarks, foretells
+):
+    one = SimpleNamespace(
+        verdict=said, remarks=remarks, model=SimpleNamespace(learned=learned)
+    )
+    assert Diagnosis.foretells.fget(one) is foretells
