@@ -80,8 +80,8 @@ def dead_loads(
         wrench[3:] = 0.0
     if bodies is not None:
         given = np.asarray(bodies, dtype=float)
-        on_bodies[:, :, :3] = skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
-        on_bodies[:, :, 3] = given[:, 3:]
+        on_bodies[:, :, :3] += skew(given[:, :3]) @ posture.transforms[:, :3, :3] / 2
+        on_bodies[:, :, 3] += given[:, 3:]
     if gravity is not None:
         g = np.asarray(gravity, dtype=float)
         _add_weights(posture, posture.robot.errors, g, on_bodies, carried)

@@ -91,6 +91,24 @@ def test_both_derivatives_of_the_work(seed):
     assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()
 
 
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
+def test_loads_together_work_as_each_alone(point):
+    """Of the platform at a point, of bodies, of weights: energies add up."""
+    rng = np.random.default_rng(7)
+    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
+    model, x, _ = moved_unknowns(posture, rng, 0.1)
+    there = place(model, x)
+    load, bodies, gravity = some_loads(posture, rng)
+    each = [
+        dead_loads(posture, load, point=point), dead_loads(posture, bodies=bodies),
+        dead_loads(posture, gravity=gravity),
+    ]  # fmt: skip
+    together = dead_loads(posture, load, bodies, gravity, point)
+    alone = [work_of(there, loads) for loads in each]
+    assert min(np.abs(alone)) > 1e-6
+    assert work_of(there, together) == pytest.approx(sum(alone), rel=1e-12)
+
+
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
 def test_a_mass_on_an_arm_hangs_where_its_hinge_lets_it(stiffness):
     """k a + m g (x cos a - y sin a) = 0 for a mass at (x, y) from the hinge."""
