@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.compiled_energy import small_answer
+from assembly.linear.compiled_energy import NEAR_WITHOUT_CLEARANCE, Limits, small_answer
 from assembly.linear.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import kernel, part
@@ -99,7 +99,9 @@ def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
             absolute = _STOP * GAP_WITHOUT_CLEARANCE * without / (size * size)
-            small_answer(G, right, starts, _STOP * GAP, absolute, own, own_y)
+            near = NEAR_WITHOUT_CLEARANCE * without / (size * size)
+            limits = Limits(_STOP * GAP, absolute, near)
+            small_answer(G, right, vector(nu), starts, limits, own, own_y)
             for i in range(r):
                 own_y[i] *= size
         total = 0.0

@@ -72,7 +72,8 @@ public:
     void finish(const Block &block, Whole asked) {
         read(block);
         std::fill(q.u.begin(), q.u.end(), Real{});
-        solver.interior_then_newton(q, STOP * GAP, absolute, asked);
+        const Real near = NEAR_WITHOUT_CLEARANCE * 0.5 * inner(q.h.data(), q.h.data(), r);
+        solver.interior_then_newton(q, STOP * GAP, absolute, near, asked);
         for (int i = 0; i < r; ++i) y[i] = q.y[i] * size;
         write(block, asked);
     }
