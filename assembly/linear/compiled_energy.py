@@ -42,7 +42,7 @@ from assembly.solvers.vectors import (
 NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN = range(7)
 _STOP = 3e-3  # the solvers stop at this fraction of the accepted gap
 # gap from which Newton's method finishes: of the energy, of that without clearance
-_NEAR, NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
+NEAR, NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _FIRST_SIGMA = 1e6  # after the interior-point method, see dual_newton
 
@@ -271,7 +271,7 @@ def _minimise(
             G[c, i] = Gt[c, i] / size
     without, bent = 0.5 * inner(right, right), under.stored / (size * size)
     absolute = GAP_WITHOUT_CLEARANCE * without + (GAP + GAP_WITHOUT_CLEARANCE) * bent
-    near = NEAR_WITHOUT_CLEARANCE * without + (_NEAR + NEAR_WITHOUT_CLEARANCE) * bent
+    near = NEAR_WITHOUT_CLEARANCE * without + (NEAR + NEAR_WITHOUT_CLEARANCE) * bent
     limits = Limits(_STOP * GAP, _STOP * absolute, near)
     outcome = small_answer(G, right, d, s.starts, limits, u, y)
     for i in range(r):
@@ -310,7 +310,7 @@ def small_answer(
     programme = Programme(G, h, d, H, vector(0), starts)
     # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (
-        (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
+        (NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
         inside, _, _ = interior_point(programme, most, stop)
         copy(inside, u)
