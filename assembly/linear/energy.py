@@ -190,7 +190,8 @@ def _rows_of(loads: FrameLoads, count: int) -> NDArray:
     """(k, 2, n, 6) [N m, N] loads on bodies and on joints, as lanes read them."""
     both = np.stack([loads.body, loads.joint], axis=-2)
     shape = *both.shape[:-1], both.shape[-1] // 6, 6
-    return np.broadcast_to(both.reshape(shape), (count, *shape[-3:]))
+    rows = np.broadcast_to(both.reshape(shape), (count, *shape[-3:]))
+    return np.require(rows, requirements=["C", "W"])
 
 
 def _any_load(loads: NDArray | None, count: int) -> NDArray:
