@@ -135,7 +135,7 @@ def _solve_one(
     """One posture: compiled, or, in doubt, the fallback."""
     frame_loads = None
     if load is not None or bodies is not None or gravity is not None:
-        frame_loads = all_loads(posture, load, bodies, gravity)
+        frame_loads = all_loads(posture, load, bodies, gravity) or None
     assembly = _compiled_assembly(posture, load, frame_loads)
     if assembly is not None:
         return assembly
@@ -152,15 +152,16 @@ def _compiled_assembly(
     out = _solve_compiled(
         robot, posture.transforms[None], robot.errors[None],
         np.array([posture.mismatch]), "elastic", len(joints.links),
-        _rows_of(frame_loads, 1) if frame_loads else None,
+        None if frame_loads is None else frame_loads.rows(1),
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
         return None
     residual = out.residual + rounding
-    drop_zeros(out.energy, out.bound, out.multipliers, residual, bool(frame_loads))
+    loaded = frame_loads is not None
+    drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
     multipliers = out.multipliers[0]
     # without loads no wrenches mean no deformation but rounding
-    bent = len(out.elastic) > 0 and (bool(frame_loads) or multipliers.any())
+    bent = len(out.elastic) > 0 and (loaded or multipliers.any())
     assembly = Assembly(
         linearisation=linearise(posture),
         joints=joints,
@@ -184,14 +185,6 @@ def _rounding_of(robot: Robot) -> float:
     """[rad, lengths] what rounding may leave open in a robot's closures."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
-
-
-def _rows_of(loads: FrameLoads, count: int) -> NDArray:
-    """(k, 2, n, 6) [N m, N] loads on bodies and on joints, as lanes read them."""
-    both = np.stack([loads.body, loads.joint], axis=-2)
-    shape = *both.shape[:-1], both.shape[-1] // 6, 6
-    rows = np.broadcast_to(both.reshape(shape), (count, *shape[-3:]))
-    return np.require(rows, requirements=["C", "W"])
 
 
 def _any_load(loads: NDArray | None, count: int) -> NDArray:
@@ -348,8 +341,7 @@ def minimise_under_loads(
     own = robot.errors if errors is None else errors
     own = np.require(own.reshape(-1, T.shape[1], 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    rows = _rows_of(loads, len(T))
-    return _minimise_all(robot, T, own, off, "elastic", rows, one)
+    return _minimise_all(robot, T, own, off, "elastic", loads.rows(len(T)), one)
 
 
 def _minimise_all(

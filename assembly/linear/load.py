@@ -46,6 +46,22 @@ class FrameLoads:
     def __bool__(self) -> bool:
         return bool(np.any(self.body) or np.any(self.joint))
 
+    def rows(self, count: int) -> NDArray:
+        """The loads as compiled functions read them.
+
+        Args:
+            count: k; one row serves all.
+
+        Returns:
+            (k, 2, n, 6) [N m, N] on bodies and on joints.
+        """
+        rows = np.stack([self.body, self.joint], axis=-2)
+        rows = rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
+        if len(rows) == count:
+            return rows
+        every = np.broadcast_to(rows, (count, *rows.shape[1:]))
+        return np.require(every, requirements=["C", "W"])
+
 
 def loads_on_frames(
     posture: Posture,
@@ -84,7 +100,8 @@ def loads_on_frames(
     if acting.size:
         # all read at the platform's origin, then summed over what each frame carries
         arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
-        given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
+        if acting.tolist() != [robot.index(robot.platform)]:  # which is there
+            given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
         after += _beyond(robot)[:, acting] @ (own + after)[..., acting, :]
         own += after
         halves = _moved(given, -arms).reshape(*lead, 2, n, 2, 3)
@@ -145,6 +162,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
+@lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
     """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""
     table = np.zeros((len(robot.frames), 8))
@@ -155,6 +173,7 @@ def _masses(robot: Robot) -> NDArray:
             length, axis = beam_axis(frame)
             area = declared_section(link.section, link.poisson).area
             row[4], row[5:] = link.density * area * length, length * axis
+    table.setflags(write=False)
     return table
 
 
@@ -191,8 +210,8 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
     if given is None:
         return
     values = np.asarray(given, dtype=float)
-    refused = ~(np.abs(values) <= largest)  # NaN is refused
-    if refused.any():
+    if not np.abs(values).max(initial=0.0) <= largest:  # NaN is refused
+        refused = ~(np.abs(values) <= largest)
         raise BadInput(
             f"{whose}: found {values[refused].flat[0]:g}, expected finite numbers of "
             f"size at most {largest:g} [{unit}]"
