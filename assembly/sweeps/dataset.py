@@ -32,7 +32,9 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
-_TOGETHER = 64  # blocks written together
+_TOGETHER = (
+    512  # blocks written together: each write takes as long as some hundred points
+)
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
