@@ -1,9 +1,10 @@
 """Wrong expressions of one line, drawn at random from the numerical modules.
 
-A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``) are
-left out: what they show is tested where it is a number.  So is what compiles loops and
-loads them (``compiled.py``): it works out no number, and runs once, in processes of its
-own, which no fork of one that has loaded it can try again.
+A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``,
+``figures.py``, ``scene.py``) are left out: what they show is tested where it is a
+number.  So is what compiles loops and loads them (``compiled.py``): it works out no
+number, and runs once, in processes of its own, which no fork of one that has loaded it
+can try again; and what runs on a GPU alone (``device.py``), where there is none.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
@@ -33,7 +34,10 @@ SWAPS: dict[type, type] = {
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
 LARGE = 10  # numbers above it become one
-LEFT_OUT = {"report.py", "plot.py", "compiled.py"}
+LEFT_OUT = {
+    "report.py", "plot.py", "figures.py", "scene.py", "scenes.py", "compiled.py",
+    "device.py",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,8 @@ class Fault:
     """A wrong expression: in which file, on which row, the new line, what it is.
 
     Its statement's rows are those that a trace may name; the name is what the
-    statement gives a value to, where that happens as the module is imported.
+    statement gives a value to, where that happens as the module is imported, and not
+    within a function.
     """
 
     chapter: str
@@ -51,6 +56,13 @@ class Fault:
     what: str
     rows: range
     name: str | None
+    within: bool
+
+    def put_into(self, source: str) -> str:
+        """The file's text with the fault."""
+        lines = source.splitlines(keepends=True)
+        lines[self.row - 1] = self.line
+        return "".join(lines)
 
     @property
     def compiled(self) -> bool:
@@ -88,49 +100,69 @@ def is_left_open(node: ast.AST) -> bool:
     return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
-def wrong(node: ast.AST, random: Random) -> ast.AST | None:
-    """The node with one fault; None where it has none of ours."""
+def wrong(node: ast.AST) -> list[ast.AST]:
+    """The node with one fault, in each of its ways."""
     if isinstance(node, ast.Constant):
         value = node.value
         assert isinstance(value, int | float)
-        return ast.Constant(value + 1 if value <= LARGE else type(value)(1))
+        return [ast.Constant(value + 1 if value <= LARGE else type(value)(1))]
     if isinstance(node, ast.UnaryOp):
-        return node.operand if isinstance(node.op, ast.USub | ast.Not) else None
+        return [node.operand] if isinstance(node.op, ast.USub | ast.Not) else []
     if isinstance(node, ast.BinOp):
         swap = SWAPS.get(type(node.op))
-        return swap and ast.BinOp(node.left, swap(), node.right)
+        return [ast.BinOp(node.left, swap(), node.right)] if swap else []
     if isinstance(node, ast.BoolOp):
-        return ast.BoolOp(SWAPS[type(node.op)](), node.values)
+        return [ast.BoolOp(SWAPS[type(node.op)](), node.values)]
     assert isinstance(node, ast.Compare)
-    k = random.randrange(len(node.ops))
-    swap = SWAPS.get(type(node.ops[k]))
-    ops = [*node.ops[:k], *([swap()] if swap else []), *node.ops[k + 1 :]]
-    return swap and ast.Compare(node.left, ops, node.comparators)
+    return [
+        ast.Compare(
+            node.left, [*node.ops[:k], swap(), *node.ops[k + 1 :]], node.comparators
+        )
+        for k, op in enumerate(node.ops)
+        if (swap := SWAPS.get(type(op)))
+    ]
+
+
+def faults_at(chapter: str, path: Path, node: ast.AST, source: str) -> list[Fault]:
+    """Faults of an expression of one line, which is in a file's text."""
+    old = ast.get_source_segment(source, node)
+    if old is None or "\n" in old:
+        return []
+    row = node.lineno  # type: ignore[attr-defined]
+    line = source.splitlines(keepends=True)[row - 1].encode()
+    begin, end = node.col_offset, node.end_col_offset  # type: ignore[attr-defined]
+    where = statement(ast.parse(source), row)
+    faults = []
+    for new in wrong(node):
+        text = ast.unparse(ast.fix_missing_locations(new))
+        changed = (line[:begin] + f"({text})".encode() + line[end:]).decode()
+        faults.append(Fault(chapter, path, row, changed, f"{old} -> {text}", *where))
+    return faults
 
 
 def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
     """A fault in a file; None where the expression drawn has none of ours."""
     source = (ROOT / path).read_text(encoding="utf-8")
-    tree = ast.parse(source)
-    nodes = list(places(tree))
+    nodes = list(places(ast.parse(source)))
     if not nodes:
         return None
-    node = random.choice(nodes)
-    new = wrong(node, random)
-    old = ast.get_source_segment(source, node)
-    if new is None or old is None or "\n" in old:
-        return None
-    text = ast.unparse(ast.fix_missing_locations(new))
-    row = node.lineno  # type: ignore[attr-defined]
-    line = source.splitlines(keepends=True)[row - 1].encode()
-    begin, end = node.col_offset, node.end_col_offset  # type: ignore[attr-defined]
-    changed = (line[:begin] + f"({text})".encode() + line[end:]).decode()
-    what = f"{old} -> {text}"
-    return Fault(chapter, path, row, changed, what, *statement(tree, row))
+    faults = faults_at(chapter, path, random.choice(nodes), source)
+    return random.choice(faults) if faults else None
 
 
-def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
-    """Rows of the innermost statement on a row, and what it names while importing."""
+def all_in(chapter: str, path: Path) -> list[Fault]:
+    """All faults of a file, row by row."""
+    source = (ROOT / path).read_text(encoding="utf-8")
+    faults = [
+        fault
+        for node in places(ast.parse(source))
+        for fault in faults_at(chapter, path, node, source)
+    ]
+    return sorted(faults, key=lambda fault: fault.row)
+
+
+def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
+    """Rows of a row's innermost statement, what it names, whether in a function."""
     within: list[ast.stmt] = []
     waiting: list[ast.AST] = [tree]
     while waiting:
@@ -145,16 +177,16 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None]:
     rows = range(last.lineno, max(end, row) + 1)
     functions = [n for n in within if isinstance(n, ast.FunctionDef)]
     if functions and functions[-1] is last:  # a default value
-        return range(last.body[0].lineno, (last.end_lineno or row) + 1), None
+        return range(last.body[0].lineno, (last.end_lineno or row) + 1), None, False
     if functions:
-        return rows, None
+        return rows, None, True
     classes = [n.name for n in within if isinstance(n, ast.ClassDef)]
     if classes:  # a field's default counts where one is made
-        return rows, classes[-1]
+        return rows, classes[-1], False
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
     # a lambda's rows are passed later
-    return rows, names[0] if names else path_name(last)
+    return rows, names[0] if names else path_name(last), False
 
 
 def path_name(node: ast.AST) -> str | None:

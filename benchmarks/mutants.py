@@ -1,18 +1,24 @@
 """Random one-line faults in the numerical modules, and whether the tests see them.
 
-    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--seconds S]
-        [--traced FOLDER]
+    python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
+        [--seconds S] [--traced FOLDER]
 
 The default tests of all folders and ``tests/test_answers.py`` run once, traced: which
 test passes which line, and how long it takes (kept in the folder after --traced, and
-traced anew where a test has changed).  Compiled loops have no lines to
-trace: tests of loops by themselves run a second time uncompiled, each for a few seconds
-at most.  Then every fault is put into a copy of the tree and the tests that pass its
-line run, in a fork of this process, which has imported all libraries: those of an
-eighth of S seconds, the nearest and shortest first, then of S seconds; the first
-failure is enough.  A fault that longer or other tests would see counts as survived.
-Faults in compiled loops are judged uncompiled, then once more compiled, by the tests
-that import their module.  Printed: the share caught, and every survivor.
+traced anew where a test has changed; what was traced of a file that has changed since
+is of no use).  Then the tests that pass a fault's line run, the nearest and shortest
+first, as many as take S seconds; the first failure is enough.  A fault that longer or
+other tests would see counts as survived.
+
+Faults within functions are exchanged in a process that has loaded everything
+(``exchanged_code.py``).  The others are put into a copy of the tree, and tests run in a
+fork of this process, which has imported all libraries: of an eighth of S seconds first.
+Compiled loops have no lines to trace: tests of loops by themselves run a second time
+uncompiled, each for a few seconds at most; faults in them are judged uncompiled, then
+once more compiled, by the tests that import their module.
+
+After --files: every fault of these files instead of COUNT that are drawn.  Printed: the
+share caught, and every survivor.
 """
 
 import argparse
@@ -23,10 +29,13 @@ import re
 import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from multiprocessing import Pipe
 from pathlib import Path
 from random import Random
 
-from benchmarks.faults import ROOT, Fault, drawn, files_of, has_loops
+from benchmarks.exchanged_code import Session
+from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of, has_loops
 from benchmarks.traced_tests import PACKAGES, Run, Trace, sources, traced
 
 # imported once, before the forks
@@ -125,9 +134,7 @@ def caught(
     """The test that sees a fault, "" where it is none's name; None if none does."""
     path = tree / fault.path
     whole, times = path.read_bytes(), path.stat()
-    lines = whole.decode().splitlines(True)
-    lines[fault.row - 1] = fault.line
-    path.write_text("".join(lines), encoding="utf-8")
+    path.write_text(fault.put_into(whole.decode()), encoding="utf-8")
     try:
         if fault.compiled:
             caches.drop(fault)
@@ -160,21 +167,66 @@ def seen(
     return run(chosen(sorted(tests, key=trace.cost(fault)), trace, seconds))
 
 
+def exchangeable(fault: Fault) -> bool:
+    """Whether it can be put into functions that are loaded already."""
+    return fault.within and not fault.compiled
+
+
+def judged(
+    faults: list[Fault], tree: Path, traces: dict[bool, Trace], seconds: float
+) -> Iterator[tuple[Fault, str | None]]:
+    """Each fault with the test that sees it; first those that can be exchanged."""
+    trace, some = traces[False], [fault for fault in faults if exchangeable(fault)]
+    # before the fork, which leaves the trace's data base behind
+    tests = [chosen(trace.nearest(fault), trace, seconds) for fault in some]
+    reading, writing = Pipe(duplex=False)
+
+    def send(session: Session) -> None:
+        for one in zip(some, tests, strict=True):
+            writing.send(session.seen(*one, 3 * seconds))
+
+    child = os.fork()
+    if not child:
+        Session(tree, send).run()
+        os._exit(0)
+    writing.close()
+    yield from ((fault, reading.recv()) for fault in some)
+    os.waitpid(child, 0)
+    caches = Caches(tree)
+    for fault in faults:
+        if not exchangeable(fault):
+            yield fault, caught(fault, tree, traces, caches, seconds)
+
+
+def asked_for(asked: argparse.Namespace) -> list[Fault]:
+    """All faults of the files asked for, or as many drawn as are asked for."""
+    files = files_of(asked.only)
+    if asked.files:
+        named = [(c, path) for c, path in files if path in asked.files]
+        return [fault for chapter, path in named for fault in all_in(chapter, path)]
+    weights = [len((ROOT / path).read_text().splitlines()) for _, path in files]
+    random = Random(asked.seed)
+    faults: list[Fault] = []
+    while len(faults) < asked.count:
+        ((chapter, path),) = random.choices(files, weights)
+        if fault := drawn(chapter, path, random):
+            faults.append(fault)
+    return faults
+
+
 def main() -> None:
     """Draw faults, count those caught, name those that were not."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="")
+    parser.add_argument("--files", type=Path, nargs="+")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--traced", type=Path)
     asked = parser.parse_args()
-    random = Random(asked.seed)
-    files = files_of(asked.only)
-    weights = [len((ROOT / path).read_text().splitlines()) for _, path in files]
     for library in LIBRARIES:
         importlib.import_module(library)
-    began, done, survived = time.monotonic(), 0, 0
+    began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
         # with the caches of compiled functions, whose files keep their times
@@ -183,18 +235,14 @@ def main() -> None:
         kept = asked.traced or Path(scratch)
         kept.mkdir(parents=True, exist_ok=True)
         traces = {loops: traced(tree, kept, loops) for loops in (False, True)}
-        caches = Caches(tree)
-        while done < asked.count:
-            ((chapter, path),) = random.choices(files, weights)
-            fault = drawn(chapter, path, random)
-            if fault is None:
-                continue
-            test = caught(fault, tree, traces, caches, asked.seconds)
-            done += 1
+        faults = asked_for(asked)
+        for done, (fault, test) in enumerate(
+            judged(faults, tree, traces, asked.seconds), start=1
+        ):
             survived += test is None
             seen = "survived" if test is None else f"caught by {test or 'a limit'}"
             print(f"{fault}  {seen}", flush=True)
-            if test is None or done == asked.count or done % 25 == 0:
+            if done == len(faults) or done % 25 == 0:
                 spent = time.monotonic() - began
                 print(f"{done} faults, {survived} survived, {spent:.0f} s", flush=True)
 

@@ -28,6 +28,10 @@ UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "bat
 UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
+WORDS = [
+    "-q", "-rfE", "-m", "not slow", "-p", "no:cacheprovider", "--tb=no",
+    "-W", "ignore::pytest.PytestAssertRewriteWarning",
+]  # fmt: skip
 
 
 class Run:
@@ -69,8 +73,7 @@ class Run:
         os.environ |= {"PYTHONPATH": str(self.tree), "PYTHONDONTWRITEBYTECODE": "1"}
         sys.dont_write_bytecode = True
         sys.path.insert(0, str(self.tree))
-        words = ["-q", "-rfE", "-m", "not slow", "-p", "no:cacheprovider", "--tb=no"]
-        words += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+        words = [*WORDS]
         if not plugins:
             words.append("-x")
         if self.uncompiled:

@@ -34,9 +34,7 @@ def skew(vector: ArrayLike) -> NDArray:
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., 2, 1] = v[..., 0]
-    S[..., 0, 2] = v[..., 1]
-    S[..., 1, 0] = v[..., 2]
+    S[..., (2, 0, 1), (1, 2, 0)] = v  # of three components, no less and no more
     return S - np.swapaxes(S, -1, -2)
 
 

@@ -47,6 +47,7 @@ from stiffness.fem.two_ends import two_ends
 from stiffness.link import LinkStiffness
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
 from tests.further_questions_for_tests import FURTHER
+from tests.inner_questions_for_tests import INNER
 from tests.part_questions_for_tests import PARTS
 from tests.planar_arm_for_tests import measured
 from tests.robot_questions_for_tests import ROBOTS
@@ -317,6 +318,7 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
     **PARTS,
     **ROBOTS,
     **FURTHER,
+    **INNER,
 }  # fmt: skip
 
 

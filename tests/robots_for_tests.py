@@ -1,6 +1,7 @@
 """Robots the tests share: the paper's with the reference draws, and tiny ones."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,35 @@ def planar_four_bar(crank=0.1, coupler=0.3, rocker=0.25, ground=0.3, errors=None
 def small_clearance(radial=20e-6, axial=30e-6, tilt=5e-4, spin=None):
     """A joint's play at a usual size."""
     return Clearance(radial=radial, axial=axial, tilt=tilt, spin=spin)
+
+
+def in_millimetres(robot, s=1000.0):
+    """The same robot with lengths in another unit: N stays N, m becomes s units."""
+    screw = np.array([1, 1, 1, s, s, s])
+
+    def stiffness(K):
+        # w = K x with moments s times larger, shifts s times larger
+        wrench = np.array([s, s, s, 1, 1, 1])
+        return K * np.outer(wrench, 1 / screw)
+
+    def turned(frame):
+        part = {}
+        if frame.link is not None:
+            part["link"] = MatrixLink(stiffness(frame.link.stiffness))
+        if frame.joint_stiffness is not None:
+            part["joint_stiffness"] = np.diag(
+                np.diag(frame.joint_stiffness) * [s, s, s, 1 / s, 1 / s, 1 / s]
+            )
+        if frame.clearance is not None:
+            c = frame.clearance
+            axial = None if c.axial is None else c.axial * s
+            part["clearance"] = Clearance(c.radial * s, axial, c.tilt, c.spin)
+        return replace(
+            frame, translation=frame.translation * s,
+            geometric_error=frame.geometric_error * screw, **part,
+        )  # fmt: skip
+
+    return replace(robot, frames=tuple(turned(f) for f in robot.frames))
 
 
 def random_robot(rng, legs=2, joints=3, link_share=0.7, branched=False):

@@ -23,6 +23,7 @@ from examples.hilti.convert import convert as convert_hilti
 from examples.ipa_ur10.convert import JOINTS, last_direction
 from examples.ipa_ur10.convert import convert as convert_ipa
 from examples.serial_robots.convert import convert as convert_serial
+from examples.serial_robots.convert import find as find_serial
 from examples.voron.convert import convert as convert_voron
 from forcefit.inputs.table import BadInput
 from stiffness.screws import transform
@@ -172,6 +173,14 @@ def test_a_table_of_the_ur5_becomes_a_campaign(q, tmp_path):
     assert campaign.measured[0, 3:] == pytest.approx([-2e-3, 1e-3, -5e-4])
     with pytest.raises(BadInput, match=r"targets are 0\.01 m off"):
         convert_serial(serial_table(tmp_path / "b.csv", 0.0, 0.041), tmp_path / "b")
+
+
+def test_a_table_is_found_by_path_or_by_name(tmp_path):
+    (tmp_path / "serial_robots").mkdir()
+    named = serial_table(tmp_path / "serial_robots" / "a.csv", 0.0)
+    assert find_serial(named) == find_serial(Path("a.csv"), tmp_path) == named
+    with pytest.raises(BadInput, match=r"b\.csv: no such file, nor .*expected a table"):
+        find_serial(Path("b.csv"), tmp_path)
 
 
 @needs("serial_robots")

@@ -175,7 +175,8 @@ class _Units:
                 base, power = self.of(left), _number(right)
                 if power is None:
                     self.equal(base, {}, ast.unparse(left))
-                return {name: k * (power or 0.0) for name, k in base.items()}
+                    return {}
+                return {name: k * power for name, k in base.items()}
             case ast.BinOp(left=left, op=op, right=right):
                 sign = -1.0 if isinstance(op, ast.Div) else 1.0
                 return _added(self.of(left), self.of(right), sign)
@@ -223,7 +224,7 @@ class _Units:
 
 def _number(node: ast.AST) -> float | None:
     """The value of a part without names, None if it has any."""
-    if any(isinstance(n, ast.Name) and n.id not in ("pi",) for n in ast.walk(node)):
+    if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
 

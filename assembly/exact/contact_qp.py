@@ -24,6 +24,7 @@ Sources:
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,18 @@ class ClearanceProblem:
     rows: NDArray
     right: NDArray
 
-    @property
-    def active(self) -> NDArray:
-        """(cones,) [J] multiplier of each cone at the start, 0 where inactive."""
-        force = cone_multipliers(self.start, self.s, self.group)
-        return np.where(force > 1e-9 * force.max(initial=0.0), force, 0.0)
+    @cached_property
+    def multipliers(self) -> tuple[NDArray, NDArray]:
+        """(cones,) [J] of cones at the start, 0 where inactive; (p,) of ``rows``."""
+        touching = cone_sizes(self.start, self.group) >= 1.0 - AT_BOUNDARY
+        normals = boundary_normals(self.start, touching, self.group)
+        balance = np.linalg.lstsq(np.hstack([normals, self.rows.T]), -self.s)[0]
+        force = np.zeros(len(touching))
+        force[touching] = np.maximum(balance[: normals.shape[1]], 0.0)
+        return (
+            np.where(force > 1e-9 * force.max(initial=0.0), force, 0.0),
+            -balance[normals.shape[1] :],
+        )
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
@@ -98,12 +106,13 @@ def clearance_step(
 def _convex(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
     """The step with S made convex, first without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
-    active = p.active[p.group]
+    force, _ = p.multipliers
+    active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s)
     # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and normal to it nothing moves to
     # first order: both make S convex where needed, and leave the minimum where it is
-    normals = boundary_normals(p.start, p.active > 0.0, p.group)
+    normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
     step = _conic(p, convex, p.s + held * p.start)
@@ -128,10 +137,11 @@ def _conic(
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
     """Newton's method on the active boundaries; None if that fails."""
-    u, active = p.start, p.active > 0.0
+    force, rigid = p.multipliers
+    u, active = p.start, force > 0.0
     for _ in range(_STEPS):
         gradient = p.s + p.S @ (u - p.start)
-        force = cone_multipliers(u, gradient, p.group) * active
+        force = cone_multipliers(u, gradient - p.rows.T @ rigid, p.group) * active
         step = _active_step(p, p.S + np.diag(force[p.group]), gradient, u, active)
         if step is None:
             return None

@@ -302,8 +302,13 @@ def _curve(
     with np.errstate(divide="ignore"):
         slopes = np.array([p.rise for p in places]) / np.array(moved)
     return DeflectionCurve(
-        posture, path.component, np.array([p.load for p in places]), screws,
-        np.array([energy_of(p.local.placement) for p in places]), slopes,
-        (frozenset(),) * len(places), np.zeros(len(places), dtype=bool),
-        tuple(events),
-    )  # fmt: skip
+        posture=posture,
+        component=path.component,
+        loads=np.array([p.load for p in places]),
+        screws=screws,
+        energies=np.array([energy_of(p.local.placement) for p in places]),
+        stiffness=slopes,
+        pressed=(frozenset(),) * len(places),
+        open_=np.zeros(len(places), dtype=bool),
+        events=tuple(events),
+    )

@@ -163,11 +163,16 @@ def load_deflection(
     )
     axis = np.eye(6)[component]
     return DeflectionCurve(
-        posture, component, np.array([p.load for p in points]), np.array(screws),
-        np.array([p.equilibrium.energy for p in points]),
-        np.array([p.tangent.along(axis)[0] for p in points]),
-        tuple(p.pressed for p in points), np.array(open_), tuple(events),
-    )  # fmt: skip
+        posture=posture,
+        component=component,
+        loads=np.array([p.load for p in points]),
+        screws=np.array(screws),
+        energies=np.array([p.equilibrium.energy for p in points]),
+        stiffness=np.array([p.tangent.along(axis)[0] for p in points]),
+        pressed=tuple(p.pressed for p in points),
+        open_=np.array(open_),
+        events=tuple(events),
+    )
 
 
 def _solve(

@@ -56,10 +56,16 @@ def exact_tangent(
     bent = modes[:, ~flat] / np.sqrt(np.abs(curvature[~flat]))
     moves, length = platform_moves(local), model.size
     return PlatformStiffness(
-        equilibrium.posture, "exact", at.platform[:3, 3].copy(), length, moves @ bent,
-        np.sign(curvature[~flat]), bent[model.springs], part_owners(equilibrium),
-        unit_screws(moves @ modes[:, flat], length),
-    )  # fmt: skip
+        posture=equilibrium.posture,
+        state="exact",
+        point=at.platform[:3, 3].copy(),
+        length=length,
+        root=moves @ bent,
+        signs=np.sign(curvature[~flat]),
+        springs=bent[model.springs],
+        parts=part_owners(equilibrium),
+        free=unit_screws(moves @ modes[:, flat], length),
+    )
 
 
 def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:

@@ -130,10 +130,16 @@ def _stiffness(
     modes = Vt[rank:].T
     joined = springs @ modes - free @ (closing @ (A_y @ modes))
     return PlatformStiffness(
-        lin.posture, state, lin.posture.platform[:3, 3], lin.size,
-        lin.platform @ joined, np.ones(modes.shape[1]), modes, tuple(parts),
-        unit_screws(lin.platform @ free @ loose, lin.size),
-    )  # fmt: skip
+        posture=lin.posture,
+        state=state,
+        point=lin.posture.platform[:3, 3],
+        length=lin.size,
+        root=lin.platform @ joined,
+        signs=np.ones(modes.shape[1]),
+        springs=modes,
+        parts=tuple(parts),
+        free=unit_screws(lin.platform @ free @ loose, lin.size),
+    )
 
 
 def _sizes(columns: NDArray, length: float) -> NDArray:

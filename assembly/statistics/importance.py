@@ -117,13 +117,13 @@ def sobol_indices(
     first, total = np.full((s, d, 3), np.nan), np.full((s, d, 3), np.nan)
     variance, failed = np.full(s, np.nan), np.ones((s, d))
     rng = np.random.default_rng(1)
-    weights = rng.multinomial(count, np.full(count, 1 / count), _RESAMPLES) / count
-    weights = np.vstack([np.full(count, 1 / count), weights])
+    weights = rng.multinomial(count, np.full(count, 1 / count), _RESAMPLES)
+    weights = np.vstack([np.ones(count), weights])
     for q in range(s):
         answered = np.isfinite(f[:, :, q])
         both = f[:2, :, q][answered[:2]]
         failed[q] = 1.0 - (answered[0] & answered[1] & answered[2:]).mean(axis=1)
-        if len(both) < 2:
+        if not len(both):
             continue
         variance[q] = both.var()
         if not variance[q] > 1e-24 * (both**2).mean():

@@ -9,6 +9,7 @@ Serial Industrial Robots, Master's thesis, Tsinghua University, 2025 (MIT licenc
 
 import argparse
 import csv
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ import numpy as np
 from assembly.kinematics.posture import place_many_joints
 from assembly.model.robot import Robot
 from assembly.robots import load_robot
-from examples.campaign_folder import write_campaign
+from examples.campaign_folder import data_folder, write_campaign
 from forcefit.inputs.table import BadInput
 
 HERE = Path(__file__).parent
+NAME = "serial_robots"
 SIGMA = {"ur5": 3e-5, "wam": 1e-3}  # [m] from the makers' repeatability, 0.1 and 2 mm
 _AGREES = 1e-4  # [m] by which targets may differ from the poses of the angles
 _AXES = "xyz"
@@ -70,9 +72,35 @@ def _check_targets(
         raise BadInput(f"{file}: targets are {off:.3g} m off the robot's own poses")
 
 
+def find(file: Path, data: Path | None = None) -> Path:
+    """A table by its path, or by its name in the data set.
+
+    Args:
+        file: either.
+        data: where all measured data lie, as for :func:`.campaign_folder.data_folder`.
+
+    Returns:
+        Its path.
+
+    Raises:
+        BadInput: it is at neither place.
+    """
+    if file.is_file():
+        return file
+    named = data_folder(NAME, data) / file
+    if not named.is_file():
+        raise BadInput(f"{file}: no such file, nor {named}; expected a table of poses")
+    return named
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("file", type=Path)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("file", type=Path, help="a table, or its name in the data set")
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--data", type=Path, help="folder that holds the data sets")
     given = parser.parse_args()
-    print(convert(given.file, given.out))
+    try:
+        print(convert(find(given.file, given.data), given.out))
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)

@@ -36,8 +36,7 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
     pairs = []
     for first in range(0, len(order), 512):
         rows = np.arange(first, min(first + 512, len(order)))
-        width = int((last[rows] - rows).max(initial=1))
-        columns = rows[:, None] + np.arange(1, max(width, 2))
+        columns = rows[:, None] + np.arange(1, int((last[rows] - rows).max()))
         proper = columns < last[rows][:, None]
         columns = np.minimum(columns, len(order) - 1)
         a, b = order[rows][:, None], order[columns]

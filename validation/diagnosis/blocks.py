@@ -77,7 +77,7 @@ class _Forms:
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class _PlaceProducts:
     """What a component at a place does, and its products for some forms.
 
     Attributes:
@@ -134,7 +134,7 @@ class Blocks:
                     forms[key] = _Forms(self._sensitivities, *key)
                 for component in part.components:
                     asked.setdefault((part.where, component, kind), {})[key] = None
-        places: dict[_Where, _Place] = {}
+        places: dict[_Where, _PlaceProducts] = {}
         last = None
         for kind, parts in sorted(alike, key=lambda at: (at[0], at[1][0].where)):
             own = alike[kind, parts]
@@ -153,7 +153,7 @@ class Blocks:
                     strips.append((forms[key], places[where], key))
             yield from zip(own, _blocks(strips, len(own)), strict=True)
 
-    def _place(self, where: _Where, forms: Mapping[_Key, _Forms]) -> _Place:
+    def _place(self, where: _Where, forms: Mapping[_Key, _Forms]) -> _PlaceProducts:
         """Products of all forms looked at there."""
         answer = self._sensitivities.sensitivity(*where) * self._over_sigma
         on = np.einsum("rc,rc->r", self._left, answer)
@@ -161,7 +161,7 @@ class Blocks:
         every = np.hstack([form.columns for form in forms.values()])
         known, along = through @ every, every.T @ on
         ends = np.cumsum([form.columns.shape[1] for form in forms.values()])[:-1]
-        return _Place(
+        return _PlaceProducts(
             answer,
             dict(zip(forms, np.split(known, ends, axis=1), strict=True)),
             dict(zip(forms, np.split(along, ends), strict=True)),
@@ -169,7 +169,7 @@ class Blocks:
 
 
 def _blocks(
-    strips: Sequence[tuple[_Forms, _Place, _Key]], count: int
+    strips: Sequence[tuple[_Forms, _PlaceProducts, _Key]], count: int
 ) -> Iterator[Block]:
     """Blocks of so many forms, unknowns part by part, component by component."""
     ends = np.cumsum([0, *(form.columns.shape[1] for form, _, _ in strips)])

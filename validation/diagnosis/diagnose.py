@@ -77,11 +77,13 @@ def diagnose(
     factor, inflation, bends = np.ones(6), 1.0, 0
     learned = NOTHING
     straight: _Straight | None = None
+    earlier: Selection | None = None
     for _ in range(_PASSES):
         some = partial(select, update=update, finite=finite)
         selection, outliers = _without_outliers(
-            campaign, conditions, rows.fitted, (outliers, impossible), some
+            campaign, conditions, rows.fitted, (outliers, impossible), some, earlier
         )
+        earlier = selection
         used = rows.fitted & ~outliers
         fitting = campaign.take(used)
         if bends < _BENDS:
@@ -131,6 +133,7 @@ def diagnose(
 def _without_outliers(
     campaign: Campaign, conditions: Conditions, fitted: NDArray,
     left_out: tuple[NDArray, NDArray], selected: Callable[..., Selection],
+    earlier: Selection | None,
 ) -> tuple[Selection, NDArray]:  # fmt: skip
     """The selection on rows (R,) without those far off, and which these are.
 
@@ -143,7 +146,9 @@ def _without_outliers(
     outliers, impossible = left_out
     for turn in range(_TURNS + 1):
         used = fitted & ~outliers
-        selection = selected(campaign.take(used), conditions.take(used))
+        earlier = selection = selected(
+            campaign.take(used), conditions.take(used), earlier=earlier
+        )
         if turn == _TURNS:
             break
         left = selection.behind.left(selection.fit.residual)

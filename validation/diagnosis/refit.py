@@ -189,6 +189,7 @@ def in_full(
 def refit(
     campaign: Campaign, conditions: Conditions, members: Sequence[Hypothesis],
     start: NDArray, defect: NDArray | float = 0.0, behind: Background = NOTHING,
+    earlier: NDArray | None = None,
 ) -> Fit:  # fmt: skip
     """Fit a set of hypotheses in the full model.
 
@@ -199,16 +200,20 @@ def refit(
         start: where to begin, one unknown after the other.
         defect: (N,) whitened, what finite motions add about there, where it is known.
         behind: small terms that are there too.
+        earlier: unknowns of a fit of nearly the same rows, from where the search goes
+            on if they leave less.
 
     Returns:
         The fit.
     """
     linear = [h for h in members if h.effect != FINITE]
     if not linear or len(linear) == len(members):
-        return _refit(campaign, conditions, members, start, behind=behind)
+        return _refit(
+            campaign, conditions, members, start, behind=behind, earlier=earlier
+        )
     # finite motions take a hundred times longer: their defect is fitted, not they
     for _ in range(_MOST_DEFECTS):
-        fit = _refit(campaign, conditions, linear, start, defect, behind)
+        fit = _refit(campaign, conditions, linear, start, defect, behind, earlier)
         exact = replace(fit.conditions, exact=True)
         together = replace(_with_clearance_at_rest(fit.conditions), exact=True)
         read = [
@@ -241,24 +246,34 @@ def _with_clearance_at_rest(conditions: Conditions) -> Conditions:
 def _refit(
     campaign: Campaign, conditions: Conditions, members: Sequence[Hypothesis],
     start: NDArray, defect: NDArray | float = 0.0, behind: Background = NOTHING,
+    earlier: NDArray | None = None,
 ) -> Fit:  # fmt: skip
     """The fit of a model to which a constant ``defect`` (N,) is added."""
     slots = [slot for h in members for slot in h.slots]
     lower = np.array([slot.unknown.lower for slot in slots])
     upper = np.array([slot.unknown.upper for slot in slots])
-    x0 = np.clip(start, lower, upper)
-    size = np.array([
-        max(slot.unknown.scale, abs(x)) for slot, x in zip(slots, x0, strict=True)
-    ])
     measured = whiten(campaign, campaign.measured) - defect
 
     def there(x: NDArray) -> Conditions:
         effects: dict[str, Values] = dict(_public(members, x, conditions.robot))
         return apply_effects(conditions, effects)
 
-    def raw_at(scaled: NDArray) -> NDArray:
-        model = whiten(campaign, predict(there(scaled * size)).deviation)
+    def raw_by(x: NDArray) -> NDArray:
+        model = whiten(campaign, predict(there(x)).deviation)
         return np.where(np.isfinite(model), measured - model, _LOST)
+
+    x0 = np.clip(start, lower, upper)
+    if earlier is not None:
+        ways = [x0, np.clip(earlier, lower, upper)]
+        with np.errstate(over="ignore", invalid="ignore"):
+            lost = [np.sum(behind.whitened(raw_by(x)) ** 2) for x in ways]
+        x0 = ways[int(np.argmin(lost))]
+    size = np.array([
+        max(slot.unknown.scale, abs(x)) for slot, x in zip(slots, x0, strict=True)
+    ])
+
+    def raw_at(scaled: NDArray) -> NDArray:
+        return raw_by(scaled * size)
 
     @lru_cache(maxsize=2)  # for the slopes, which are taken where the residual was
     def both_at(scaled: bytes) -> tuple[NDArray, NDArray]:

@@ -4,7 +4,7 @@ The best set by its signatures is fitted with its parts, its near rivals and the
 sets of other effects, since a tangent may flatter a set that is larger than needed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +29,7 @@ class Refits:
     def __init__(
         self, campaign: Campaign, conditions: Conditions,
         nuisance: Sequence[Hypothesis], finite: NDArray | float,
+        ended: Mapping[object, NDArray],
     ) -> None:  # fmt: skip
         """Nothing is fitted yet.
 
@@ -37,12 +38,14 @@ class Refits:
             conditions: of them.
             nuisance: hypotheses that are fitted beside every set.
             finite: (N,) whitened change by finite motions; 0 if they do not show.
+            ended: where fits of nearly the same rows ended, by :func:`names_of`.
         """
         self.campaign, self.conditions = campaign, conditions
         self.nuisance, self.finite = list(nuisance), finite
         # where clearances would rest in closed chains; slow to find
         self._rest: NDArray | None = None
         self._known: dict[object, Fit] = {}
+        self.ended = dict(ended)
 
     def fit(self, one: Scored, screen: Screen, behind: Background) -> Fit:
         """A set fitted in the full model.
@@ -63,11 +66,14 @@ class Refits:
                 self.settle(every, begin)
             held = replace(self.conditions, rest=self._rest)
             return refit(self.campaign, held, every, begin, behind=behind)
-        if names_of(every) not in self._known:
-            self._known[names_of(every)] = refit(
-                self.campaign, self.conditions, every, begin, self.finite, behind
-            )
-        return self._known[names_of(every)]
+        name = names_of(every)
+        if name not in self._known:
+            self._known[name] = refit(
+                self.campaign, self.conditions, every, begin, self.finite, behind,
+                self.ended.get(name),
+            )  # fmt: skip
+            self.ended[name] = self._known[name].values
+        return self._known[name]
 
     def settle(self, members: Sequence[Hypothesis], values: NDArray) -> None:
         """Clearances rest where they do with these effects, from now on."""

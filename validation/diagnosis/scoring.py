@@ -265,7 +265,7 @@ def _solve(G: NDArray, b: NDArray) -> tuple[NDArray, int]:
     except np.linalg.LinAlgError:
         pass
     values, vectors = np.linalg.eigh(scaled)
-    kept = values > _RANK * max(values[-1], 1e-300)
+    kept = values > _RANK * values[-1]
     y = vectors[:, kept].T @ (b / size) / values[kept]
     return vectors[:, kept] @ y / size, int(kept.sum())
 

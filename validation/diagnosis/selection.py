@@ -5,7 +5,7 @@ fitted in the full model, signatures retaken there, and scored again until the b
 stays.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -55,6 +55,7 @@ class Selection:
         terms: small terms with all their unknowns.
         columns: (N, k) whitened change of the readings per unknown of the best set, the
             device's frame first.
+        ended: unknowns of all sets fitted, by :func:`.refitting.names_of`.
     """
 
     screen: Screen
@@ -66,11 +67,13 @@ class Selection:
     behind: Background
     terms: tuple[SmallTerm, ...]
     columns: NDArray
+    ended: Mapping[object, NDArray]
 
 
 def select(
-    campaign: Campaign, conditions: Conditions, update: Update, *, finite: bool = False
-) -> Selection:
+    campaign: Campaign, conditions: Conditions, update: Update, *,
+    finite: bool = False, earlier: Selection | None = None,
+) -> Selection:  # fmt: skip
     """Score all small sets, refit the best, and again about it until it stays.
 
     Declared clearances in closed chains are held where they rest: as declared, then as
@@ -81,11 +84,13 @@ def select(
         conditions: of them as declared, with the registration if that was fitted.
         update: told what is done, how much of it and of how much.
         finite: whether the best set is fitted once more with finite motions.
+        earlier: of nearly the same rows: fits go on from its own where that is better.
 
     Returns:
         The selection.
     """
-    selected = _select_settled(campaign, conditions, update)
+    ended = {} if earlier is None else earlier.ended
+    selected = _select_settled(campaign, conditions, update, ended)
     if not finite:
         return selected
     members = (*selected.fit.hypotheses, Hypothesis(FINITE, (), ()))
@@ -96,21 +101,26 @@ def select(
 
 
 def _select_settled(
-    campaign: Campaign, conditions: Conditions, update: Update
-) -> Selection:
+    campaign: Campaign, conditions: Conditions, update: Update,
+    ended: Mapping[object, NDArray],
+) -> Selection:  # fmt: skip
     """The selection with motions to first order beside what ``conditions`` carries."""
     # where clearances rest in closed chains is found row by row, too slowly to repeat
     clearance = (
         conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]
     )
     if not clearance:
-        return _select(campaign, conditions, update)
-    selected = _select(campaign, with_rest_positions(conditions), update)
+        return _select(campaign, conditions, update, ended)
+    selected = _select(campaign, with_rest_positions(conditions), update, ended)
     rest = rest_under(conditions, selected.fit.effects)
-    return _select(campaign, replace(conditions, rest=rest), update)
+    held = replace(conditions, rest=rest)
+    return _select(campaign, held, update, selected.ended)
 
 
-def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selection:
+def _select(
+    campaign: Campaign, conditions: Conditions, update: Update,
+    ended: Mapping[object, NDArray],
+) -> Selection:  # fmt: skip
     """Score all small sets; refit the best; score again about it until it stays."""
     tangents = Tangents(campaign, conditions)
     nuisance = [device_frame(conditions)] if campaign.registration == "unknown" else []
@@ -124,7 +134,7 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
         tangents.residual,
     )
     prior = screens.first(signatures)
-    refits = Refits(campaign, conditions, nuisance, finite)
+    refits = Refits(campaign, conditions, nuisance, finite, ended)
     best: tuple[Hypothesis, ...] = ()
     for turn in range(_ROUNDS):
         behind = background(screens.terms, prior)
@@ -158,6 +168,7 @@ def _select(campaign: Campaign, conditions: Conditions, update: Update) -> Selec
         behind=behind,
         terms=screens.terms,
         columns=np.hstack([nothing, *(s.columns for s in tangent)]),
+        ended=refits.ended,
     )
 
 

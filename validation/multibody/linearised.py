@@ -31,7 +31,7 @@ from validation.multibody.exudyn_reading import (
 )
 from validation.multibody.exudyn_solver import raise_callback_error, static_settings
 from validation.multibody.motion import turned
-from validation.multibody.open_robot import Tree
+from validation.multibody.open_robot import OpenTree
 
 # of Exudyn's coordinates, whose rotations are numbers of size 1; a contact is smoothed
 # within some nm, and pressed by less
@@ -43,7 +43,7 @@ _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
 
 
 def linearised_compliance(
-    model: Model, tree: Tree, platform: str
+    model: Model, tree: OpenTree, platform: str
 ) -> tuple[NDArray, float, bool]:
     """Compliance at the equilibrium in which a model stands.
 
@@ -96,7 +96,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 
 
 def _compliance(
-    model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: Tree
+    model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
     """V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
@@ -178,7 +178,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 
 
 def _motion(
-    model: Model, tree: Tree, platform: str, q: NDArray, Z: NDArray, step: float
+    model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
     """Derivatives along Z of gaps, of the platform's pose, of idle joints."""
     system, place = model.mbs.systemData, tree.before[platform]

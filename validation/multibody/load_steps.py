@@ -17,12 +17,12 @@ from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import idle_motions, pose
 from validation.multibody.exudyn_solver import close, equilibrate
-from validation.multibody.open_robot import Tree
+from validation.multibody.open_robot import OpenTree
 
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4  # [rad, m] of the platform, and how they fall
 
 
-def add_step_loads(model: Model, tree: Tree, platform: str) -> tuple[int, int]:
+def add_step_loads(model: Model, tree: OpenTree, platform: str) -> tuple[int, int]:
     """Moment and force on the platform, none at first; before the model is solved."""
     marker = model.add_marker(tree.before[platform])
     item = model.item
@@ -32,7 +32,7 @@ def add_step_loads(model: Model, tree: Tree, platform: str) -> tuple[int, int]:
 
 
 def stepped_compliance(
-    model: Model, tree: Tree, platform: str, loads: tuple[int, int], shift: NDArray,
+    model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
     """Compliance by differences at the equilibrium in which a model stands.

@@ -103,7 +103,7 @@ def link_springs(
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class OpenTree:
     """The built model, filled in frame by frame.
 
     Attributes:
@@ -127,7 +127,7 @@ class Tree:
     closures: list[Closure] = field(default_factory=list)
 
 
-def build(model: Model, case: Case) -> Tree:
+def build(model: Model, case: Case) -> OpenTree:
     """The open, stress-free robot with its errors, its closures and its loads.
 
     Args:
@@ -139,7 +139,7 @@ def build(model: Model, case: Case) -> Tree:
     """
     posture, robot = case.posture, case.posture.robot
     nominal = _nominal(posture)
-    tree = Tree(platform=nominal[robot.platform])
+    tree = OpenTree(platform=nominal[robot.platform])
     after = {BASE: model.ground}
     for frame, q in zip(robot.frames, posture.coordinates, strict=True):
         place = _add_frame(model, case, frame, after[frame.parent], tree)
@@ -159,7 +159,7 @@ def build(model: Model, case: Case) -> Tree:
 
 
 def _add_frame(
-    model: Model, case: Case, frame: Frame, parent: Place, tree: Tree
+    model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
     """A body with its error, its link and its joint; where its own motion begins."""
     error = case.scale * frame.geometric_error
@@ -231,7 +231,7 @@ def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -
         model.add_force(place, -force)
 
 
-def _add_weights(model: Model, robot: Robot, tree: Tree, gravity: NDArray) -> None:
+def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -> None:
     """Loads of everything that has a mass.
 
     A beam's weight acts at its nodes, with the moments at its ends of a clamped beam

@@ -44,7 +44,13 @@ from validation.multibody.exudyn_reading import (
 from validation.multibody.exudyn_solver import largest_gap, solve
 from validation.multibody.exudyn_vibration import natural_frequencies, set_masses
 from validation.multibody.motion import shifted, turn_of
-from validation.multibody.open_robot import Case, PostureLike, Tree, build, link_springs
+from validation.multibody.open_robot import (
+    Case,
+    OpenTree,
+    PostureLike,
+    build,
+    link_springs,
+)
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
@@ -330,7 +336,9 @@ def without_clearance(robot: Robot) -> Robot:
     return replace(robot, frames=frames)
 
 
-def _read(model: Model, robot: Robot, tree: Tree, started: float) -> MultibodyAssembly:
+def _read(
+    model: Model, robot: Robot, tree: OpenTree, started: float
+) -> MultibodyAssembly:
     """The equilibrium's screws, wrenches and energies."""
     count = len(robot.frames)
     screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "clearance")}

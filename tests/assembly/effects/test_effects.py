@@ -9,11 +9,14 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.base_compliance import on_foundation
+from assembly.effects.friction_hysteresis import elastic_joints
+from assembly.effects.joint_clearance import moving_joints
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict, read
 from assembly.measurement.settled_clearance import with_clearances_taken_up
-from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 
 L, RADIUS, E, NU, RHO = 0.8, 0.015, 70e9, 0.33, 2700.0
@@ -296,3 +299,54 @@ def test_a_search_starts_and_may_go_as_far_as_is_plausible(name, robot):
             assert all(unknown.lower <= one <= unknown.upper for one in starts)
         reach = max(unknown.upper - min(starts), max(starts) - unknown.lower)
         assert reach >= unknown.scale
+
+
+def standing(**foot):
+    """A drive on a frame between it and the base; what that frame is."""
+    return Robot("standing", "tip", (
+        Frame("foot", **foot),
+        Frame("drive", "foot", joint="revolute", actuated=True),
+        Frame("tip", "drive", [0.3, 0, 0]),
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("robot", "new"),
+    [
+        (standing(), False),  # it carries all the others and is nothing else
+        (standing(translation=[0.1, 0, 0]), True),
+        (standing(rotation=[0, 0, 0.1]), True),
+        (standing(joint="revolute", actuated=True), True),
+        (standing(link=MatrixLink(np.eye(6) * 1e6)), True),
+        (load_robot("five_bar"), True),
+        (load_robot("arm6"), True),
+    ],
+)
+def test_what_moves_the_base_moves_a_frame_below_all_others(robot, new):
+    given = as_declared(place_robot(robot), np.zeros(6))
+    found = on_foundation(given)
+    assert len(found.robot.frames) == len(robot.frames) + new
+    first = found.robot.frames[0]
+    assert [f.name for f in found.robot.frames if f.parent == "base"] == [first.name]
+    assert predict(found).deviation == pytest.approx(predict(given).deviation)
+    assert on_foundation(found) is found
+    n = len(found.robot.frames)
+    assert found.coordinates.shape == (1, n)
+    assert found.errors.shape == (1, n, 6)
+    assert found.transforms[0, 0] == pytest.approx(np.eye(4))
+    assert found.transforms[:, int(new) :] == pytest.approx(given.transforms)
+
+
+def test_which_joints_may_have_friction_and_which_play():
+    """A spring of their own, however soft; no play but a spin that is declared."""
+    own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
+    robot = Robot("chain", "tip", (
+        Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),
+        Frame("rigid", "soft", joint="revolute", actuated=True,
+              clearance=Clearance(radial=0.0, spin=1e-3)),
+        Frame("loose", "rigid", joint="revolute", actuated=True,
+              clearance=Clearance(radial=0.0, tilt=1e-4)),
+        Frame("tip", "loose", joint_stiffness=own),
+    ))  # fmt: skip
+    assert elastic_joints(robot) == ("soft",)
+    assert moving_joints(robot) == ("soft", "rigid")

@@ -69,3 +69,29 @@ def test_units_of_parameters_follow(text, variables, result, units):
 def test_units_that_clash_are_refused(text, variables, result):
     with pytest.raises(BadInput, match="units clash"):
         parameter_units(parse_formula(text), variables, result)
+
+
+@pytest.mark.parametrize("around", ["-{}", "+{}", "abs({})", "(a+{})", "({}*a)"])
+def test_fifty_operations_one_in_the_other_are_a_formula_and_no_more(around):
+    """As the message says, whichever operations they are, on whichever side."""
+    text = "q"
+    for _ in range(50):
+        text = around.format(text)
+    parse_formula(text)
+    with pytest.raises(BadInput, match="nested deeper than 50"):
+        parse_formula(around.format(text))
+
+
+def test_five_hundred_characters_are_a_formula_and_no_more():
+    parse_formula("q" * 500)
+    with pytest.raises(BadInput, match="found 501 characters"):
+        parse_formula("q" * 501)
+
+
+def test_units_of_powers_add_up_and_cancel():
+    """(a t)^2 sqrt(b t) / t is a length: a and b share it, one of them is a number."""
+    tree = parse_formula("(a*t)**2*t**0.5*sqrt(b)/t")
+    found = parameter_units(tree, {"t": S}, M)
+    a, b = ({**dict.fromkeys("ms", 0), **found[name]} for name in "ab")
+    for unit, exponent in (("m", 1), ("s", -1.5)):
+        assert 2 * a[unit] + b[unit] / 2 == pytest.approx(exponent)

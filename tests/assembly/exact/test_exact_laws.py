@@ -177,3 +177,59 @@ def test_a_load_along_one_axis_moves_by_the_slope_of_the_potential(
     slope = (high.potential - low.potential) / (2 * step * value)
     # the third derivative times the square of the step
     assert -slope == pytest.approx(middle.platform_screw[component], rel=1e-5)
+
+
+def loaded_arm(pieces=1):
+    """The six-axis arm, its frames off in all six ways, 50 N at its tip."""
+    robot = load_robot("arm6")
+    rng = np.random.default_rng(2)
+    errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-2] * 3, *[1e-3] * 3]
+    links = {
+        f.name: replace(f.link, pieces=pieces)
+        for f in robot.frames
+        if hasattr(f.link, "pieces")
+    }
+    assert links
+    posture = place_robot(robot.with_links(links).with_errors(errors))
+    return solve_exact(posture, [1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
+
+
+def test_a_cut_beam_bends_from_where_its_error_puts_it():
+    """Small bending of links that are turned by 0.02 rad: in pieces as in one."""
+    whole, cut = loaded_arm(), loaded_arm(pieces=2)
+    assert len(cut.placement.transforms) > len(whole.placement.transforms)
+    for name in ("link_screws", "wrenches"):
+        one, other = getattr(whole, name), getattr(cut, name)
+        for part in (slice(3), slice(3, 6)):
+            size = np.abs(one[:, part]).max()
+            assert size > 0
+            assert other[:, part] == pytest.approx(one[:, part], abs=2e-2 * size)
+
+
+def test_the_cost_of_linear_closures_is_a_difference():
+    found = loaded_arm()
+    error = found.linearisation_error
+    both = np.concatenate([error.rotation, error.translation])
+    assert len(error.rotation) == len(error.translation) == 3
+    assert found.platform_screw + both == pytest.approx(
+        found.linear.platform_screw, rel=1e-12
+    )
+    assert found.energy + error.energy == pytest.approx(found.linear.energy, rel=1e-12)
+    assert error.relative_energy == pytest.approx(error.energy / found.energy)
+
+
+def test_from_a_solution_nearby_there_are_fewer_steps_to_the_same_one():
+    """Another load a hundredth larger; the solution of another robot is no start."""
+    posture = loaded_arm().posture
+    load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
+    before = solve_exact(posture, load)
+    anew = solve_exact(posture, 1.01 * load)
+    near = solve_exact(posture, 1.01 * load, near=before)
+    assert near.platform_screw == pytest.approx(anew.platform_screw, rel=1e-9)
+    assert near.iterations <= anew.iterations
+    again = solve_exact(posture, load, near=before)
+    assert again.iterations <= 2
+    other = solve_exact(home_posture(load_robot("five_bar")), [0, 0, 0, 1, 0, 0])
+    stranger = solve_exact(posture, load, near=other)
+    assert stranger.iterations == before.iterations
+    assert np.array_equal(stranger.platform_screw, before.platform_screw)

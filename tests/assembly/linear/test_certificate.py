@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_many, place_robot
+from assembly.linear.assemblies import excess_of, solve_each
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
 from assembly.linear.reference import reference_energy
@@ -254,3 +255,64 @@ def test_the_certificate_trusts_nothing_but_the_wrenches():
     stiffer = replace(answer, elastic=answer.elastic * 1.01)
     assert stiffer.duality_gap() == pytest.approx(0.0201 * answer.energy, rel=1e-6)
     assert stiffer.closure_residual() > 1e-7
+
+
+def spoilt_springs(answer, size, rng):
+    """The same closures and clearances, springs moved by what closures leave open."""
+    rows = answer.linearisation.rows @ answer.joints.elastic
+    _, S, Vt = np.linalg.svd(rows)
+    free = Vt[np.sum(S > 1e-12 * S[0]) :]
+    move = free.T @ rng.normal(size=len(free))
+    scale = size * np.linalg.norm(answer.elastic) / np.linalg.norm(move)
+    return replace(answer, elastic=answer.elastic + scale * move)
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.1, 2.0])
+def test_what_springs_do_not_balance_is_the_gap(size, rng):
+    """A spoilt energy is larger by |dy|^2 / 2, y.dy being zero; so is the gap."""
+    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
+    errors = np.zeros((len(posture.robot.frames), 6))
+    errors[posture.robot.index("leg1.link_a"), 3] = 3e-3
+    answer = solve_assembly(replace(posture, robot=posture.robot.with_errors(errors)))
+    spoilt = spoilt_springs(answer, size, rng)
+    larger = size**2 * answer.stored
+    assert spoilt.stored - answer.stored == pytest.approx(larger, rel=1e-3)
+    assert spoilt.duality_gap() == pytest.approx(larger, rel=1e-3)
+    assert spoilt.uncertainty == pytest.approx(larger, rel=1e-3)
+    share = size**2 / (1 + size**2)
+    assert spoilt.relative_gap() == pytest.approx(share, rel=1e-3)
+    assert (unproved(spoilt) == "") == (share < 1e-8)
+
+
+def test_within_the_zone_a_gap_counts_beside_the_energy_without_clearance():
+    posture = place_robot(load_robot("3rrr"))
+    errors = np.zeros((len(posture.robot.frames), 6))
+    errors[0, 3] = 1e-6
+    answer = solve_assembly(replace(posture, robot=posture.robot.with_errors(errors)))
+    assert answer.stored < 1e-6 * answer.energy_without_clearance
+    scale = 1e-4 * answer.energy_without_clearance
+    assert answer.relative_gap() * scale == pytest.approx(answer.duality_gap())
+
+
+def test_points_solved_one_by_one_are_what_each_is():
+    """Bounds are energies less their gaps; a clearance beyond its cone by a half."""
+    robot = load_robot("five_bar")
+    errors = np.zeros((len(robot.frames), 6))
+    errors[:, 3:] = 1e-3
+    posture = home_posture(robot.with_errors(errors))
+    loads = [np.zeros(6), np.array([0, 0, 0, 3.0, -2.0, 0])]
+    both = [solve_assembly(posture, load) for load in loads]
+    found = solve_each(robot, 2, lambda i: both[i])
+    for name, values in (
+        ("energy", [a.energy for a in both]),
+        ("bound", [a.energy - a.duality_gap() for a in both]),
+        ("platform_screw", [a.platform_screw for a in both]),
+        ("multipliers", [a.multipliers for a in both]),
+        ("clearances", [a.clearances for a in both]),
+        ("closure_residual", [a.closure_residual() for a in both]),
+    ):
+        assert np.array_equal(getattr(found, name), values), name
+    assert found.certified.all()
+    assert found.fallbacks() == {"loads": 2}
+    two = np.array([[0.6, 0.8, 0.1], [0.9, 1.2, 0.0]])
+    assert excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])

@@ -11,43 +11,14 @@ from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
-from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector, transform
-from tests.robots_for_tests import planar_four_bar, random_robot
+from tests.robots_for_tests import in_millimetres, planar_four_bar, random_robot
 
 REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)
 ROD = BeamLink({"radius": 0.01}, 70e9, 0.33)
-
-
-def in_millimetres(robot, s=1000.0):
-    """The same robot with lengths in another unit: N stays N, m becomes s units."""
-    screw = np.array([1, 1, 1, s, s, s])
-
-    def stiffness(K):
-        # w = K x with moments s times larger, shifts s times larger
-        wrench = np.array([s, s, s, 1, 1, 1])
-        return K * np.outer(wrench, 1 / screw)
-
-    def turned(frame):
-        part = {}
-        if frame.link is not None:
-            part["link"] = MatrixLink(stiffness(frame.link.stiffness))
-        if frame.joint_stiffness is not None:
-            part["joint_stiffness"] = np.diag(
-                np.diag(frame.joint_stiffness) * [s, s, s, 1 / s, 1 / s, 1 / s]
-            )
-        if frame.clearance is not None:
-            c = frame.clearance
-            axial = None if c.axial is None else c.axial * s
-            part["clearance"] = Clearance(c.radial * s, axial, c.tilt, c.spin)
-        return replace(
-            frame, translation=frame.translation * s,
-            geometric_error=frame.geometric_error * screw, **part,
-        )  # fmt: skip
-
-    return replace(robot, frames=tuple(turned(f) for f in robot.frames))
 
 
 @pytest.mark.parametrize("seed", range(8))

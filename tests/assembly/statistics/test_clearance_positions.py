@@ -1,5 +1,7 @@
 """Play sampled uniformly and at contact, against known volumes and rejection."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -22,6 +24,7 @@ from assembly.statistics.uniform_clearance import (
     diagnose,
     sample_uniform_position,
 )
+from tests.robots_for_tests import in_millimetres
 
 
 def generators(count, seed=3):
@@ -303,3 +306,19 @@ def test_a_set_without_interior_has_no_ellipsoid():
     np.testing.assert_allclose(near[0], 0.999, atol=1e-5)
     # 1 - (0.999 +- s / sqrt 2)^2 = 0 ends it at s = 0.001 sqrt 2
     assert 0 < np.linalg.norm(near[1]) <= 0.001 * np.sqrt(2)
+
+
+def test_contact_play_knows_no_unit_of_length():
+    """The same random pushes in metres and in millimetres: the same positions."""
+    robot = load_robot("3rrr")
+    frames = (replace(f, link=None, joint_stiffness=None) for f in robot.frames)
+    robot, screws = replace(robot, frames=tuple(frames)), []
+    for one in (robot, in_millimetres(robot)):
+        prepared = prepare_energies(home_posture(one))
+        found = prepared.solve(np.zeros((5, len(one.frames), 6)))
+        moved, _ = position_clearances(prepared, found, "contact", generators(5))
+        screws.append(moved)
+    here, there = screws
+    assert np.abs(here).max(axis=1).min() > 1e-6
+    assert there[:, :3] == pytest.approx(here[:, :3], rel=1e-6, abs=1e-12)
+    assert there[:, 3:] == pytest.approx(1e3 * here[:, 3:], rel=1e-6, abs=1e-9)

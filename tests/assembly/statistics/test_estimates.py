@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.statistics.estimates import mean, most_probable, proportion, quantile
+from assembly.statistics.estimates import (
+    _modes,
+    mean,
+    most_probable,
+    proportion,
+    quantile,
+)
 
 
 def test_no_success_in_n_draws_has_the_known_upper_bound():
@@ -70,3 +76,43 @@ def test_the_most_probable_value_is_the_mode(law, mode, positive, rng):
 def test_sizes_that_crowd_at_zero_have_their_mode_there(rng):
     x = np.abs(rng.normal(size=50_000))
     assert most_probable(x, positive=True)["value"] < 0.15
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 500, 1021, 1022, 1023])
+def test_a_single_peak_is_the_mode_wherever_it_is(place):
+    """The kernel is reflected at both ends, where a peak of one bin stays largest."""
+    counts = np.zeros((1, 1024))
+    counts[0, place] = 7
+    assert _modes(counts, 0.4)[0] == pytest.approx(place, abs=0.01)
+
+
+@pytest.mark.parametrize("values", [[3.0, 3.0], [0.0, 0.0, 0.0], [-2.0] * 5])
+def test_equal_numbers_are_their_own_mode(values):
+    assert set(most_probable(values).values()) == {values[0]}
+
+
+def test_a_mode_scales_and_shifts_with_its_sample(rng):
+    x = rng.gamma(3.0, size=400)
+    one, other = most_probable(x), most_probable(5.0 - 1e-9 * x)
+    assert other["value"] == pytest.approx(5.0 - 1e-9 * one["value"], abs=1e-11)
+    big = most_probable(1e6 * x, positive=True)
+    small = most_probable(x, positive=True)
+    for name in ("value", "lower", "upper"):
+        assert big[name] == pytest.approx(1e6 * small[name], rel=1e-9)
+
+
+def test_a_far_tail_does_not_move_a_mode(rng):
+    x = rng.normal(size=1000)
+    far = np.concatenate([x, [1e4]])
+    assert most_probable(far)["value"] == pytest.approx(
+        most_probable(x)["value"], abs=0.1
+    )
+
+
+def test_the_interval_of_a_quantile_begins_at_a_number_of_the_sample():
+    """Of ten, P(none below the median) = 2^-10: from the second to the ninth."""
+    found = quantile(np.arange(10.0), 0.5, 0.95)
+    assert (found["lower"], found["upper"]) == (1.0, 8.0)
+    found = quantile(np.arange(6.0), 0.5, 0.95)  # 2^-6 = 0.016: the first, the last
+    assert (found["lower"], found["upper"]) == (0.0, 5.0)
+    assert quantile(np.arange(5.0), 0.5, 0.95)["lower"] == -np.inf

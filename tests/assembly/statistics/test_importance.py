@@ -47,6 +47,47 @@ def test_ishigamis_function_has_its_known_indices():
     assert found.variance[0] == pytest.approx(13.845, rel=0.03)
 
 
+def additive(scale=1.0, shift=0.0):
+    """A design of 400 draws of three numbers, and 3 x + 2 y + z of them."""
+    A, B = np.random.default_rng(4).normal(size=(2, 400, 3))
+    design = SaltelliDesign(A, B, [(n, np.array([k])) for k, n in enumerate("xyz")])
+    x = design.rows(0, len(design))
+    return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0)])
+def test_indices_know_no_units(scale, shift):
+    first, other = sobol_indices(*additive()), sobol_indices(*additive(scale, shift))
+    for name in ("first", "total"):
+        one, two = getattr(first, name), getattr(other, name)
+        np.testing.assert_allclose(two, one, atol=1e-6)
+        assert np.all((one[..., 1] <= one[..., 0]) & (one[..., 0] <= one[..., 2]))
+    assert other.variance == pytest.approx(scale**2 * first.variance, rel=1e-9)
+    np.testing.assert_allclose(first.total[0, :, 0], [9 / 14, 4 / 14, 1 / 14], atol=0.1)
+
+
+def test_a_result_that_only_rounds_has_no_importance():
+    design, results = additive()
+    rounded = 1e6 + 1e-8 * np.sign(results)
+    found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
+    assert np.isfinite(found.first[0]).all()
+    assert np.isnan(found.first[1:]).all()
+    assert np.isnan(found.variance[2])
+
+
+def test_failed_draws_of_one_group_leave_the_others_alone():
+    """A result that fails where a group's draws were exchanged: that group's alone."""
+    design, results = additive()
+    whole = sobol_indices(design, results)
+    some = results.reshape(5, 400, 1).copy()
+    some[3] = np.nan
+    found = sobol_indices(design, some.reshape(-1, 1))
+    assert found.failed[0].tolist() == [0.0, 1.0, 0.0]
+    for k in (0, 2):
+        np.testing.assert_allclose(found.total[0, k], whole.total[0, k])
+    assert np.isnan(found.total[0, 1]).all()
+
+
 @pytest.mark.slow
 def test_without_play_the_closed_form_holds():
     """Then the platform's screw is linear in the errors."""

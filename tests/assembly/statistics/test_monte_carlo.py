@@ -77,6 +77,16 @@ def test_a_draw_is_what_one_solve_says(experiment):
             np.testing.assert_allclose(one["stress"], stress, rtol=1e-2)
 
 
+@pytest.mark.parametrize("model", ["least", "contact"])
+def test_pose_errors_of_a_draw_are_the_sizes_of_its_screw(experiment, model):
+    data = run_draws(replace(experiment, clearance_model=model), 4)
+    screw = data["platform_screw"].values
+    for k, name in enumerate(("rotation", "translation")):
+        sizes = np.sqrt((screw[:, 3 * k : 3 * k + 3] ** 2).sum(axis=1))
+        assert sizes.max() > 0
+        np.testing.assert_allclose(data[name].values, sizes, rtol=1e-12)
+
+
 def test_a_run_that_was_killed_goes_on_and_ends_the_same(
     experiment, small_blocks, tmp_path
 ):

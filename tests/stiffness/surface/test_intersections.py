@@ -43,3 +43,42 @@ def test_a_plane_needs_three_numbers_twice():
     for text in ("plane=0,0,0.1", "plane=0,0/0,0,1", "plane=0,0,1/0,0,1/2"):
         with pytest.raises(BadInput, match="expected"):
             parse_interface(text)
+
+
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_any_order_unit_and_longest_side_give_the_same_pairs(along):
+    """Neighbours share a corner, and do not cross."""
+    rng = np.random.default_rng(along)
+    corners = 0.3 * rng.uniform(-1, 1, (40, 3, 3))
+    corners[:, :, along] += 0.05 * rng.permutation(40)[:, None]
+    points, triangles = corners.reshape(-1, 3), np.arange(120).reshape(40, 3)
+    triangles[1:5, 0] = triangles[0, 0]
+    corners = points[triangles]
+    expected = {
+        (j, i)
+        for i in range(40)
+        for j in range(i)
+        if not set(triangles[i]) & set(triangles[j])
+        and (crosses(corners[i], corners[j]) or crosses(corners[j], corners[i]))
+    }
+    assert len(expected) > 10
+    some = rng.permutation(40)
+    for scale in (1.0, 1e3):
+        turned = triangles[some][:, [1, 2, 0]]
+        pairs = some[crossing_triangles(scale * points, turned)]
+        assert len(pairs) == len(expected)
+        assert {tuple(sorted(pair)) for pair in pairs.tolist()} == expected
+
+
+def test_of_many_apart_only_those_that_meet_cross():
+    """More than are looked at together; the last two cross."""
+    rng = np.random.default_rng(1)
+    corners = 1e-3 * rng.normal(size=(1100, 3, 3))
+    corners[:, :, 1] += 5.0 * rng.permutation(1100)[:, None]
+    corners[-2] = [[-1, 0, 0], [1, 1, 0], [1, -1, 0]]
+    corners[-1] = [[0, 0, -1], [0, 0.1, 1], [0.2, 0, 1]]
+    points, triangles = corners.reshape(-1, 3), np.arange(3300).reshape(-1, 3)
+    found = crossing_triangles(points + [9.0, 0, 0], triangles)
+    assert np.sort(found, axis=1).tolist()[-1] == [1098, 1099]
+    one = crossing_triangles(points[:3300:1100], np.array([[0, 1, 2]]))
+    assert one.shape == (0, 2)

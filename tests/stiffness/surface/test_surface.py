@@ -7,7 +7,12 @@ import pytest
 from scipy import constants
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.surface import UNITS, check_surface, read_surface
+from stiffness.surface.surface import (
+    UNITS,
+    check_surface,
+    read_surface,
+    signed_volume,
+)
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, cylinder
 
 
@@ -146,3 +151,13 @@ def test_units_of_length_are_scipys():
                 "mm": constants.milli, "um": constants.micro, "in": constants.inch,
                 "inch": constants.inch, "ft": constants.foot}  # fmt: skip
     assert pytest.approx(expected, rel=1e-15) == UNITS
+
+
+def test_a_volume_is_the_same_far_from_the_origin():
+    """Some 40 km away, where products of coordinates have no digit left of 1 l."""
+    far = CUBE + np.array([1e4, -2e4, 3e4])
+    for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
+        volume = signed_volume(points, CUBE_TRIANGLES)
+        assert volume == pytest.approx(1e-3, rel=tolerance)
+        inside_out = signed_volume(points, CUBE_TRIANGLES[:, ::-1])
+        assert inside_out == pytest.approx(-volume, rel=tolerance)

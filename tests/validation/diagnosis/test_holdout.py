@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from validation.diagnosis.holdout import gain_over_blocks
+from tests.campaigns_for_tests import campaign_of
+from validation.diagnosis.holdout import gain_over_blocks, split
 
 BLOCKS = np.repeat(np.arange(15), 6)
 
@@ -40,3 +41,18 @@ def test_what_is_gained_by_one_is_lost_by_the_other():
     there, back = gain_over_blocks(*z, BLOCKS), gain_over_blocks(*z[::-1], BLOCKS)
     assert there == pytest.approx((-back[0], back[1]))
     assert gain_over_blocks(*z, np.zeros(len(BLOCKS)))[1] == 0.0
+
+
+def test_the_scatter_of_two_blocks_is_that_of_two_numbers():
+    """Gains g and h: their sum, and sqrt(2) times |g - h| / sqrt(2)."""
+    before, less = np.ones(4), np.array([1e-6, 2e-6, 5e-6, 7e-6])
+    gain, error = gain_over_blocks(before, before - less, np.array([0, 0, 1, 1]))
+    assert gain == pytest.approx(15e-6, rel=1e-4)
+    assert error == pytest.approx(9e-6, rel=1e-4)
+    assert gain_over_blocks(before, before - less, np.zeros(4))[1] == 0.0
+
+
+@pytest.mark.parametrize(("rows", "kept"), [(1, 0), (2, 1), (3, 1), (7, 1), (9, 2)])
+def test_a_quarter_is_kept_aside_and_one_row_of_few(rows, kept):
+    parts = split(campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows)))
+    assert np.sum(~parts.fitted) == kept

@@ -119,3 +119,65 @@ def test_rows_without_a_clock_say_nothing(rng):
     z = np.linalg.cholesky(covariance_of(campaign)) @ rng.normal(size=2 * ROWS)
     campaign.covariates = {}
     assert noise_in_time(campaign, z) is None
+
+
+def by_definition(campaign, z):
+    """Share, constant and probability from the likelihood of every R written out."""
+    times = campaign.covariates["time"]
+    sessions = np.zeros(len(campaign)) if campaign.session is None else campaign.session
+    each = [np.sort(times[sessions == s]) for s in np.unique(sessions)]
+    steps = np.concatenate([np.diff(t) for t in each])
+    best = (-np.inf, 0.0, 0.0)
+    for share in (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95):
+        for constant in np.geomspace(
+            np.median(steps[steps > 0]), max(np.ptp(t) for t in each), 12
+        ):
+            R = covariance_of(campaign, share, constant)
+            squares = z @ np.linalg.solve(R, z)
+            gain = len(z) * np.log(z @ z / squares) - np.linalg.slogdet(R)[1]
+            best = max(best, (gain, share, constant))
+    return best[1], best[2], np.exp(-best[0] / 2)  # of two degrees of freedom
+
+
+@pytest.mark.parametrize("sessions", [None, np.repeat([0, 1, 1], 12)])
+def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
+    """Rows in any order, at times of any steps, some of them at one time."""
+    campaign = session(36, (1, 3), sessions)
+    campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
+    z = (
+        2.5
+        * np.linalg.cholesky(covariance_of(campaign, 0.9, 200.0))
+        @ rng.normal(size=72)
+    )
+    found, expected = noise_in_time(campaign, z), by_definition(campaign, z)
+    assert (found.share, found.constant) == pytest.approx(expected[:2])
+    assert found.probability == pytest.approx(expected[2], rel=1e-9)
+
+
+def test_points_of_a_body_have_noise_of_their_own(rng):
+    """Two points, read in turns, are two series: covariances of each add up."""
+    one, both = session(40), session(80)
+    both.point = np.tile(["p", "q"], 40)
+    both.covariates["time"] = np.repeat(one.covariates["time"], 2)
+    noise = NoiseInTime(SHARE, CONSTANT, 0.0)
+    G = design(one, rng)
+    H = np.linalg.inv(G.T @ G)
+    wide = widened(H, G, one, noise)
+    twice = np.repeat(G.reshape(40, 2, 3), 2, axis=0).reshape(160, 3)
+    found = widened(H / 2, twice, both, noise)
+    assert found == pytest.approx(wide / 2, rel=1e-9)
+
+
+def test_thirty_rows_are_enough_and_fewer_are_not(rng):
+    for rows, enough in ((29, False), (30, True)):
+        campaign = session(rows, range(6))
+        z = np.linalg.cholesky(covariance_of(campaign, 0.95)) @ rng.normal(
+            size=6 * rows
+        )
+        assert (noise_in_time(campaign, z) is not None) == enough
+
+
+def test_rows_of_one_moment_say_nothing_of_time(rng):
+    campaign = session()
+    campaign.covariates["time"] = np.zeros(ROWS)
+    assert noise_in_time(campaign, rng.normal(size=2 * ROWS)) is None

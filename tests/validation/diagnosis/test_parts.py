@@ -10,6 +10,7 @@ from scipy.stats import binom
 
 from assembly.effects.effect import Unknown
 from assembly.kinematics.posture import place_robot
+from assembly.measurement.predict import predict
 from assembly.model.robot import BeamLink, Frame, Robot
 from forcefit.inputs.table import BadInput
 from tests.planar_arm_for_tests import SIGMA
@@ -19,6 +20,7 @@ from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import coarse_frame, register
+from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
 
@@ -106,6 +108,41 @@ def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
         register(campaign, conditions_of(campaign))
 
 
+def test_a_device_is_found_beside_errors_that_the_model_knows():
+    """The declared tip is 4 mm off: that is the machine's, and not the device's."""
+    plain = bar()
+    errors = np.zeros((2, 6))
+    errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
+    robot = plain.robot.with_errors(errors)
+    turn, t = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.5, -2.0])
+    R = Rotation.from_rotvec(turn)
+    q = plain.coordinates[:, 0]
+    off = Rotation.from_rotvec(np.outer(q, [0, 0, 1])).apply(errors[1, 3:])
+    p = LENGTH * along(plain)
+    seen = np.hstack([np.full((8, 3), np.nan), R.apply(p + off) + t - p])
+    campaign = replace(bar(measured=seen), robot=robot)
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+
+
+def test_each_session_has_a_device_of_its_own():
+    """Two places in the room, two sessions; rows without any are all of one."""
+    plain, sessions = bar(), np.array(["a", "b"] * 4)
+    p, seen = LENGTH * along(plain), np.zeros((8, 6))
+    seen[:, :3] = np.nan
+    where = {"a": ([0.1, 0.2, -0.3], [1.0, 2.0, 0.5]), "b": ([0, 0, 1.0], [-1.0, 0, 0])}
+    for k, name in enumerate(sessions):
+        turn, t = where[name]
+        seen[k, 3:] = Rotation.from_rotvec(turn).apply(p[k]) + t - p[k]
+    campaign = replace(bar(measured=seen), session=sessions)
+    found = register(campaign, conditions_of(campaign))
+    left = campaign.measured - predict(found).deviation
+    assert np.abs(left[:, 3:]).max() < 1e-9
+    unknown = replace(campaign, session=np.array(["a"] * 8))
+    with pytest.raises(BadInput, match='session "b" has no row'):
+        register(unknown, conditions_of(campaign))
+
+
 # tangents
 
 
@@ -142,6 +179,16 @@ def test_a_tangent_about_an_upper_bound_is_taken_below_it():
     assert max(tried) == most
     expected = 5.0 * whiten(campaign, fit_of(campaign, LENGTH))
     assert found.columns[:, 0] == pytest.approx(expected, rel=1e-6, abs=1e-3)
+
+
+def test_wrenches_are_as_small_as_their_loads():
+    """Zero is what is rounding beside the largest, and not beside 1 N."""
+    load = np.array([0, 0, 3.0, 0, 5.0, 0])
+    one = responses(conditions_of(bar(load, link=BEAM)))
+    tiny = responses(conditions_of(bar(1e-12 * load, link=BEAM)))
+    assert np.abs(one.wrenches).max() > 1.0
+    assert 1e12 * tiny.wrenches == pytest.approx(one.wrenches, rel=1e-9, abs=1e-9)
+    assert tiny.screws == pytest.approx(one.screws)
 
 
 # refit
@@ -214,6 +261,20 @@ def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
     slope = LENGTH * np.sin(q + e) / SIGMA[3]
     assert np.abs(fit.slopes[:, 0]) == pytest.approx(np.abs(slope), rel=1e-3)
     assert std == pytest.approx(1 / np.linalg.norm(slope), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("earlier", "end"), [(None, 0.4), (-0.39, -0.4), (-1.2, 0.4), (0.41, 0.4)]
+)
+def test_a_fit_goes_on_from_an_earlier_one_if_that_leaves_less(earlier, end):
+    """Of a bar along x only x is read, L cos e: it may be turned either way."""
+    seen = np.full((1, 6), np.nan)
+    seen[0, 3] = LENGTH * (np.cos(0.4) - 1)
+    campaign = bar(measured=seen, rows=1)
+    here = replace(conditions_of(campaign), exact=True)
+    begun = None if earlier is None else np.array([earlier])
+    fit = refit(campaign, here, [TURNED], np.array([0.1]), earlier=begun)
+    assert fit.values == pytest.approx([end], rel=1e-5)
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
@@ -353,3 +414,35 @@ def test_springs_of_passive_joints_leave_their_own_motion_free():
     K = with_small(robot, [springs], [np.array([1e-3, 1e-7])]).frame("hinge")
     stiffness = np.diag(K.joint_stiffness)
     assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
+
+
+def test_a_range_of_temperatures_is_left_by_half_of_it():
+    """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
+    heat = {"temperature": np.linspace(20.0, 60.0, 8)}
+    plain = bar(link=BEAM, **heat)
+    seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
+    campaign = bar(link=BEAM, measured=seen, **heat)
+    here = conditions_of(campaign)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    for fit, rival in ((longer, warmer), (warmer, longer)):
+        found = next_measurement(campaign, here, fit, [rival])
+        assert found.covariates == {"temperature": 80.0}
+
+
+def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
+    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
+    M, k = 30.0, 2e5
+    plain = bar()
+    across = np.cross([0, 0, 1], along(plain))
+    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
+    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    here = conditions_of(campaign)
+    softer, turned = (
+        refit(campaign, here, [one], np.array([start]))
+        for one, start in ((SOFTER, 1e-6), (TURNED, 0.0))
+    )
+    found = next_measurement(campaign, here, softer, [turned])
+    assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
+    assert found.load[2] < 0  # against it they are farther apart

@@ -77,3 +77,48 @@ def test_geometric_errors_of_a_fiftieth_of_the_robot_are_doubted(campaign):
     for size, doubted in ((2e-3, 0), (5e-2, 1)):
         behind = replace(NOTHING, scales={"geometry": (1e-3, size)})
         assert len(implausible(campaign, fit, behind)) == doubted
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "low", "high"),
+    [
+        # an arm whose longest body is 0.6 m: 0.2 rad, a tenth of it
+        ("encoder_offset", "one", -0.2, 0.2),
+        ("link_length", "two", -0.06, 0.06),
+        ("registration", "base.ty", -0.06, 0.06),
+        ("registration", "base.rx", -0.2, 0.2),
+        ("thermal_expansion", "two", -5e-4, 5e-4),
+        ("self_weight", "gravity.z", -12.0, 12.0),
+        ("load_gain", "factor", 0.3, 3.0),
+        ("modulus_scale", "two", 0.2, 5.0),
+    ],
+)
+def test_every_number_has_a_range(campaign, effect, name, low, high):
+    for value, doubts in (
+        (0.999 * high, 0), (1.001 * high, 1), (low * 0.999**np.sign(-low), 0),
+        (low * 1.001**np.sign(-low), 1),
+    ):  # fmt: skip
+        fit = SimpleNamespace(effects={effect: {name: value}})
+        assert len(implausible(campaign, fit, NOTHING)) == doubts, value
+
+
+def test_geometric_errors_have_a_largest_size(campaign):
+    """A tenth of a radian; a fiftieth of 0.6 m."""
+    fit = SimpleNamespace(effects={})
+    for scales, doubted in (
+        ((0.099, 0.0119), []), ((0.101, 0.0119), ["rotation"]),
+        ((0.099, 0.0121), ["translation"]), ((1.0, 1.0), ["rotation", "translation"]),
+    ):  # fmt: skip
+        said = implausible(campaign, fit, replace(NOTHING, scales={"geometry": scales}))
+        assert [kind in one for kind, one in zip(doubted, said, strict=True)] == [
+            True for _ in doubted
+        ]
+
+
+def test_what_is_far_from_the_usual_temperature_is_flagged_not_what_is_hot(campaign):
+    """In kelvin or in degrees: 150 K from the median, and no less."""
+    for usual in (0.0, 293.0):
+        heat = np.full(len(campaign), usual)
+        heat[2], heat[4] = usual + 149.0, usual - 151.0
+        odd = replace(campaign, covariates={"temperature": heat})
+        assert np.flatnonzero(impossible_rows(odd)).tolist() == [4]

@@ -12,7 +12,7 @@ from validation.diagnosis import refitting
 from validation.diagnosis.background import NOTHING
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.refit import Fit
-from validation.diagnosis.refitting import Refits
+from validation.diagnosis.refitting import Refits, names_of
 from validation.diagnosis.scoring import FINITE, Scored, Screen
 from validation.diagnosis.signatures import Signature
 
@@ -34,7 +34,7 @@ class Made(Refits):
     """Fits that leave what the tangents leave, and for some sets more."""
 
     def __init__(self, more=None):
-        super().__init__(None, None, [], 0.0)
+        super().__init__(None, None, [], 0.0, {})
         self.more = more or {}
 
     def fit(self, one, screen, behind):
@@ -118,18 +118,23 @@ def test_a_fit_begins_where_screening_ended_but_for_shapes_and_is_kept(
     screen = Screen(np.zeros(CELLS), [signature])
     one = Scored((0,), np.array([1.5, 0.0]), 0.0, 2, 0.0)
     begun = []
+    ends = Fit((), np.array([0.4, 1.6, 0.8]), np.zeros((3, 3)), np.zeros(1), None, None)
 
-    def refit(campaign, conditions, members, start, defect, behind):
-        begun.append((members, start, defect))
-        return len(begun)
+    def refit(campaign, conditions, members, start, defect, behind, earlier):
+        begun.append((members, start, defect, earlier))
+        return ends
 
     monkeypatch.setattr(refitting, "refit", refit)
     monkeypatch.setattr(refitting, "adds_clearance", lambda *given: False)
-    refits = Refits(None, None, [nuisance], 0.25)
-    assert refits.fit(one, screen, NOTHING) == refits.fit(one, screen, NOTHING) == 1
-    ((members, start, defect),) = begun
+    other = names_of([nuisance])
+    refits = Refits(None, None, [nuisance], 0.25, {other: np.array([0.2])})
+    assert refits.fit(one, screen, NOTHING) is refits.fit(one, screen, NOTHING) is ends
+    ((members, start, defect, earlier),) = begun
     assert members == [nuisance, shaped]
     assert start == pytest.approx([0.3, 1.5, 0.7])
     assert defect == 0.25
+    assert earlier is None  # of this set
     refits.forget()
-    assert refits.fit(one, screen, NOTHING) == 2
+    refits.fit(one, screen, NOTHING)
+    assert begun[1][3] is ends.values  # behind other terms it may go on from there
+    assert set(refits.ended) == {other, names_of(members)}

@@ -10,6 +10,7 @@ from scipy.optimize import nnls
 from assembly.effects.effect import Unknown
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.scoring import FINITE, Scored, Screen, inclusion, posterior
+from validation.diagnosis.screens import Projector, score_beside_squares
 from validation.diagnosis.signatures import Signature
 from validation.diagnosis.verdict import by_names, calibrate, linear_or_finite, verdict
 
@@ -263,3 +264,53 @@ def test_a_claim_of_one_effect_where_two_are_hidden_is_false(rng):
     claims = tally.with_found["explained"] + tally.without.get("explained", 0)
     assert 10 < false <= claims <= 40
     assert tally.right * 20 + false == pytest.approx(claims)
+
+
+@pytest.mark.parametrize("units", [1.0, 1e-9, 1e9])
+def test_what_nuisances_can_do_is_taken_out_and_nothing_else(units, rng):
+    """Least squares by another routine; equal columns and zeros are no more."""
+    A = rng.normal(size=(30, 3))
+    nuisances = [
+        signature("a", A * [1.0, units, 1.0]),
+        signature("b", np.zeros((30, 1))),
+    ]
+    project = Projector([*nuisances, signature("c", A[:, [1]])])
+    X = rng.normal(size=(30, 4))
+    expected = X - A @ np.linalg.lstsq(A, X)[0]
+    assert project(X) == pytest.approx(expected, abs=1e-12)
+    assert Projector([])(X) is X
+
+
+def test_a_score_beside_its_squares_knows_no_residual(rng):
+    signatures = made_up_effects(rng, 3, 60)
+    first, other = (Screen(z, signatures).fit((0, 2)) for z in rng.normal(size=(2, 60)))
+    assert first.rss != pytest.approx(other.rss)
+    assert score_beside_squares(first) == pytest.approx(score_beside_squares(other))
+
+
+def test_signatures_that_are_nothing_or_the_same_add_no_rank():
+    """Of columns e, e, 0 the least answer shares what one would take."""
+    e = np.eye(4)
+    screen = Screen(np.array([2.0, 0, 0, 0]), [
+        signature("a", np.column_stack([e[0], e[0], 0 * e[0]])),
+        signature("b", 0 * e[0]),
+    ])  # fmt: skip
+    one = screen.fit((0,))
+    assert one.values == pytest.approx([1.0, 1.0, 0.0])
+    assert (one.rank, one.rss) == (1, pytest.approx(0.0, abs=1e-12))
+    nothing = screen.fit((1,))
+    assert (nothing.rank, nothing.rss) == (0, pytest.approx(4.0))
+
+
+def test_an_unknown_that_leaves_its_bound_is_held_there(rng):
+    """The others then are least squares of what it leaves."""
+    A, z = rng.normal(size=(20, 3)), rng.normal(size=20)
+    free = np.linalg.lstsq(A, z)[0]
+    low = np.where(np.arange(3) == 1, free + 0.5, -np.inf)
+    made = Signature(Hypothesis("a", (), tuple(
+        Slot((f"x{k}",), Unknown(f"x{k}", 1.0, low[k], np.inf), 0.0) for k in range(3)
+    )), np.zeros(20), A)  # fmt: skip
+    found = Screen(z, [made]).fit((0,))
+    rest = np.linalg.lstsq(A[:, [0, 2]], z - A[:, 1] * low[1])[0]
+    assert found.values == pytest.approx([rest[0], low[1], rest[1]])
+    assert found.rank == 3

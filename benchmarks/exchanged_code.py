@@ -1,0 +1,138 @@
+"""Faults put into functions that are loaded: their code is exchanged in a fork.
+
+All tests are collected once, all modules imported, all compiled functions loaded.  For
+each fault the process forks, exchanges the code of the fault's functions, and runs the
+tests that pass its line: hundredths of a second more than the tests, not the seconds
+that a process of its own takes.  Only a statement within a function of a file without
+compiled loops can be exchanged so; what an import has worked out is in use already.
+"""
+
+import functools
+import gc
+import importlib
+import os
+import resource
+import shutil
+import signal
+import sys
+import traceback
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import CodeType, FunctionType
+
+import pytest
+
+from benchmarks.faults import Fault
+from benchmarks.traced_tests import MEMORY, WORDS, places_of_tests, sources
+
+PASSED, FAILED, BROKEN = 0, 1, 2
+WAITS = 10  # seconds of the clock at most for one of the processor
+# what they keep is no answer
+KEPT_CACHES = ("forcefit.native", "assembly.solvers.compiled")
+
+
+class Session:
+    """A plugin: instead of the collected tests, what ``judge`` asks of this session."""
+
+    def __init__(self, tree: Path, judge: Callable[["Session"], None]) -> None:
+        self.tree, self.judge = tree, judge
+        self.failed = ""
+
+    def run(self) -> None:
+        """Collect the tests, import, load, and judge."""
+        os.chdir(self.tree)
+        os.environ |= {"PYTHONPATH": str(self.tree), "PYTHONDONTWRITEBYTECODE": "1"}
+        sys.dont_write_bytecode = True
+        sys.path.insert(0, str(self.tree))
+        pytest.main([*WORDS, "-s", *places_of_tests()], plugins=[self])
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Load everything that a test may load."""
+        self.items = {item.nodeid: item for item in session.items}
+        for path in sources():
+            if path.name not in {"__main__.py", "mesh_worker.py"}:
+                names = path.with_suffix("").parts
+                importlib.import_module(".".join(names).removesuffix(".__init__"))
+        importlib.import_module("forcefit.commands.warm_up").warm_up()
+        self.functions = defaultdict[str, list[FunctionType]](list)
+        for found in gc.get_objects():
+            if type(found) is FunctionType:  # a proxy of what is gone has no class
+                self.functions[found.__code__.co_filename].append(found)
+            elif type(found) is functools._lru_cache_wrapper:
+                if not found.__module__.startswith(KEPT_CACHES):
+                    found.cache_clear()
+        # of forks that share what they do not change
+        gc.collect()
+        gc.freeze()
+
+    def pytest_runtestloop(self) -> bool:
+        """Judge, in place of a run of all tests."""
+        self.judge(self)
+        return True
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """The first test that fails."""
+        if report.failed and not self.failed:
+            self.failed = report.nodeid
+
+    def seen(self, fault: Fault, tests: list[str], seconds: float) -> str | None:
+        """The first of these tests that fails, "" at a limit; None if all pass."""
+        some = [self.items[test] for test in tests if test in self.items]
+        if not some:
+            return None
+        folder = some[0].config._tmp_path_factory.getbasetemp()
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            code = FAILED
+            try:
+                limit = int(seconds) + 1
+                resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+                resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+                signal.alarm(WAITS * limit)
+                with open(os.devnull, "r+") as nothing:
+                    for stream in range(3):
+                        os.dup2(nothing.fileno(), stream)
+                self.exchange(fault)
+                for item, after in zip(some, [*some[1:], None], strict=True):
+                    item.ihook.pytest_runtest_protocol(item=item, nextitem=after)
+                    if self.failed:
+                        os.write(writing, self.failed.encode())
+                        os._exit(FAILED)
+                code = PASSED
+            except BaseException:
+                os.write(writing, traceback.format_exc().encode())
+                code = BROKEN
+            finally:
+                os._exit(code)
+        os.close(writing)
+        with os.fdopen(reading) as file:
+            failed = file.read()
+        _, status = os.waitpid(child, 0)
+        if os.WIFEXITED(status) and os.WEXITSTATUS(status) == BROKEN:
+            raise RuntimeError(failed)
+        for left in folder.iterdir():
+            if left.is_dir() and not left.is_symlink():
+                shutil.rmtree(left, ignore_errors=True)
+        return None if status == 0 else failed
+
+    def exchange(self, fault: Fault) -> None:
+        """Give the functions of a file the code that they have with the fault."""
+        name = str(self.tree / fault.path)
+        right = (self.tree / fault.path).read_text("utf-8")
+        before, after = (
+            list(within(compile(source, name, "exec", dont_inherit=True)))
+            for source in (right, fault.put_into(right))
+        )
+        codes = dict(zip(before, after, strict=True))
+        for function in self.functions[name]:
+            function.__code__ = codes[function.__code__]
+
+
+def within(code: CodeType) -> Iterator[CodeType]:
+    """A code object and all that are defined in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from within(constant)
