@@ -19,7 +19,8 @@ class Loaded : public Reduction {
 public:
     Loaded(const Robot &s, const Points &points)
         : Reduction(s, points), loaded(points.loads), tight(loaded ? s.ny : 0),
-          holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0), left(loaded ? 6 * ng : 0) {
+          holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0),
+          left(loaded ? 6 * ng : 0) {
         programme.loaded = loaded;
     }
 
@@ -29,7 +30,7 @@ protected:
     Row holding;   // (m,) w
     Row drive;     // (nq,) g
     Row on_play;   // (nu,) c, in the robot's order
-    Row left;      // (r,) what rounding leaves of t in the closures' springs
+    Row left;      // (r,) what rounding leaves of t in the springs of closures
     Real stored;   // |t|^2 / 2
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
