@@ -12,10 +12,12 @@ grid of its workspace.  Printed, in this order:
   ``solve_assembly`` and ``minimise_energies``, by numba and side by side in C++
   (linearisation, reduction and certificate counted), with the ratio of cvxpy's DPP to
   each;
+- the same for the energy under a force and a moment on the platform and weight, errors
+  times 1, 0.2 and 0, and for draws of the errors at one posture under them;
 - the same for the margin (21), both readings;
 - what other single calls take, and placing many poses;
 - the share of the grid's points with a certified energy at six multiples of the errors,
-  and how many of them the fallback had to solve.
+  and under four sizes of the load at three, and how many the fallback had to solve.
 
 The slow ways see a sample of the grid, ours all of it; nothing is run twice to choose
 the better time but ours, whose first run compiles.
@@ -42,8 +44,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
+from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import Posture, place_many, place_robot
 from assembly.linear import reference
+from assembly.linear.assembled import all_loads
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import reference_assembly, reference_margin
@@ -60,6 +64,8 @@ from forcefit.native.libraries import by_numba, load_library
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways
 READINGS = ("rigid", "free")
+LOAD = np.array([1.0, 2.0, 3.0, 30.0, 10.0, -100.0])  # [N m, N] on the platform
+GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
 
 
 def paper_robot() -> Robot:
@@ -114,6 +120,21 @@ def closure_matrices(
     )  # fmt: skip
 
 
+def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
+    """The same, and the loads on free motions, clearances and springs, scaled alike."""
+    lin, joints = linearise(posture), virtual_joints(posture.robot)
+    loads = all_loads(posture, LOAD, None, GRAVITY)
+    small = np.abs(lin.rows @ joints.cones).max()
+    soft = np.abs(lin.rows @ joints.elastic).max() / small  # springs are in this unit
+    on_springs = np.where(
+        joints.links, loads.body @ joints.elastic, loads.joint @ joints.elastic
+    )
+    return (
+        *closure_matrices(posture), soft**2 * small * (loads.joint @ joints.free),
+        soft**2 * (loads.joint @ joints.cones), soft * on_springs,
+    )  # fmt: skip
+
+
 class Dpp:
     """One of the two problems with parameters, canonicalised once.
 
@@ -135,7 +156,7 @@ class Dpp:
         ]  # fmt: skip
         q, u, y = (cp.Variable(part.shape[1]) for part in data[0][:3])
         t = cp.Variable(nonneg=True)
-        A_q, A_u, A_y, misfit = self.parameters
+        A_q, A_u, A_y, misfit, *loads = self.parameters
         total = A_q @ q + A_u @ u + misfit
         if len(joints.links):
             total = total + A_y @ y
@@ -144,6 +165,7 @@ class Dpp:
             part = np.flatnonzero(joints.group == cone)
             limits.append(cp.norm(u[part]) <= (t if margin else 1.0))
         goal = t if margin else cp.sum_squares(y) / 2
+        goal -= sum(own @ x for own, x in zip(loads, (q, u, y), strict=False))
         self.problem = cp.Problem(cp.Minimize(goal), limits)
         self(data[0])
 
@@ -193,10 +215,12 @@ def clarabel_reduced(posture: Posture) -> object:
 def moreau_batched(postures: list[Posture]) -> float:
     """Processor time a point [us] of the full problem, scaled, by moreau in one batch.
 
-    Its matrices are ready made; handing them over counts.
+    Its matrices are ready made; handing them over counts.  NaN where there is none.
     """
-    import moreau
-
+    try:
+        import moreau
+    except ImportError:
+        return np.nan
     data = [closure_matrices(posture) for posture in postures]
     group = virtual_joints(postures[0].robot).group
     limits, radii = conic._unit_cones(group, np.ones(len(group)))
@@ -280,6 +304,35 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
     print_table(f"energy (22), errors times {kappa:g}", rows)
 
 
+def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
+    """The table of problem (22) under loads at a multiple of the errors."""
+    scaled = robot.with_errors(kappa * robot.errors)
+    own = [replace(p, robot=scaled) for p in postures]
+    few = own[:: len(own) // SAMPLE][:SAMPLE]
+
+    def together(robot: Robot, T: NDArray, mismatch: NDArray) -> object:
+        return solve_assembly(own, LOAD, gravity=GRAVITY)
+
+    loaded = {"load": LOAD, "gravity": GRAVITY}
+    for posture in own:
+        solve_assembly(posture, **loaded)
+    data = [loaded_matrices(p) for p in few]
+    dpp = Dpp(robot, "elastic", False, data)
+    rows = {
+        "cvxpy DPP, scaled": timed(dpp, data),
+        "ours, reference in numpy": timed(partial(reference_assembly, **loaded), few),
+        "ours, one at a time": timed(partial(solve_assembly, **loaded), own),
+        **batched(together, own),
+    }
+    one = prepare_energies(own[len(own) // 2], **loaded)
+    errors = kappa * np.linspace(-1, 1, 2000)[:, None, None] * robot.errors
+    draws = batched(lambda robot, T, mismatch: one.solve(errors), own)
+    for name, taken in draws.items():
+        each = taken * len(own) / len(errors)
+        rows[name.replace("batched", "draws at one posture")] = each
+    print_table(f"energy (22) under loads, errors times {kappa:g}", rows)
+
+
 def print_margins(postures: list[Posture]) -> None:
     """The table of problem (21), both readings."""
     few = postures[:: len(postures) // SAMPLE][:SAMPLE]
@@ -338,6 +391,16 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
             f"errors times {kappa:<5g} {share:6.2f} %   fallback: {slow or 'none'}; "
             f"Newton alone {newton:.0f} %"
         )
+    for size in (1e-3, 0.1, 1.0, 10.0):
+        for kappa in (0.0, 0.2, 1.0):
+            scaled = robot.with_errors(kappa * robot.errors)
+            own = [replace(p, robot=scaled) for p in postures]
+            answers = solve_assembly(own, size * LOAD, gravity=size * GRAVITY)
+            share, slow = answers.certified.mean() * 100, answers.fallbacks()
+            print(
+                f"loads times {size:<6g} errors times {kappa:<5g} {share:6.2f} %   "
+                f"fallback: {slow or 'none'}"
+            )
 
 
 def main() -> None:
@@ -348,6 +411,8 @@ def main() -> None:
     print(f"{robot.name}, {len(postures)} points, one core")
     for kappa in (1.0, 0.2):
         print_energies(robot, postures, kappa)
+    for kappa in (1.0, 0.2, 0.0):
+        print_loaded(robot, postures, kappa)
     print_margins(postures)
     print_calls(robot, postures)
     print_certified(robot, postures)

@@ -1,30 +1,39 @@
 """Times one sweep here, on one worker process and on two; prints a table.
 
-Run from the repository's root: ``python benchmarks/sweep_scaling.py [DRAWS]``.  The
+Run from the repository's root: ``python -m benchmarks.sweep_scaling [DRAWS]``.  The
 sweep is the five-bar robot at 100 postures with DRAWS draws of errors each; worker
 processes are started and warmed by a short sweep of their own before the clock runs.
 Two processes are compared with one worker, so what Dask costs shows in the first ratio
-and how it scales in the second.  The three files are compared byte by byte.
+and how it scales in the second.  The files are compared byte by byte.
+
+What the machine itself gives stands beside it, of the same workers and between the
+same sweeps: a loop of sums and products in each of two at once against one alone, and
+the sweep's own points, without what sends, keeps and writes them.  All in turns, the
+best of five; where other programs run, whose load is printed, processor seconds say
+more.
 """
 
+import os
 import sys
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
+import dask
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
 from distributed import Client, LocalCluster
 
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
-from assembly.sweeps.cluster import cluster_solver
+from assembly.sweeps.cluster import _QUIET, cluster_solver
 from assembly.sweeps.plan import Sweep
+from assembly.sweeps.points import solve_points
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import run_sweep, solve_here
 from assembly.sweeps.targets import grid_targets, parse_grid
+
+TURNS = 5
 
 
 def sweep(draws):
@@ -36,43 +45,97 @@ def sweep(draws):
     return Sweep(question, targets, (), draws)
 
 
-def timed(asked, path, solve, tasks):
-    """Seconds of a sweep after a short one."""
-    run_sweep(sweep(20), path, solve=solve)
-    tasks.clear()
-    start = time.perf_counter()
-    run_sweep(asked, path, solve=solve)
+def loop(_):
+    """Seconds of sums and products that need no memory."""
+    start, x = time.perf_counter(), 1.0
+    for _ in range(8_000_000):
+        x = 0.999999 * x + 1e-9
     return time.perf_counter() - start
+
+
+def points(draws):
+    """Seconds of the sweep's first blocks, solved and dropped."""
+    asked = sweep(draws)
+    blocks = [asked.points(block) for block in range(min(asked.blocks, 64))]
+    start = time.perf_counter()
+    for block in blocks:
+        solve_points(asked.question, block)
+    return time.perf_counter() - start
+
+
+def at_once(client, workers, work, draws):
+    """Seconds of the same work on each of these workers at once, the slowest's."""
+    asked = [
+        client.submit(work, draws, workers=[worker], pure=False) for worker in workers
+    ]
+    return max(client.gather(asked))
+
+
+def timed(asked, path, solve, client):
+    """Seconds of a sweep; processor seconds here and of the workers."""
+
+    def spent():
+        workers = client.run(time.process_time).values() if client else ()
+        return np.array([time.perf_counter(), time.process_time(), sum(workers)])
+
+    before = spent()
+    run_sweep(asked, path, solve=solve)
+    return spent() - before
 
 
 def main(draws=400):
     """Run, compare and print."""
-    asked = sweep(draws)
-    print(f"{asked.size} points in {asked.blocks} blocks")
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{n}.nc" for n in range(3)]
-        times = [timed(asked, paths[0], solve_here, [])]
-        print(
-            f"here           {times[0]:6.1f} s  {asked.size / times[0]:6.0f} points/s"
-        )
-        for workers in (1, 2):
-            with (
+    asked, short = sweep(draws), sweep(20)
+    print(
+        f"{asked.size} points in {asked.blocks} blocks; load {os.getloadavg()[0]:.1f}"
+    )
+    with ExitStack() as kept:
+        folder = Path(kept.enter_context(tempfile.TemporaryDirectory()))
+        kept.enter_context(dask.config.set(_QUIET))
+        ways, tasks = {"here": (solve_here, None)}, []
+        for count in (1, 2):
+            cluster = kept.enter_context(
                 LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None
-                ) as cluster,
-                Client(cluster),
-            ):
-                tasks = []
-                solve = cluster_solver(
-                    scheduler=cluster.scheduler_address, report=tasks.append
+                    n_workers=count, threads_per_worker=1, dashboard_address=None
                 )
-                times.append(timed(asked, paths[workers], solve, tasks))
-            seconds, ratio = times[-1], times[-2] / times[-1]
-            rate = f"{asked.size / seconds:6.0f} points/s"
-            print(f"{workers} process(es)  {seconds:6.1f} s  {rate}, {ratio:.2f} times "
-                  f"the row above; {tasks[0]}")  # fmt: skip
-        same = len({path.read_bytes() for path in paths}) == 1
-    print("the three files are", "the same, byte by byte" if same else "DIFFERENT")
+            )
+            client = kept.enter_context(Client(cluster))
+            address = cluster.scheduler_address
+            ways[f"{count} process(es)"] = (
+                cluster_solver(scheduler=address, report=tasks.append), client
+            )  # fmt: skip
+        workers = list(client.nthreads())  # the two
+        best, machine = {}, {}
+        for solve, _ in ways.values():
+            run_sweep(short, folder / "short.nc", solve=solve)
+        for work in (loop, points):
+            at_once(client, workers, work, draws)
+        for _ in range(TURNS):
+            for name, (solve, own) in ways.items():
+                taken = timed(asked, folder / f"{name[0]}.nc", solve, own)
+                best[name] = np.minimum(best.get(name, np.inf), taken)
+            for work in (loop, points):
+                pair = [
+                    at_once(client, some, work, draws)
+                    for some in (workers[:1], workers)
+                ]
+                machine[work] = np.minimum(machine.get(work, np.inf), pair)
+        same = len({path.read_bytes() for path in folder.glob("[h12].nc")}) == 1
+    before = None
+    for name, (seconds, here, theirs) in best.items():
+        ratio = f", {before / seconds:.2f} times the row above" if before else ""
+        print(
+            f"{name:14} {seconds:6.2f} s  {asked.size / seconds:6.0f} points/s{ratio}; "
+            f"processor {here:.2f} s here, {theirs:.2f} of workers"
+        )
+        before = seconds
+    print(f"last: {tasks[-1]}")
+    for work, (one, two) in machine.items():
+        print(
+            f"the machine, {work.__name__}: two at once {2 * one / two:.2f} times one"
+        )
+    print("the files are", "the same, byte by byte" if same else "DIFFERENT")
+    print(f"load {os.getloadavg()[0]:.1f}")
     return same
 
 

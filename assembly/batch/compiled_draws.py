@@ -10,13 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.compiled_energy import small_answer
+from assembly.linear.compiled_energy import (
+    NEAR,
+    NEAR_WITHOUT_CLEARANCE,
+    Limits,
+    small_answer,
+)
 from assembly.linear.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import kernel, part
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from assembly.solvers.layouts import Indices, Matrix, Vector
-from assembly.solvers.vectors import copy, fill, inner, matrix, vector
+from assembly.solvers.vectors import copy, divide, fill, inner, matrix, vector
 
 SOLVED, UNCERTIFIED = range(2)
 _STOP = 1e-2  # the solvers stop at this fraction of the accepted gap
@@ -32,7 +37,11 @@ class Reduced(NamedTuple):
         inverse: (nu, r) pseudoinverse of G.
         cones: (nu, r) generalised force of y on each clearance, before elimination.
         gram: (r, r) the springs' complementary energy is y.gram y / 2.
-        slip: [per size of y] how much the free motions may gain by rounding.
+        d: (nu,) [J] what each clearance carries in the tight robot under its loads.
+        slip: [per size of y] how much the free motions may gain by rounding ..
+        slack: [J] .. whatever y is.
+        stored: [J] energy that loads alone bend.
+        loaded: whether there are loads.
     """
 
     Gt: NDArray
@@ -40,7 +49,11 @@ class Reduced(NamedTuple):
     inverse: NDArray
     cones: NDArray
     gram: NDArray
+    d: NDArray
     slip: float
+    slack: float
+    stored: float
+    loaded: bool
 
 
 class Energies(NamedTuple):
@@ -63,14 +76,14 @@ class Energies(NamedTuple):
 
 @kernel
 def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
-    """Minimise |G u + h|^2 / 2 for every row of h.
+    """Minimise |G u + h|^2 / 2 - d.u for every row of h.
 
     Args:
         reduced: of the posture.
         h: (k, r) [sqrt(2 J)].
         out: arrays to fill.
     """
-    Gt, starts, inverse, cones, gram, slip = reduced
+    Gt, starts, inverse, cones, gram, loads, slip, slack, stored, loaded = reduced
     u, y, energy, bound, outcome = out
     nu, r = Gt.shape
     norm = 0.0
@@ -79,6 +92,7 @@ def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
         for i in range(r):
             squares += Gt[c, i] * Gt[c, i]
         norm = max(norm, np.sqrt(squares))
+        norm = max(norm, np.sqrt(abs(loads[c])))
     own, right = vector(nu), vector(r)
     G = matrix(nu, r)
     own_y = vector(r)
@@ -90,48 +104,63 @@ def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
         size = max(np.sqrt(size), norm)
         fill(own, 0.0)
         copy(h[point], own_y)
-        if nu and without > 0.0 and _within(Gt, starts, h[point], inverse, own):
+        some = nu > 0 and (without > 0.0 or loaded)
+        if some and not loaded and _within(Gt, starts, h[point], inverse, own):
             fill(own_y, 0.0)
-        elif nu and without > 0.0:
+        elif some and size > 0.0:
             fill(own, 0.0)
             for i in range(r):
                 right[i] = h[point, i] / size
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
-            absolute = _STOP * GAP_WITHOUT_CLEARANCE * without / (size * size)
-            small_answer(G, right, starts, _STOP * GAP, absolute, own, own_y)
+            joule = size * size
+            absolute = GAP_WITHOUT_CLEARANCE * (without + stored) + GAP * stored
+            near = NEAR_WITHOUT_CLEARANCE * (without + stored) + NEAR * stored
+            limits = Limits(_STOP * GAP, _STOP * absolute / joule, near / joule)
+            small_answer(G, right, divide(loads, joule), starts, limits, own, own_y)
             for i in range(r):
                 own_y[i] *= size
-        total = 0.0
+        total, along = 0.0, 0.0
         for i in range(r):
             v = h[point, i]
             for c in range(nu):
                 v += Gt[c, i] * own[c]
             total += v * v
+            along += v * own_y[i]
         for c in range(nu):
             u[point, c] = own[c]
-        energy[point] = 0.5 * total
         worth, cost, y_size = 0.0, 0.0, 0.0
         for i in range(r):
             worth += h[point, i] * own_y[i]
             y_size += own_y[i] * own_y[i]
             for l in range(r):
                 cost += own_y[i] * gram[i, l] * own_y[l]
-        worth -= slip * np.sqrt(y_size)
+        moved = slip * np.sqrt(y_size) + slack
+        gains = 0.0
         for c in range(len(starts) - 1):
-            size_of_cone = 0.0
+            size_of_cone, work = 0.0, 0.0
             for a in range(starts[c], starts[c + 1]):
-                component = 0.0
+                component = loads[a]
                 for i in range(r):
                     component += cones[a, i] * own_y[i]
                 size_of_cone += component * component
+                work += component * own[a]
             worth -= np.sqrt(size_of_cone)
-        # any multiple of y proves a bound: the best one, zero inside a zone
-        factor = max(0.0, worth) / cost if cost > 0.0 else 0.0
-        bound[point] = 0.5 * factor * factor * cost
+            gains += max(0.0, np.sqrt(size_of_cone) - work)
+        energy[point] = 0.5 * total + stored
+        factor = 1.0
+        if loaded:
+            # strains that balance y, and what clearances could still gain
+            off = max(0.0, 0.5 * total - along + 0.5 * cost)
+            bound[point] = energy[point] - off - gains - moved
+        else:
+            worth -= moved
+            # any multiple of y proves a bound: the best one, zero inside a zone
+            factor = max(0.0, worth) / cost if cost > 0.0 else 0.0
+            bound[point] = 0.5 * factor * factor * cost
         for i in range(r):
             y[point, i] = factor * own_y[i]
-        allowed = GAP * energy[point] + GAP_WITHOUT_CLEARANCE * without
+        allowed = GAP * energy[point] + GAP_WITHOUT_CLEARANCE * (without + stored)
         # written so that NaN fails
         certified = energy[point] - bound[point] <= allowed
         outcome[point] = SOLVED if certified else UNCERTIFIED

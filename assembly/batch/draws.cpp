@@ -6,6 +6,7 @@
 // G, h      (r, nu)   strains by clearances, shared, and by each draw's errors
 // u, y                clearances, multipliers of the springs
 // cones     (nu, r)   generalised force of y on each clearance, before elimination
+// d         (nu,)     and what it carries in the tight robot under its loads
 // gram      (r, r)    the springs' complementary energy is y.gram y / 2
 // ========  ========  =================================================================
 #include "../solvers/cpp/block.h"
@@ -24,7 +25,10 @@ struct Reduced {
     const double *inverse;  // (nu, r) pseudoinverse of G
     const double *forces;   // (nu, r) `cones`
     const double *gram;
+    const double *d;        // (nu,) or none
     double slip;            // [per size of y] how much free motions may gain by rounding
+    double slack;           // the same whatever y is
+    double stored;          // energy that loads alone bend
 };
 
 // compiled_draws.py's Energies, one row a draw.
@@ -40,11 +44,13 @@ public:
     Draws(const Reduced &shared, const double *h, Energies &out)
         : s(shared), given(h), out(out), nu(int(s.nu)), r(int(s.r)),
           cones(s.starts, int(s.cones)), q(cones, r), solver(cones, r), h(r), y(r),
-          left(r) {
+          left(r), loaded(shared.d) {
+        q.loaded = loaded;
         for (int c = 0; c < nu; ++c) {
             double squares = 0.0;
             for (int i = 0; i < r; ++i) squares += s.Gt[c * r + i] * s.Gt[c * r + i];
             norm = std::max(norm, std::sqrt(squares));
+            if (loaded) norm = std::max(norm, std::sqrt(std::abs(s.d[c])));
         }
     }
 
@@ -52,8 +58,8 @@ public:
     // lanes that it leaves.
     Whole begin(const Block &block, Whole asked) {
         read(block);
-        const Whole within = inside(asked);
-        Whole solved = asked & ((without == 0.0) | within);
+        const Whole within = loaded ? Whole{} : inside(asked);
+        Whole solved = loaded ? Whole{} : asked & ((without == 0.0) | within);
         for (int i = 0; i < r; ++i) y[i] = solved ? Real{} : h[i];
         for (Real &own : q.u) own = within ? own : Real{};
         if (nu && any(asked & ~solved)) {
@@ -72,7 +78,9 @@ public:
     void finish(const Block &block, Whole asked) {
         read(block);
         std::fill(q.u.begin(), q.u.end(), Real{});
-        solver.interior_then_newton(q, STOP * GAP, absolute, asked);
+        Real near = NEAR_WITHOUT_CLEARANCE * 0.5 * inner(q.h.data(), q.h.data(), r);
+        near += (NEAR + NEAR_WITHOUT_CLEARANCE) * bent;
+        solver.interior_then_newton(q, STOP * GAP, absolute, near, asked);
         for (int i = 0; i < r; ++i) y[i] = q.y[i] * size;
         write(block, asked);
     }
@@ -86,8 +94,9 @@ private:
     Programme q;
     Solver solver;
     Row h, y, left;
+    const bool loaded;
     double norm = 0.0;
-    Real without, size, absolute;
+    Real without, size, absolute, bent;
 
     // The draws' right sides, and the problems in numbers of order 1.
     void read(const Block &block) {
@@ -101,6 +110,10 @@ private:
                 q.M[i][c] = s.Gt[cones.column[c] * r + i] * over;
         }
         absolute = STOP * GAP_WITHOUT_CLEARANCE * without * over * over;
+        bent = s.stored * over * over;
+        absolute += STOP * (GAP + GAP_WITHOUT_CLEARANCE) * bent;
+        for (int c = 0; loaded && c < nu; ++c)
+            q.d[c] = s.d[cones.column[c]] * over * over;
     }
 
     // (r columns of a shared matrix, one row a clearance) times x.
@@ -150,28 +163,38 @@ private:
     void write(const Block &block, Whole where) {
         multiply(q.M.rows(), r, q.u.data(), nu, left.data());
         for (int i = 0; i < r; ++i) left[i] = left[i] * size + h[i];
-        const Real energy = 0.5 * inner(left.data(), left.data(), r);
-        Real worth = inner(h.data(), y.data(), r), cost = {};
-        worth -= s.slip * root(inner(y.data(), y.data(), r));
+        Real energy = 0.5 * inner(left.data(), left.data(), r), bound, cost = {};
+        const Real slip = s.slip * root(inner(y.data(), y.data(), r)) + s.slack;
         for (int i = 0; i < r; ++i) {
             Real along = {};
             for (int l = 0; l < r; ++l) along += s.gram[i * r + l] * y[l];
             cost += y[i] * along;
         }
+        Real most = {}, gains = {}, factor = real(1.0);  // of clearances
         cones.each([&](auto size, int, int at) {
-            Real squares = {};
+            Real squares = {}, work = {};
             for (int c = at; c < at + size; ++c) {
-                const Real force = product(s.forces, c, y);
+                Real force = product(s.forces, c, y);
+                if (loaded) force += s.d[cones.column[c]], work += force * q.u[c];
                 squares += force * force;
             }
-            worth -= root(squares);
+            most += root(squares);
+            gains += larger(root(squares) - work, Real{});
         });
-        // any multiple of y proves a bound: the best one, zero inside a zone
-        const Real factor = (worth > 0.0) & (cost > 0.0) ? worth / cost : Real{};
-        const Real bound = 0.5 * factor * factor * cost;
+        if (loaded) {
+            // strains that balance y, and what clearances could still gain
+            const Real off = energy - inner(left.data(), y.data(), r) + 0.5 * cost;
+            energy += s.stored;
+            bound = energy - larger(off, Real{}) - gains - slip;
+        } else {
+            const Real worth = inner(h.data(), y.data(), r) - slip - most;
+            // any multiple of y proves a bound: the best one, zero inside a zone
+            factor = (worth > 0.0) & (cost > 0.0) ? worth / cost : Real{};
+            bound = 0.5 * factor * factor * cost;
+        }
         // written so that NaN fails
         const Whole proved =
-            energy - bound <= GAP * energy + GAP_WITHOUT_CLEARANCE * without;
+            energy - bound <= GAP * energy + GAP_WITHOUT_CLEARANCE * (without + s.stored);
         for (int c = 0; c < nu; ++c)
             block.write(out.u, nu, cones.column[c], q.u[c], where);
         for (int i = 0; i < r; ++i) block.write(out.y, r, i, factor * y[i], where);

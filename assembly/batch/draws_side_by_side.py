@@ -25,9 +25,9 @@ class _Reduced(ctypes.Structure):
         *((name, ctypes.c_int64) for name in ("nu", "r", "cones")),
         *(
             (name, ctypes.c_void_p)
-            for name in ("Gt", "starts", "inverse", "forces", "gram")
+            for name in ("Gt", "starts", "inverse", "forces", "gram", "d")
         ),
-        ("slip", ctypes.c_double),
+        *((name, ctypes.c_double) for name in ("slip", "slack", "stored")),
     )
 
 
@@ -48,12 +48,16 @@ def least_energies_side_by_side(
     if library is None:
         return False
     shared = (
-        reduced.Gt, reduced.starts, reduced.inverse, reduced.cones, reduced.gram
+        reduced.Gt, reduced.starts, reduced.inverse, reduced.cones, reduced.gram,
+        reduced.d,
     )  # fmt: skip
     arrays = [np.ascontiguousarray(array) for array in (*shared, h)]
-    *fields, rows = map(address, arrays)
+    *fields, d, rows = map(address, arrays)
     nu, r = reduced.Gt.shape
-    given = _Reduced(nu, r, len(reduced.starts) - 1, *fields, reduced.slip)
+    given = _Reduced(
+        nu, r, len(reduced.starts) - 1, *fields, d if reduced.loaded else None,
+        reduced.slip, reduced.slack, reduced.stored,
+    )  # fmt: skip
     filled = (ctypes.c_void_p * len(out))(*map(address, out))
     count = ctypes.c_int64(len(h))
     library.least_energies(

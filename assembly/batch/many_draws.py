@@ -76,5 +76,5 @@ def prepare_energies(
         left=A @ moved,
         ranges=bounds[np.flatnonzero(joints.free.any(axis=1))],
         wrench=wrenches.reshape(len(robot.frames), 6, -1) / size,
-        loads=posture_loads(reduced, misfit, wrench, g) if frame_loads else None,
+        loads=posture_loads(reduced, closing, wrench, g) if frame_loads else None,
     )

@@ -7,6 +7,7 @@ whose certificate falls short, or that this does not cover, is solved again by
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,12 +22,10 @@ from assembly.linear.energy import CannotAssemble, minimise_energies, solve_asse
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN
-from assembly.solvers.conic import (
-    GAP,
-    GAP_WITHOUT_CLEARANCE,
-    SolverFailed,
-    minimise_energy,
-)
+from assembly.solvers.conic import SolverFailed
+
+if TYPE_CHECKING:
+    from assembly.batch.compiled_draws import Reduced
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +105,7 @@ class OnePosture:
             raise ValueError(
                 f"errors have shape {errors.shape}, expected (k, {n}, 6), all finite"
             )
-        if self.loads is not None:
-            return _solve_loaded(self, self.loads, errors)
-        return _solve_unloaded(self, errors)
+        return _solve_draws(self, errors)
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
         """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
@@ -118,9 +115,9 @@ class OnePosture:
         return wrenches
 
 
-def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
-    """Least energies of k draws without loads."""
-    from assembly.batch.compiled_draws import Energies, Reduced, least_energies
+def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
+    """Least energies of k draws."""
+    from assembly.batch.compiled_draws import Energies, least_energies
 
     count, n = len(errors), len(one.posture.robot.frames)
     flat = errors.reshape(-1, 6 * n)
@@ -134,39 +131,65 @@ def _solve_unloaded(one: OnePosture, errors: NDArray) -> Draws:
     screws, motions, left = (m[:, columns] for m in (one.screws, one.motions, one.left))
     # nothing is larger than this in any draw, which saves a look at each one
     most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
-    slip = np.abs(one.free).T @ (np.abs(motions) @ most)
-    reduced = Reduced(
-        Gt=np.ascontiguousarray(one.G.T),
-        starts=one.starts,
-        inverse=np.linalg.pinv(one.G),
-        cones=one.cones,
-        gram=one.on_springs.T @ one.on_springs,
-        slip=float(np.linalg.norm(slip)),
-    )
+    reduced = _reduced(one, np.abs(motions) @ most)
     h = e @ one.misfit[:, erring].T
     out = Energies(u, y, energy, bound, outcome)
     if not least_energies_side_by_side(reduced, h, out):
         least_energies(reduced, h, out)
     parts = np.hstack([u, e])
+    multipliers = y @ one.closing.T
+    screw = parts @ screws.T
+    always, open_ = np.zeros(len(motions)), np.zeros(len(left))
     fallback = (outcome > 0) | bool(len(one.H))
-    for rows, limit in ((left, np.full(len(left), OPEN)), (motions, one.ranges)):
-        if (np.abs(rows) @ most > limit).any():
-            fallback |= (np.abs(parts @ rows.T) > limit).any(axis=1)
+    if one.loads is not None:
+        always, open_ = one.loads.motions, one.closures @ one.loads.screws
+        multipliers += one.loads.multipliers
+        screw += one.platform @ one.loads.screws
+    for rows, constant, limit in (
+        (left, open_, np.full(len(left), OPEN)), (motions, always, one.ranges)
+    ):  # fmt: skip
+        if (np.abs(rows) @ most + np.abs(constant) > limit).any():
+            fallback |= (np.abs(parts @ rows.T + constant) > limit).any(axis=1)
     infeasible = np.abs(e @ one.infeasible[:, erring].T)
     fallback |= infeasible.max(axis=1, initial=0.0) > INFEASIBLE
-    multipliers = y @ one.closing.T
     rounding = closure_rounding(errors, one.joints, size_of(one.posture.robot))
-    drop_zeros(energy, bound, multipliers, rounding)
+    drop_zeros(energy, bound, multipliers, rounding, one.loads is not None)
     draws = Draws(
         energy=energy,
         bound=bound,
         clearances=u,
         multipliers=multipliers,
-        platform_screw=parts @ screws.T,
+        platform_screw=screw,
         fallback=fallback,
     )
-    _solve_fallback(one, errors, draws)
+    if one.loads is None:
+        _solve_fallback(one, errors, draws)
+    else:
+        for i in np.flatnonzero(fallback).tolist():
+            _solve_loaded_fallback(one, one.loads, errors[i], draws, i)
     return draws
+
+
+def _reduced(one: OnePosture, most: NDArray) -> "Reduced":
+    """What all draws share, free motions moving by at most (nq,) ``most``."""
+    from assembly.batch.compiled_draws import Reduced
+
+    loads, slack = one.loads, 0.0
+    if loads is not None:
+        most = most + np.abs(loads.motions)
+        slack = 2.0 * float(np.abs(loads.on_free) @ most)
+    return Reduced(
+        Gt=np.ascontiguousarray(one.G.T),
+        starts=one.starts,
+        inverse=np.linalg.pinv(one.G),
+        cones=one.cones,
+        gram=one.on_springs.T @ one.on_springs,
+        d=np.zeros(one.G.shape[1]) if loads is None else loads.d,
+        slip=float(np.linalg.norm(np.abs(one.free).T @ most)),
+        slack=slack,
+        stored=0.0 if loads is None else loads.stored,
+        loaded=loads is not None,
+    )
 
 
 def _solve_fallback(one: OnePosture, errors: NDArray, draws: Draws) -> None:
@@ -188,70 +211,6 @@ def _solve_fallback(one: OnePosture, errors: NDArray, draws: Draws) -> None:
         # joints at the end of their motion stay
         multipliers = multipliers - multipliers @ one.redundant @ one.redundant.T
     draws.multipliers[rows] = multipliers
-
-
-def _solve_loaded(one: OnePosture, loads: PostureLoads, errors: NDArray) -> Draws:
-    """Least energies of k draws under loads."""
-    count, nu = len(errors), one.G.shape[1]
-    e = errors.reshape(count, -1)
-    h = e @ one.misfit.T + loads.h
-    u, y = np.full((count, nu), np.nan), np.full(h.shape, np.nan)
-    if not len(one.H):
-        none = np.zeros((0, nu)), np.zeros(0)
-        for i in range(count):
-            try:
-                least = minimise_energy(one.G, h[i], loads.d, *none, one.joints.group)
-            except SolverFailed:
-                continue
-            u[i], y[i] = least.clearances, least.springs
-    springs = (u @ one.G.T + h) @ loads.spread.T + loads.springs
-    parts = np.hstack([u, e])
-    motions = parts @ one.motions.T + loads.motions
-    multipliers = loads.multipliers + y @ one.closing.T
-    energy = (springs**2).sum(axis=1) / 2
-    gap = _loaded_gaps(one, loads, e, u, springs, motions, multipliers)
-    residual = parts @ one.left.T + one.closures @ loads.screws
-    residual = np.abs(residual).max(axis=1, initial=0.0)
-    infeasible = np.abs(e @ one.infeasible.T).max(axis=1, initial=0.0)
-    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * (h**2).sum(axis=1) / 2
-    # written so that NaN is not certified
-    certified = (gap <= allowed) & (residual <= OPEN) & (infeasible <= INFEASIBLE)
-    certified &= (np.abs(motions) <= one.ranges).all(axis=1)
-    draws = Draws(
-        energy=energy,
-        bound=energy - np.abs(gap),
-        clearances=u,
-        multipliers=multipliers,
-        platform_screw=parts @ one.screws.T + one.platform @ loads.screws,
-        fallback=~certified,
-    )
-    for i in np.flatnonzero(draws.fallback).tolist():
-        _solve_loaded_fallback(one, loads, errors[i], draws, i)
-    return draws
-
-
-def _loaded_gaps(
-    one: OnePosture, loads: PostureLoads, e: NDArray, u: NDArray, springs: NDArray,
-    motions: NDArray, multipliers: NDArray,
-) -> NDArray:  # fmt: skip
-    """(k,) [J] energy minus work, less its certified lower bound."""
-    # the bound is that of assembly.linear.assembled.Assembly, on the whole problem
-    joints, on_frames = one.joints, loads.frame_loads
-    closing = multipliers @ one.closures
-    body, joint = closing + on_frames.body, closing + on_frames.joint
-    on_springs = np.where(joints.links, body @ joints.elastic, joint @ joints.elastic)
-    on_cones = (joint @ joints.cones) ** 2
-    sizes = on_cones
-    if u.size:
-        sizes = np.sqrt(np.add.reduceat(on_cones, one.starts[:-1], axis=1))
-    slip = np.abs(joint @ joints.free) * np.abs(motions)
-    bound = -(body * e).sum(axis=1) - (on_springs**2).sum(axis=1) / 2
-    bound = bound - sizes.sum(axis=1) - slip.sum(axis=1)
-    of_links = (springs * joints.links) @ joints.elastic.T
-    of_joints = (springs * ~joints.links) @ joints.elastic.T
-    of_joints = of_joints + u @ joints.cones.T + motions @ joints.free.T
-    work = (e + of_links) @ on_frames.body + of_joints @ on_frames.joint
-    return (springs**2).sum(axis=1) / 2 - work - bound
 
 
 def _solve_loaded_fallback(

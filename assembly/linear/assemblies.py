@@ -21,7 +21,7 @@ from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 # second, why the point went to the fallback
 OUTCOMES = (
     "dual Newton", "interior point", "rigid rows", "rank in doubt", "uncertified",
-    "bounded joint", "loads",
+    "bounded joint", "free motion", "one by one",
 )  # fmt: skip
 COMPILED = 2
 
@@ -39,7 +39,8 @@ class Assemblies(PointResults[Assembly]):
     Attributes:
         energy: (k,) [J] stored; NaN where there is no solution, see ``status``.
         bound: (k,) [J] certified lower bound.
-        energy_without_clearance: (k,) [J] least energy with all clearances at zero.
+        energy_without_clearance: (k,) [J] energy stored with all clearances at zero.
+        work: (k,) [J] of the loads on all but the errors.
         platform_screw: (k, 6) [rad, m] pose error at the platform's origin, base axes.
         closure_residual: (k,) [rad, reference lengths] largest gap left in a closure.
         clearance_excess: (k,) [-] by how much the worst clearance leaves its cone.
@@ -48,6 +49,7 @@ class Assemblies(PointResults[Assembly]):
         motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         outcome: (k,) index into :data:`OUTCOMES`.
+        loaded: (k,) bool, points under loads.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
             there is no solution or its certificate falls short.
         reason: (k,) message where the status is not ok.
@@ -58,6 +60,7 @@ class Assemblies(PointResults[Assembly]):
     energy: NDArray
     bound: NDArray
     energy_without_clearance: NDArray
+    work: NDArray
     platform_screw: NDArray
     closure_residual: NDArray
     clearance_excess: NDArray
@@ -65,6 +68,7 @@ class Assemblies(PointResults[Assembly]):
     motions: NDArray
     multipliers: NDArray
     outcome: NDArray
+    loaded: NDArray
     status: NDArray
     reason: NDArray
     joints: VirtualJoints
@@ -85,11 +89,6 @@ class Assemblies(PointResults[Assembly]):
         """Point i with its wrenches; raises where there is no solution."""
         return self.one(range(len(self))[i])
 
-    @property
-    def loaded(self) -> NDArray:
-        """(k,) bool: points under loads."""
-        return self.outcome == OUTCOMES.index("loads")
-
     @cached_property
     def gap(self) -> NDArray:
         """(k,) [J] certified: no energy is more than this above the least possible."""
@@ -97,9 +96,12 @@ class Assemblies(PointResults[Assembly]):
 
     @cached_property
     def certified(self) -> NDArray:
-        """(k,) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance."""
-        allowed = GAP * self.energy
-        allowed = allowed + GAP_WITHOUT_CLEARANCE * self.energy_without_clearance
+        """(k,) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance.
+
+        Under loads also + 1e-12 of their work.
+        """
+        largest = self.energy_without_clearance + np.abs(self.work)
+        allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest
         return (self.gap <= allowed) & (self.status == "ok")
 
     def fallbacks(self) -> dict[str, int]:
@@ -125,6 +127,7 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
         energy=np.array([assembly.energy]),
         bound=unknown,
         energy_without_clearance=np.array([assembly.energy_without_clearance]),
+        work=np.array([assembly.work]),
         platform_screw=assembly.platform_screw[None],
         closure_residual=unknown,
         clearance_excess=unknown,
@@ -132,6 +135,7 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
         motions=assembly.motions[None],
         multipliers=assembly.multipliers[None],
         outcome=np.zeros(1, dtype=int),
+        loaded=np.array([bool(assembly.frame_loads)]),
         status=np.full(1, "ok", dtype=object),
         reason=np.full(1, "", dtype=object),
         joints=assembly.joints,
@@ -140,7 +144,7 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
 
 
 def solve_each(robot: Robot, count: int, one: Callable[[int], Assembly]) -> Assemblies:
-    """Least energies of points that are solved one by one, under loads for instance.
+    """Least energies of points under loads that are solved one by one.
 
     Args:
         robot: of all points.
@@ -159,13 +163,15 @@ def solve_each(robot: Robot, count: int, one: Callable[[int], Assembly]) -> Asse
         energy=unknown(),
         bound=unknown(),
         energy_without_clearance=unknown(),
+        work=unknown(),
         platform_screw=unknown(6),
         closure_residual=unknown(),
         clearance_excess=unknown(),
         clearances=unknown(joints.cones.shape[1]),
         motions=unknown(joints.free.shape[1]),
         multipliers=unknown(6 * len(robot.closures)),
-        outcome=np.full(count, OUTCOMES.index("loads")),
+        outcome=np.full(count, OUTCOMES.index("one by one")),
+        loaded=np.ones(count, dtype=bool),
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
         joints=joints,
@@ -192,9 +198,9 @@ def solve_again(energies: Assemblies, i: int) -> None:
         i: which.
     """
     a = energies
-    for values in (a.energy, a.bound, a.energy_without_clearance, a.platform_screw,
-                   a.closure_residual, a.clearance_excess, a.clearances, a.motions,
-                   a.multipliers):  # fmt: skip
+    for values in (a.energy, a.bound, a.energy_without_clearance, a.work,
+                   a.platform_screw, a.closure_residual, a.clearance_excess,
+                   a.clearances, a.motions, a.multipliers):  # fmt: skip
         values[i] = np.nan
     try:
         assembly = a.one(i)
@@ -203,6 +209,7 @@ def solve_again(energies: Assemblies, i: int) -> None:
         return
     a.energy[i] = assembly.energy
     a.energy_without_clearance[i] = assembly.energy_without_clearance
+    a.work[i] = assembly.work
     a.platform_screw[i] = assembly.platform_screw
     a.closure_residual[i] = assembly.closure_residual()
     a.clearance_excess[i] = assembly.clearance_excess()

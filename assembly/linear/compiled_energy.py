@@ -1,13 +1,16 @@
-"""Problem (22) without loads, compiled from the frames' poses to the certified answer.
+"""Problem (22), compiled from the frames' poses to the certified answer.
 
 Points that this does not cover go to the fallback, with a code for the reason.  A point
 counts as solved only if its certificate, computed from the wrenches on the problem
 before any elimination, proves the gap asked for.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.compiled_loads import Loaded, balance, loaded_gap, unloaded
 from assembly.linear.compiled_reduction import (
     eliminate,
     eliminate_springs,
@@ -36,17 +39,17 @@ from assembly.solvers.vectors import (
     vector,
 )
 
-NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED = range(6)
+NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN = range(7)
 _STOP = 3e-3  # the solvers stop at this fraction of the accepted gap
 # gap from which Newton's method finishes: of the energy, of that without clearance
-_NEAR, _NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
+NEAR, NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _FIRST_SIGMA = 1e6  # after the interior-point method, see dual_newton
 
 
 @kernel
 def assemble_all(
-    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
+    s: Structure, T: NDArray, errors: NDArray, mismatch: NDArray, loads: NDArray,
     out: Solutions,
 ) -> None:  # fmt: skip
     """Solve every point; see :class:`~assembly.linear.solutions.Solutions`.
@@ -56,6 +59,8 @@ def assemble_all(
         T: (k, n, 4, 4) frames.
         errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
+        loads: (k, 2, n, 6) [N m, N] on bodies and on joints in the frames' axes; no
+            rows if there are none.
         out: arrays to fill.
     """
     for point in range(len(T)):
@@ -76,33 +81,73 @@ def assemble_all(
             continue
         # the reduced problem in the clearances
         Gt, h = small_problem(s, P, Z, rank, known)
+        under = unloaded(s, Z.shape[1])
+        if len(loads):
+            under = balance(s, P, loads[point], reduced.free, Z, reduced.springs)
+        if under.driven:
+            out.outcome[point] = DRIVEN
+            continue
         u, v, y = vector(len(Gt)), vector(rank), vector(rank)
-        outcome = _minimise(s, Gt, h, u, v, y)
+        outcome = _minimise(s, Gt, h, under, u, v, y)
         # back to the full problem
-        _least_multipliers(Z, rank, y, out.multipliers[point])
+        closing = vector(Z.shape[1])
+        for i in range(rank):
+            for a in range(len(closing)):
+                closing[a] += Z[i, a] * y[i]
+        multipliers = out.multipliers[point]
+        for a in range(len(closing)):
+            multipliers[a] = closing[a] + under.holding[a]
+        _least_multipliers(Z, rank, multipliers)
         for c in range(len(u)):
             out.clearances[point, c] = u[c]
+        for i in range(rank):
+            v[i] -= under.left[i]
         spring = vector(Y.shape[1])
         copy(v, spring)
         turn(Y, y_turns, rank, spring)
         if len(out.elastic):
             own_springs(s, P, spring, out.elastic[point])
-        out.energy[point] = 0.5 * inner(v, v)
-        out.without_clearance[point] = 0.5 * inner(h, h)
+            for c in range(len(under.tight)):
+                out.elastic[point, s.spring_order[c]] += under.tight[c]
+        out.energy[point] = 0.5 * inner(v, v) + under.stored + inner(v, under.left)
+        out.without_clearance[point] = 0.5 * inner(h, h) + under.stored
         moved = moved_by(s, P, L, u, spring, known, out.platform_screw[point])
+        if len(loads):
+            _move_tight(s, P, under.tight, moved, out.platform_screw[point])
         motions = out.motions[point]
         least_motions(F, turns, diagonal, order, free, moved, motions)
-        out.outcome[point] = _certify(point, s, P, own, moved, outcome, out)
+        if len(loads):
+            # t is orthogonal to what closures do to springs
+            work = 2.0 * under.stored + inner(under.d, u)
+            out.work[point] = work + inner(under.holding, known)
+        gap = -1.0  # without loads the best multiple of the wrenches says it
+        if len(loads):
+            strains = v, spring
+            gap = loaded_gap(s, P, L, under, closing, strains, u, motions, multipliers)
+        out.outcome[point] = _certify(point, s, P, own, moved, outcome, gap, out)
 
 
 @part
-def _least_multipliers(Z: Matrix, rank: int, y: Vector, multipliers: Vector) -> None:
+def _move_tight(
+    s: Structure, P: Matrices, tight: Vector, moved: Vector, screw: Vector
+) -> None:
+    """Adds what loads alone bend to what closures are open, and to the screw."""
+    for c in range(len(tight)):
+        j = s.spring_frame[c]
+        for axis in range(6):
+            strain = s.springs[c, axis] * tight[c]
+            if strain != 0.0:
+                for a in range(6):
+                    step = P[j, axis, a] * strain
+                    screw[a] += s.on_path[j] * step
+                    for k in range(len(moved) // 6):
+                        moved[6 * k + a] += s.patterns[s.pattern_of[j], k] * step
+
+
+@part
+def _least_multipliers(Z: Matrix, rank: int, multipliers: Vector) -> None:
     """Multipliers of the closures, the least ones where they are not unique."""
     m = len(multipliers)
-    for a in range(m):
-        multipliers[a] = 0.0
-        for i in range(rank):
-            multipliers[a] += Z[i, a] * y[i]
     # nothing feels those along Z's other rows, made orthonormal here
     for i in range(rank, len(Z)):
         for l in range(rank, i):
@@ -119,7 +164,7 @@ def _least_multipliers(Z: Matrix, rank: int, y: Vector, multipliers: Vector) -> 
 @part
 def _certify(
     point: int, s: Structure, P: Matrices, errors: Matrix, moved: Vector, outcome: int,
-    out: Solutions,
+    gap: float, out: Solutions,
 ) -> int:  # fmt: skip
     """The certificate on the problem before elimination, and the platform screw."""
     m = len(moved)
@@ -141,20 +186,23 @@ def _certify(
                     screw[a] += P[j, axis, a] * errors[j, axis]
     for a in range(3, 6):
         screw[a] *= s.size
-    residual, work = 0.0, 0.0
+    residual, slip = 0.0, 0.0
     for a in range(m):
         residual = max(residual, abs(moved[a]))
-        work += abs(moved[a] * out.multipliers[point, a])
+        slip += abs(moved[a] * out.multipliers[point, a])
     out.residual[point] = residual
-    gain, cost = _complementary(s, P, errors, out.multipliers[point], motions)
-    # any multiple of the wrenches proves a bound: the best one, zero inside a zone
-    factor = max(0.0, gain - work) / cost if cost > 0.0 else 0.0
-    bound = 0.5 * factor * factor * cost
-    for a in range(m):
-        out.multipliers[point, a] *= factor
-    out.bound[point] = bound
     energy = out.energy[point]
-    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * out.without_clearance[point]
+    bound = energy - gap - slip
+    if gap < 0.0:
+        gain, cost = _complementary(s, P, errors, out.multipliers[point], motions)
+        # any multiple of the wrenches proves a bound: the best one, zero inside a zone
+        factor = max(0.0, gain - slip) / cost if cost > 0.0 else 0.0
+        bound = 0.5 * factor * factor * cost
+        for a in range(m):
+            out.multipliers[point, a] *= factor
+    out.bound[point] = bound
+    largest = out.without_clearance[point] + abs(out.work[point])
+    allowed = GAP * energy + GAP_WITHOUT_CLEARANCE * largest
     # written so that NaN fails
     if energy - bound <= allowed and residual <= OPEN:
         return outcome
@@ -201,25 +249,31 @@ def _complementary(
 
 @part
 def _minimise(
-    s: Structure, Gt: Matrix, h: Vector, u: Vector, v: Vector,
+    s: Structure, Gt: Matrix, h: Vector, under: Loaded, u: Vector, v: Vector,
     y: Vector,
 ) -> int:  # fmt: skip
-    """Least |G u + h|^2 / 2: u, v = G u + h, and the multipliers y (close to v)."""
+    """Least |G u + h|^2 / 2 - d.u: u, v = G u + h, and multipliers y (close to v)."""
     nu, r = Gt.shape
     outcome = NEWTON
-    size = np.sqrt(inner(h, h))
-    if nu == 0 or size == 0.0:
+    size, most = np.sqrt(inner(h, h)), 0.0
+    for c in range(nu):
+        most = max(most, abs(under.d[c]))
+    if nu == 0 or size + most == 0.0:
         copy(h, y)
         copy(h, v)
         return outcome
     for c in range(nu):
         size = max(size, np.sqrt(inner(Gt[c], Gt[c])))
-    G, right = matrix(nu, r), divide(h, size)
+    size = max(size, np.sqrt(most))
+    G, right, d = matrix(nu, r), divide(h, size), divide(under.d, size * size)
     for c in range(nu):
         for i in range(r):
             G[c, i] = Gt[c, i] / size
-    absolute = _STOP * GAP_WITHOUT_CLEARANCE * 0.5 * inner(right, right)
-    outcome = small_answer(G, right, s.starts, _STOP * GAP, absolute, u, y)
+    without, bent = 0.5 * inner(right, right), under.stored / (size * size)
+    absolute = GAP_WITHOUT_CLEARANCE * without + (GAP + GAP_WITHOUT_CLEARANCE) * bent
+    near = NEAR_WITHOUT_CLEARANCE * without + (NEAR + NEAR_WITHOUT_CLEARANCE) * bent
+    limits = Limits(_STOP * GAP, _STOP * absolute, near)
+    outcome = small_answer(G, right, d, s.starts, limits, u, y)
     for i in range(r):
         v[i] = h[i]
         y[i] *= size
@@ -228,22 +282,35 @@ def _minimise(
     return outcome
 
 
+class Limits(NamedTuple):
+    """Gaps asked for.
+
+    Attributes:
+        relative: of the strains' energy ..
+        absolute: .. plus this.
+        near: gap beside 1e-8 of that energy from which Newton's method finishes.
+    """
+
+    relative: float
+    absolute: float
+    near: float
+
+
 @part
 def small_answer(
-    Gt: Matrix, h: Vector, starts: Indices, relative: float,
-    absolute: float, u: Vector, y: Vector,
+    Gt: Matrix, h: Vector, d: Vector, starts: Indices, limits: Limits, u: Vector,
+    y: Vector,
 ) -> int:  # fmt: skip
     """Newton alone where all constraints are active, else after an interior point."""
-    r, d = len(h), vector(len(u))
-    dual = Dual(Gt, h, d, r, starts, relative, absolute)
+    relative, absolute, near = limits
+    dual = Dual(Gt, h, d, len(h), starts, relative, absolute)
     if dual_newton(dual, _STEPS_ALONE, 0.0, u, y) >= 0:
         return NEWTON
     G, H = np.ascontiguousarray(Gt.T), matrix(0, len(u))
     programme = Programme(G, h, d, H, vector(0), starts)
-    near = _NEAR_WITHOUT_CLEARANCE * 0.5 * inner(h, h)
     # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (
-        (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
+        (NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
         inside, _, _ = interior_point(programme, most, stop)
         copy(inside, u)

@@ -105,7 +105,7 @@ def largest_spring(s: Structure, P: Matrices) -> float:
     """Largest entry of the springs' closure columns, for the noise floor."""
     largest = 0.0
     column = vector(6)
-    for c in range(len(s.springs)):
+    for c in range(s.groups[len(s.groups) - 1]):
         fill(column, 0.0)
         for axis in range(6):
             weight = s.springs[c, axis]

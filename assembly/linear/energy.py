@@ -1,12 +1,12 @@
 """The least energy that closes a manipulator, problem (22): one answer or many.
 
 Compiled from the frames' poses to the certificate
-(:mod:`assembly.linear.compiled_energy`): about a tenth of a millisecond a point.  What
-this does not cover, or where its certificate falls short, is solved by
-:mod:`assembly.linear.fallback`, and is counted.
+(:mod:`assembly.linear.compiled_energy`), with loads and without: about a tenth of a
+millisecond a point.  What this does not cover, or where its certificate falls short, is
+solved by :mod:`assembly.linear.fallback`, and is counted.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import overload
 
@@ -21,7 +21,6 @@ from assembly.linear.assemblies import (
     Assemblies,
     excess_of,
     solve_again,
-    solve_each,
 )
 from assembly.linear.closure import checked_size, linearise
 from assembly.linear.device import assemble_on_device
@@ -45,8 +44,12 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 
 __all__ = [
-    "Assemblies", "Assembly", "CannotAssemble", "minimise_energies", "solve_assembly",
+    "Assemblies", "Assembly", "CannotAssemble", "minimise_energies",
+    "minimise_under_loads", "solve_assembly",
 ]  # fmt: skip
+
+# structure, frames, errors, closure errors of the frames, rows to fill
+_Given = tuple[Structure, NDArray, NDArray, NDArray, Solutions]
 
 
 @overload
@@ -114,44 +117,57 @@ def solve_assembly(
     mismatch = np.array([p.mismatch for p in postures])
     if load is None and bodies is None and gravity is None:
         return minimise_energies(robot, T, sets, mismatch)
+    where = posture if isinstance(posture, Posture) else Posture(
+        robot, np.array([p.coordinates for p in postures]), T, float(mismatch.max())
+    )  # fmt: skip
+    loads = all_loads(where, load, bodies, gravity)
     at = partial(_posture_at, robot, T, sets, mismatch)
-    return solve_each(robot, len(T), lambda i: _solve_one(at(i), load, bodies, gravity))
+    return minimise_under_loads(
+        robot, T, loads, lambda i: _solve_one(at(i), load, bodies, gravity), sets,
+        mismatch,
+    )  # fmt: skip
 
 
 def _solve_one(
     posture: Posture, load: ArrayLike | None, bodies: ArrayLike | None,
     gravity: ArrayLike | None,
 ) -> Assembly:  # fmt: skip
-    """One posture: compiled without loads, else, or in doubt, the fallback."""
+    """One posture: compiled, or, in doubt, the fallback."""
     frame_loads = None
     if load is not None or bodies is not None or gravity is not None:
-        frame_loads = all_loads(posture, load, bodies, gravity)
-    if not frame_loads:
-        assembly = _compiled_assembly(posture)
-        if assembly is not None:
-            return assembly
+        frame_loads = all_loads(posture, load, bodies, gravity) or None
+    assembly = _compiled_assembly(posture, load, frame_loads)
+    if assembly is not None:
+        return assembly
     return reference_assembly(posture, load, bodies, gravity)
 
 
-def _compiled_assembly(posture: Posture) -> Assembly | None:
-    """One posture without loads; None where it is left to the fallback."""
+def _compiled_assembly(
+    posture: Posture, load: ArrayLike | None, frame_loads: FrameLoads | None
+) -> Assembly | None:
+    """One posture; None where it is left to the fallback."""
     robot = posture.robot
     rounding = _rounding_of(robot)
     joints, _ = structure_of(robot)
     out = _solve_compiled(
         robot, posture.transforms[None], robot.errors[None],
         np.array([posture.mismatch]), "elastic", len(joints.links),
+        None if frame_loads is None else frame_loads.rows(1),
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
         return None
-    drop_zeros(out.energy, out.bound, out.multipliers, out.residual + rounding)
+    residual = out.residual + rounding
+    loaded = frame_loads is not None
+    drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
     multipliers = out.multipliers[0]
+    # without loads no wrenches mean no deformation but rounding
+    bent = len(out.elastic) > 0 and (loaded or multipliers.any())
     assembly = Assembly(
         linearisation=linearise(posture),
         joints=joints,
-        load=np.zeros(6),
-        frame_loads=FrameLoads(*np.zeros((2, robot.errors.size))),
-        elastic=out.elastic[0] if multipliers.any() else np.zeros(len(joints.links)),
+        load=np.zeros(6) if load is None else np.array(load, dtype=float),
+        frame_loads=frame_loads or FrameLoads(*np.zeros((2, robot.errors.size))),
+        elastic=out.elastic[0] if bent else np.zeros(len(joints.links)),
         clearances=out.clearances[0],
         motions=out.motions[0],
         multipliers=multipliers,
@@ -171,9 +187,15 @@ def _rounding_of(robot: Robot) -> float:
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
+def _any_load(loads: NDArray | None, count: int) -> NDArray:
+    """(k,) bool: which points are under loads."""
+    rows = np.zeros((count, 1)) if loads is None else loads.reshape(count, -1)
+    return np.any(rows, axis=1)
+
+
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
-    springs: int,
+    springs: int, loads: NDArray | None,
 ) -> Solutions:  # fmt: skip
     """Rows of k points, and of the deformations of so many springs."""
     joints, structure = structure_of(robot, compliant)
@@ -183,6 +205,7 @@ def _solve_compiled(
         energy=np.zeros(count),
         bound=np.zeros(count),
         without_clearance=np.zeros(count),
+        work=np.zeros(count),
         platform_screw=np.zeros((count, 6)),
         clearances=np.zeros((count, joints.cones.shape[1])),
         motions=np.zeros((count, joints.free.shape[1])),
@@ -190,42 +213,61 @@ def _solve_compiled(
         residual=np.zeros(count),
         elastic=np.zeros((count if springs else 0, springs)),
     )
+    given = structure, T, errors, mismatch, out
+    loaded = _any_load(loads, count)
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
-    elif errors.any():  # else nothing has to move, and zeros are the answer
-        given = structure, T, errors, mismatch, out
-        if assemble_on_device(*given) or assemble_side_by_side(*given):
-            _solve_left(structure, T, errors, mismatch, out)
-        else:
-            _by_numba(structure, T, errors, mismatch, out)
+    elif loaded.all() or not loaded.any():
+        _fill(given, loads if loaded.any() else None)
+    else:  # points that no load acts on have the bits of those without
+        _fill_some(_fill, loaded, given, loads)
+        _fill_some(_fill, ~loaded, given, None)
     return out
 
 
-def _by_numba(
-    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: Solutions,
-) -> None:  # fmt: skip
+def _fill(given: _Given, loads: NDArray | None) -> None:
+    """Every point, by what there is: a device, a compiler for C++, numba."""
+    structure, T, errors, mismatch, out = given
+    if loads is None and not errors.any():
+        return  # nothing has to move, and zeros are the answer
+    if loads is None and assemble_on_device(*given):
+        pass
+    elif not assemble_side_by_side(*given, loads):
+        return _fill_by_numba(given, loads)
+    # what was not certified side by side; rounding is another
+    left = out.outcome >= COMPILED
+    if left.any():
+        _fill_some(_fill_by_numba, left, given, loads)
+
+
+def _fill_by_numba(given: _Given, loads: NDArray | None) -> None:
     """One point after the other; numba's functions know writable arrays only."""
     from assembly.linear.compiled_energy import assemble_all
 
-    T, errors = (np.require(rows, requirements=["C", "W"]) for rows in (T, errors))
-    assemble_all(structure, T, errors, mismatch, out)
+    structure, T, errors, mismatch, out = given
+    none = np.zeros((0, 2, T.shape[1], 6))
+    T, errors, loads = (
+        np.require(rows, requirements=["C", "W"])
+        for rows in (T, errors, none if loads is None else loads)
+    )
+    assemble_all(structure, T, errors, mismatch, loads, out)
 
 
-def _solve_left(
-    structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: Solutions,
+def _fill_some(
+    fill: Callable[[_Given, NDArray | None], None], some: NDArray, given: _Given,
+    loads: NDArray | None,
 ) -> None:  # fmt: skip
-    """By numba what side by side was not certified; rounding there is another."""
-    if out.outcome.max(initial=0) < COMPILED:
-        return
-    left = np.flatnonzero(out.outcome >= COMPILED)
-    again = Solutions._make(rows[left] if len(rows) else rows for rows in out)
-    own = errors[left] if len(errors) > 1 else errors
-    _by_numba(structure, T[left], own, mismatch[left], again)
+    """Fill the rows of some of the points."""
+    structure, T, errors, mismatch, out = given
+    again = Solutions._make(rows[some] if len(rows) else rows for rows in out)
+    own = errors[some] if len(errors) > 1 else errors
+    fill(
+        (structure, T[some], own, mismatch[some], again),
+        None if loads is None else loads[some],
+    )
     for rows, solved in zip(out, again, strict=True):
         if len(rows):
-            rows[left] = solved
+            rows[some] = solved
 
 
 def minimise_energies(
@@ -268,18 +310,53 @@ def minimise_energies(
         )
     all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
-    joints, structure = structure_of(robot, compliant)
-    out = _solve_compiled(robot, T, all_errors, off, compliant, 0)
     at = partial(_posture_at, robot, T, all_errors, off)
 
     def one(i: int) -> Assembly:
         assembly = _solve_one(at(i), None, None, None)
         return without_own_springs(assembly) if compliant == "hinged" else assembly
 
+    return _minimise_all(robot, T, all_errors, off, compliant, None, one)
+
+
+def minimise_under_loads(
+    robot: Robot, transforms: NDArray, loads: FrameLoads,
+    one: Callable[[int], Assembly], errors: NDArray | None = None,
+    mismatch: ArrayLike = 0.0,
+) -> Assemblies:  # fmt: skip
+    """The same under loads.
+
+    Args:
+        robot: of n frames.
+        transforms: (k, n, 4, 4) frames seen from the base.
+        loads: (6n,) or (k, 6n), as of :func:`assembly.linear.load.loads_on_frames`.
+        one: solves a point by itself.
+        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
+        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+
+    Returns:
+        Energies, screws and certificates, in the order given.
+    """
+    T = np.require(transforms, dtype=float, requirements=["C", "W"])
+    own = robot.errors if errors is None else errors
+    own = np.require(own.reshape(-1, T.shape[1], 6), requirements=["C", "W"])
+    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
+    return _minimise_all(robot, T, own, off, "elastic", loads.rows(len(T)), one)
+
+
+def _minimise_all(
+    robot: Robot, T: NDArray, errors: NDArray, off: NDArray, compliant: Compliant,
+    loads: NDArray | None, one: Callable[[int], Assembly],
+) -> Assemblies:  # fmt: skip
+    """All points compiled; one by one what that leaves."""
+    joints, structure = structure_of(robot, compliant)
+    out = _solve_compiled(robot, T, errors, off, compliant, 0, loads)
+    count = len(T)
     energies = Assemblies(
         energy=out.energy,
         bound=out.bound,
         energy_without_clearance=out.without_clearance,
+        work=out.work,
         platform_screw=out.platform_screw,
         closure_residual=out.residual,
         clearance_excess=excess_of(out.clearances, structure.starts),
@@ -287,6 +364,7 @@ def minimise_energies(
         motions=out.motions,
         multipliers=out.multipliers,
         outcome=out.outcome,
+        loaded=_any_load(loads, count),
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
         joints=joints,
@@ -295,8 +373,10 @@ def minimise_energies(
     for i in np.flatnonzero(out.outcome >= COMPILED).tolist():
         solve_again(energies, i)
     residual = energies.closure_residual
-    residual = residual + closure_rounding(all_errors, joints, structure.size)
-    drop_zeros(energies.energy, energies.bound, energies.multipliers, residual)
+    residual = residual + closure_rounding(errors, joints, structure.size)
+    drop_zeros(
+        energies.energy, energies.bound, energies.multipliers, residual, energies.loaded
+    )
     return energies
 
 

@@ -1,4 +1,4 @@
-// Problems (22), without loads, (21) and (27), and the classical compliance, several
+// Problems (22), (21) and (27), and the classical compliance, several
 // postures side by side.
 #include "cpp/assembled.h"
 #include "cpp/compliances.h"

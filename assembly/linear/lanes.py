@@ -23,8 +23,8 @@ SOURCE = "assembly/linear/lanes.cpp"
 FEW_LANES = "assembly/linear/few_lanes.cpp"
 _ARRAYS = (
     "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
-    "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis", "cone_size",
-    "starts", "free_frame", "free_axis", "free_bound",
+    "of_joint", "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis",
+    "cone_size", "starts", "free_frame", "free_axis", "free_bound",
 )  # fmt: skip
 _COUNTS = ("n", "closures", "np", "ny", "ng", "nu", "cones", "nq")
 _KEPT = 64  # robots whose arrays' addresses are known
@@ -43,18 +43,18 @@ class RobotRecord(ctypes.Structure):
 
 
 class PointsRecord(ctypes.Structure):
-    """``Points`` of lanes.cpp; ``erring`` may be left out."""
+    """``Points`` of lanes.cpp; ``erring`` and ``loads`` may be left out."""
 
     _fields_ = (
         ("count", ctypes.c_int64), ("T", ctypes.c_void_p), ("errors", ctypes.c_void_p),
         ("mismatch", ctypes.c_void_p), ("own_errors", ctypes.c_int64),
-        ("erring", ctypes.c_void_p),
+        ("erring", ctypes.c_void_p), ("loads", ctypes.c_void_p),
     )  # fmt: skip
 
 
 def assemble_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: Solutions,
+    out: Solutions, loads: NDArray | None = None,
 ) -> bool:  # fmt: skip
     """Solve every point; see :class:`~assembly.linear.solutions.Solutions`.
 
@@ -64,11 +64,13 @@ def assemble_side_by_side(
         errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         out: arrays to fill.
+        loads: (k, 2, n, 6) [N m, N] on bodies and on joints in the frames' axes.
 
     Returns:
         Whether it did; not where there is no compiler.
     """
-    return _side_by_side("assemble_all", structure, (T, errors, mismatch), out)
+    points = (T, errors, mismatch)
+    return _side_by_side("assemble_all", structure, points, out, loads=loads)
 
 
 def margins_side_by_side(
@@ -144,7 +146,7 @@ def compliances_side_by_side(
 
 def _side_by_side(
     name: str, structure: Structure, points: tuple[NDArray, NDArray, NDArray],
-    *tables: tuple[NDArray | int, ...],
+    *tables: tuple[NDArray | int, ...], loads: NDArray | None = None,
 ) -> bool:  # fmt: skip
     """Call a function of the library on every point; whether it did."""
     # tables are what its other arguments point to: addresses of arrays, in their order
@@ -154,6 +156,7 @@ def _side_by_side(
     if library is None:
         return False
     given = PointsRecord(len(T), *map(_address, points), len(errors) > 1)
+    given.loads = None if loads is None else _address(loads)
     rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
     getattr(library, name)(*map(ctypes.byref, (_robot(structure), given, *rows)))
     return True

@@ -25,7 +25,6 @@ from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import declared_section
-from stiffness.screws import screw_map
 
 _LARGEST_LOAD = (
     1e60  # [N m, N] weights of the largest masses at the largest gravity included
@@ -46,6 +45,22 @@ class FrameLoads:
 
     def __bool__(self) -> bool:
         return bool(np.any(self.body) or np.any(self.joint))
+
+    def rows(self, count: int) -> NDArray:
+        """The loads as compiled functions read them.
+
+        Args:
+            count: k; one row serves all.
+
+        Returns:
+            (k, 2, n, 6) [N m, N] on bodies and on joints.
+        """
+        rows = np.stack([self.body, self.joint], axis=-2)
+        rows = rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
+        if len(rows) == count:
+            return rows
+        every = np.broadcast_to(rows, (count, *rows.shape[1:]))
+        return np.require(every, requirements=["C", "W"])
 
 
 def loads_on_frames(
@@ -72,27 +87,44 @@ def loads_on_frames(
     for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
         _check(whose, given, _LARGEST_LOAD, "N m, N")
     robot, T = posture.robot, posture.transforms
-    on_body, after = np.zeros((2, *T.shape[:-2], 6))
+    lead, n = T.shape[:-3], len(robot.frames)
+    given = np.zeros((*lead, 2, n, 6))
+    own, after = given[..., 0, :, :], given[..., 1, :, :]
     if bodies is not None:
-        on_body += np.asarray(bodies, dtype=float)
+        own += np.asarray(bodies, dtype=float)
     if carried is not None:
         after += np.asarray(carried, dtype=float)
     if load is not None:
-        on_body[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
-    flat = (*T.shape[:-3], 6 * len(robot.frames))
-    if not (on_body.any() or after.any()):
-        return FrameLoads(*np.zeros((2, *flat)))
-    # all read at the platform's origin, then summed over what each frame carries
-    read = screw_map(posture.platform[..., None, :3, 3] - T[..., :3, 3])
-    own = np.einsum("...ij,...i->...j", read, on_body)
-    after = np.einsum("...ij,...i->...j", read, after)
-    below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
-    joint = below @ (own + after) + after
-    paths = posture.paths
-    return FrameLoads(
-        np.einsum("...ji,...j->...i", paths, joint + own).reshape(flat),
-        np.einsum("...ji,...j->...i", paths, joint).reshape(flat),
-    )
+        own[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
+    acting = np.flatnonzero(given.reshape(-1, n, 6).any(axis=(0, 2)))
+    if acting.size:
+        # all read at the platform's origin, then summed over what each frame carries
+        arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
+        if acting.tolist() != [robot.index(robot.platform)]:  # which is there
+            given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
+        after += _beyond(robot)[:, acting] @ (own + after)[..., acting, :]
+        own += after
+        halves = _moved(given, -arms).reshape(*lead, 2, n, 2, 3)
+        given = halves @ T[..., None, :, :3, :3]
+    on = given.reshape(*lead, 2, 6 * n)
+    return FrameLoads(on[..., 0, :], on[..., 1, :])
+
+
+@lru_cache(maxsize=16)
+def _beyond(robot: Robot) -> NDArray:
+    """(n, n) 1 where a frame, the column, is carried by another, the row."""
+    return (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T.astype(float)
+
+
+def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
+    """(..., n, 6) wrenches that act at arms (..., n, 3), read at the origin."""
+    read = wrenches.copy()
+    x, y, z = (arms[..., a] for a in range(3))
+    fx, fy, fz = (wrenches[..., a] for a in range(3, 6))
+    read[..., 0] += y * fz - z * fy
+    read[..., 1] += z * fx - x * fz
+    read[..., 2] += x * fy - y * fx
+    return read
 
 
 def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -130,6 +162,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
+@lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
     """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""
     table = np.zeros((len(robot.frames), 8))
@@ -140,6 +173,7 @@ def _masses(robot: Robot) -> NDArray:
             length, axis = beam_axis(frame)
             area = declared_section(link.section, link.poisson).area
             row[4], row[5:] = link.density * area * length, length * axis
+    table.setflags(write=False)
     return table
 
 
@@ -176,8 +210,8 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
     if given is None:
         return
     values = np.asarray(given, dtype=float)
-    refused = ~(np.abs(values) <= largest)  # NaN is refused
-    if refused.any():
+    if not np.abs(values).max(initial=0.0) <= largest:  # NaN is refused
+        refused = ~(np.abs(values) <= largest)
         raise BadInput(
             f"{whose}: found {values[refused].flat[0]:g}, expected finite numbers of "
             f"size at most {largest:g} [{unit}]"

@@ -93,8 +93,9 @@ class Reduction:
 
     @property
     def energy_without_clearance(self) -> float:
-        """[J] least energy if every bounded clearance stayed at zero."""
-        return float(self.h @ self.h) / 2
+        """[J] energy stored if every bounded clearance stayed at zero."""
+        bent, h = self.load_springs, self.h
+        return float(h @ h + 2 * (self.spread @ h) @ bent + bent @ bent) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
         """(nq,) free motions of least size that go with clearances and springs."""

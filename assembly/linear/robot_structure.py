@@ -23,10 +23,12 @@ class Structure(NamedTuple):
         on_path: (n,) 1 on the way to the platform.
         patterns: (np, closures) signs with which frames enter the closures.
         pattern_of: (n,) row of ``patterns``.
-        springs: (ny, 6) spring columns in their frame's axes, sorted by group.
+        springs: (ny, 6) spring columns in their frame's axes, sorted by group; those
+            in no closure last.
         spring_frame: (ny,) whose they are.
         spring_order: (ny,) their places among the virtual joints' columns.
-        groups: (ng + 1,) first spring of each group, and ny.
+        of_joint: (ny,) 1 a joint's spring, 0 a link's.
+        groups: (ng + 1,) first spring of each group, and of those in no closure.
         group_pattern: (ng,) row of ``patterns``.
         group_on_path: (ng,) 1 on the way to the platform.
         cone_frame: (nu,) whose a clearance is.
@@ -46,6 +48,7 @@ class Structure(NamedTuple):
     springs: Matrix
     spring_frame: Indices
     spring_order: Indices
+    of_joint: Indices
     groups: Indices
     group_pattern: Indices
     group_on_path: Vector
@@ -98,8 +101,10 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]
     order = np.lexsort((np.arange(len(key)), key))
-    order = order[acting[order]]
+    order, alone = order[acting[order]], order[~acting[order]]
     keys, starts = np.unique(key[order], return_index=True)
+    groups = np.append(starts, len(order)).astype(np.int64)
+    order = np.append(order, alone)
     cone_frame, cones = _by_frame(joints.cones)
     free_frame, free = _by_frame(joints.free)
     bounds = component_bounds(clearance_bounds(robot, compliant))
@@ -116,7 +121,8 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
         springs=np.ascontiguousarray(springs[order]),
         spring_frame=spring_frame[order],
         spring_order=order,
-        groups=np.append(starts, len(order)).astype(np.int64),
+        of_joint=(~joints.links[order]).astype(np.int64),
+        groups=groups,
         group_pattern=keys // 2,
         group_on_path=(keys % 2).astype(float),
         cone_frame=cone_frame,

@@ -61,21 +61,25 @@ def differs_from_zero(
 
 
 def drop_zeros(
-    energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray
-) -> None:
-    """Set to zero, in place, energies of unloaded robots that do not differ from it.
+    energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray,
+    loaded: ArrayLike = False,
+) -> None:  # fmt: skip
+    """Set to zero, in place, energies that do not differ from it.
 
     Args:
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound.
-        multipliers: (k, 6 closures) of the scaled closures; zero where they are no more
-            than rounding.
+        multipliers: (k, 6 closures) of the scaled closures; zero where, without loads,
+            they are no more than rounding.
         residual: (k,) [rad, lengths] open in the closures, rounding included.
+        loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
     if not zero.any():  # nor is any no more than rounding
         return
-    rounding = ~differs_from_zero(energy, 0.0, multipliers, residual)
+    rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
+        loaded
+    )
     energy[zero], multipliers[rounding] = 0.0, 0.0
     bound[zero] = np.minimum(bound[zero], 0.0)
 

@@ -19,6 +19,7 @@ class Solutions(NamedTuple):
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound of it.
         without_clearance: (k,) [J] energy if every clearance stayed at zero.
+        work: (k,) [J] of the loads on all but the errors.
         platform_screw: (k, 6) [rad, m].
         clearances: (k, nu) in units of their cones.
         motions: (k, nq) [rad, m].
@@ -32,6 +33,7 @@ class Solutions(NamedTuple):
     energy: Vector
     bound: Vector
     without_clearance: Vector
+    work: Vector
     platform_screw: Matrix
     clearances: Matrix
     motions: Matrix

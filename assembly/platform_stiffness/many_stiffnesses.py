@@ -15,7 +15,6 @@ from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from forcefit.inputs.display import html_table, short_repr
-from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size of a compliance's root that counts as rigid
 
@@ -157,9 +156,6 @@ def platform_stiffnesses(
     # the kernel's forces act on translations in reference lengths
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
-    alone = np.setdiff1d(np.arange(springs.shape[1]), structure.spring_order)
-    if alone.size:
-        springs[:, alone] = _outside_closures(robot, T, joints.elastic[:, alone])
     singular = {}
     for i in np.flatnonzero(status != SOLVED).tolist():
         q = np.full(len(robot.frames), np.nan)
@@ -170,12 +166,3 @@ def platform_stiffnesses(
     return Stiffnesses(
         robot, size, springs, tuple(owners(joints)), status != SOLVED, singular
     )
-
-
-def _outside_closures(robot: Robot, T: NDArray, columns: NDArray) -> NDArray:
-    """(k, s, 6) springs in no closure: the platform's wrench alone acts, or nothing."""
-    i = robot.index(robot.platform)
-    paths = screw_map(T[:, :, :3, 3] - T[:, None, i, :3, 3], T[:, :, :3, :3])
-    paths = paths * robot.on_path[i][:, None, None]
-    blocks = columns.reshape(len(robot.frames), 6, columns.shape[1])
-    return np.einsum("knij,njs->ksi", paths, blocks)

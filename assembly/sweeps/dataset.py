@@ -32,7 +32,8 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
-_TOGETHER = 64  # blocks written together
+# blocks written together: a write takes as long as that of a hundred points
+_TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":

@@ -1,8 +1,8 @@
 """Conditions at the points of a sweep: load, gravity and the effects of the robot.
 
-Without load the points are solved together by compiled functions, with effects that
-change errors, springs or clearances too.  Under load each is solved by itself, which
-takes some milliseconds.
+Points are solved together by compiled functions, under loads and with effects that
+change errors, springs or clearances.  Where places give by laws of their own each is
+solved by itself, which takes some milliseconds.
 """
 
 from dataclasses import replace
@@ -11,13 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import apply_known
+from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
 from assembly.linear.assemblies import Assemblies, solve_each
+from assembly.linear.closure import closure_signs
+from assembly.linear.energy import minimise_under_loads
+from assembly.linear.load import loads_with_weight
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot
 from assembly.sweeps.quantities import Question
+from stiffness.screws import screw_map
 
 
 def point_conditions(
@@ -60,7 +65,7 @@ def is_loaded(conditions: Conditions) -> bool:
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray]:
-    """Least energies of all rows, one by one.
+    """Least energies of all rows under loads.
 
     Args:
         conditions: k rows of a robot of n frames.
@@ -69,12 +74,44 @@ def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray]:
         Assemblies, screws and certificates in the order given; and the (k, n, 6)
         [N m, N] wrenches through the bodies.
     """
-    wrenches = np.full((len(conditions), len(conditions.robot.frames), 6), np.nan)
+    c = conditions
 
     def one(i: int) -> Assembly:
-        assembly = assemble_row(conditions, i)
+        assembly = assemble_row(c, i)
         assert isinstance(assembly, Assembly)
-        wrenches[i] = assembly.wrenches
         return assembly
 
-    return solve_each(conditions.robot, len(conditions), one), wrenches
+    if c.laws or c.yields:
+        wrenches = np.full((len(c), len(c.robot.frames), 6), np.nan)
+
+        def noted(i: int) -> Assembly:
+            assembly = one(i)
+            wrenches[i] = assembly.wrenches
+            return assembly
+
+        return solve_each(c.robot, len(c), noted), wrenches
+    loads = loads_with_weight(c.postures, c.load_at_origin(), c.gravity)
+    energies = minimise_under_loads(
+        c.robot, c.transforms, loads, one, c.errors, c.mismatch
+    )
+    through = wrenches_of(c.robot, c.transforms, energies.multipliers)
+    return energies, through + loads.body.reshape(through.shape)
+
+
+def wrenches_of(robot: Robot, T: NDArray, multipliers: NDArray) -> NDArray:
+    """Wrenches through every frame that closures cause.
+
+    Args:
+        robot: of n frames.
+        T: (k, n, 4, 4) frames seen from the base.
+        multipliers: (k, 6 closures) of the scaled closure rows.
+
+    Returns:
+        (k, n, 6) [N m, N] at each frame's origin, in its axes.
+    """
+    size = size_of(robot)
+    closures = multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
+    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot), closures)
+    origin = T[:, None, robot.index(robot.platform), :3, 3]
+    paths = screw_map(T[..., :3, 3] - origin, T[..., :3, :3])
+    return np.einsum("kfji,kfj->kfi", paths, at_platform)

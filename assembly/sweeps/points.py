@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
-from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.linear.closure import closure_signs
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.singularity import KINDS, find_singularities
@@ -29,6 +27,7 @@ from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
     point_conditions,
+    wrenches_of,
 )
 from assembly.sweeps.point_stiffness import (
     classical_stiffnesses,
@@ -37,7 +36,6 @@ from assembly.sweeps.point_stiffness import (
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
-from stiffness.screws import screw_map
 
 _PAGE = 256  # draws generated together
 
@@ -222,7 +220,7 @@ def _solve_reached(
     if question.reads_otherwise and ok:
         out["reading"][rows_ok] = read(conditions.take(ok), energies.platform_screw[ok])
     if wrenches is None and (question.wrenches or question.strength is not None):
-        wrenches = _wrenches(robot, T, energies)
+        wrenches = wrenches_of(robot, T, energies.multipliers)
     if wrenches is not None:
         _record_wrenches(question, robot, wrenches[ok], solved, rows_ok)
     if question.clearance_only:
@@ -331,16 +329,6 @@ def _record_frequencies(
         except BadInput:
             continue  # what has a mass does not move there
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
-
-
-def _wrenches(robot: Robot, T: NDArray, energies: Assemblies) -> NDArray:
-    """(k, n, 6) [N m, N] wrench through every frame without loads, in its axes."""
-    size = size_of(robot)
-    closures = energies.multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
-    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot), closures)
-    origin = T[:, None, robot.index(robot.platform), :3, 3]
-    paths = screw_map(T[..., :3, 3] - origin, T[..., :3, :3])
-    return np.einsum("kfji,kfj->kfi", paths, at_platform)
 
 
 def _record_bounds(bounds: PoseErrors, solved: SolvedPoints, rows: NDArray) -> None:

@@ -1,4 +1,4 @@
-// Problems (22), without loads, and (21) of all points: what a library exports of them.
+// Problems (22) and (21) of all points: what a library exports of them.
 #pragma once
 
 #include "energies.h"

@@ -51,9 +51,7 @@ inline Whole Compliance::comply(
                     total += L[6 * g + a][b] * on[6 * s.group_pattern[g] + a];
                 bent[6 * g + b] = total;
             }
-        turn_back(springs, r, 6 * ng, bent.data());
-        for (int i = 0; i < r; ++i) bent[i] = -bent[i];
-        combine(Z.data(), r, bent.data(), m, closing.data());
+        bend_least(r, bent, closing);
         for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
         for (int c = 0; c < s.ny; ++c) {
             const int64_t j = s.spring_frame[c];

@@ -24,7 +24,7 @@ struct Robot {
     const double *on_path, *patterns;
     const int64_t *pattern_of;
     const double *springs;
-    const int64_t *spring_frame, *spring_order, *groups, *group_pattern;
+    const int64_t *spring_frame, *spring_order, *of_joint, *groups, *group_pattern;
     const double *group_on_path;
     const int64_t *cone_frame, *cone_axis;
     const double *cone_size;
@@ -34,12 +34,14 @@ struct Robot {
 };
 
 // Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (n,)
-// whether a frame errs at any point, which is found out where nobody says it.
+// whether a frame errs at any point, which is found out where nobody says it; (k, 2, n,
+// 6) loads on bodies and on joints, in the frames' axes, or none.
 struct Points {
     int64_t count;
     const double *T, *errors, *mismatch;
     int64_t own_errors;
     const bool *erring;
+    const double *loads;
 };
 
 // A closure that a frame enters, and the sign.
@@ -171,7 +173,7 @@ inline void Linearised::columns() {
                 column(s.spring_frame[c], axis, step);
                 for (int a = 0; a < 6; ++a) elastic[c][a] += weight * step[a];
             }
-        for (int a = 0; a < 6; ++a)
+        for (int a = 0; c < s.groups[ng] && a < 6; ++a)
             largest_spring = larger(magnitude(elastic[c][a]), largest_spring);
     }
 }

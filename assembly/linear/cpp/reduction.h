@@ -59,7 +59,9 @@ protected:
     Row spring_strains(int r, const Row &v);
     Row moved_by(const Row &grouped);
     Row least_motions(int rank, const Row &moved);
+    Whole hold_free_motions(int rank, const Row &drive, Real still, Row &closing);
     Whole hold_free_motions(int rank, int row, double still, Row &closing);
+    void bend_least(int r, Row &bent, Row &closing);
     int spring_group(int g, Triangle &rows);
 
 private:
@@ -255,18 +257,15 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
     return motions;
 }
 
-// The closures' least wrenches with which a unit wrench moves nothing free, but for
-// `still`; returns the lanes that have none.
+// The closures' least wrenches with which forces `drive` on the free motions move none,
+// but for `still`; returns the lanes that have none.
 inline Whole Reduction::hold_free_motions(
-    int rank, int row, double still, Row &closing) {
+    int rank, const Row &drive, Real still, Row &closing) {
     Whole loose = {};
     std::fill(closing.begin(), closing.end(), Real{});
     for (int i = 0; i < nq; ++i) {
         Real left;
-        for (int l = 0; l < LANES; ++l) {
-            const int c = int(free.order[i][l]);
-            left[l] = -s.on_path[s.free_frame[c]] * motion[c][row][l];
-        }
+        for (int l = 0; l < LANES; ++l) left[l] = -drive[free.order[i][l]][l];
         for (int l = 0; l < std::min(i, rank); ++l) left -= free.F[i][l] * closing[l];
         if (i < rank)
             closing[i] = left / free.diagonal[i];
@@ -276,5 +275,22 @@ inline Whole Reduction::hold_free_motions(
     Real *own = closing.data();
     turn_all(free, rank, m, &own, 1);
     return loose;
+}
+
+// The same for a unit wrench on the platform.
+inline Whole Reduction::hold_free_motions(
+    int rank, int row, double still, Row &closing) {
+    Row drive(nq);
+    for (int c = 0; c < nq; ++c)
+        drive[c] = s.on_path[s.free_frame[c]] * motion[c][row];
+    return hold_free_motions(rank, drive, real(still), closing);
+}
+
+// Adds to the closures' wrenches those that bend springs least; `bent`, what the others
+// bend of the groups' springs, is overwritten with what these are of Z's first rows.
+inline void Reduction::bend_least(int r, Row &bent, Row &closing) {
+    turn_back(springs, r, 6 * ng, bent.data());
+    for (int i = 0; i < r; ++i) bent[i] = -bent[i];
+    combine(Z.data(), r, bent.data(), m, closing.data());
 }
 

@@ -47,7 +47,7 @@ public:
         return dual_newton(q, STEPS_ALONE, 0.0, relative, absolute, asked);
     }
     void interior_then_newton(
-        Programme &q, double relative, Real absolute, Whole asked);
+        Programme &q, double relative, Real absolute, Real near, Whole asked);
     Whole interior_point(Programme &q, Real tolerance, double relative, Whole asked);
     Whole dual_newton(
         Programme &q, int steps, double first_sigma, double relative, Real absolute,
@@ -449,14 +449,14 @@ inline Whole Solver::dual_newton(
     return done;
 }
 
-// Least |G u + h|^2 / 2 in the lanes asked for, to a gap of absolute + relative times it.
+// Minimises in the lanes asked for, to a gap of absolute + relative |G u + h|^2 / 2; the
+// interior point leaves the rest to Newton at a gap of `near` and NEAR of that energy.
 inline void Solver::interior_then_newton(
-    Programme &q, double relative, Real absolute, Whole asked) {
-    const Real without = 0.5 * inner(q.h.data(), q.h.data(), q.r);
+    Programme &q, double relative, Real absolute, Real near, Whole asked) {
     // near a zone's edge the interior point stops early; Newton then takes longer
     for (int attempt = 0; attempt < 2 && any(asked); ++attempt) {
         if (attempt == 0)
-            interior_point(q, NEAR_WITHOUT_CLEARANCE * without, NEAR, asked);
+            interior_point(q, near, NEAR, asked);
         else
             interior_point(q, absolute, relative, asked);
         k.each([&](auto size, int, int at) {  // rounding may have left the cones

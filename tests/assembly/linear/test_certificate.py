@@ -313,6 +313,6 @@ def test_points_solved_one_by_one_are_what_each_is():
     ):
         assert np.array_equal(getattr(found, name), values), name
     assert found.certified.all()
-    assert found.fallbacks() == {"loads": 2}
+    assert found.fallbacks() == {"one by one": 2}
     two = np.array([[0.6, 0.8, 0.1], [0.9, 1.2, 0.0]])
     assert excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])

@@ -72,7 +72,7 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa):
 def test_no_point_of_the_papers_robot_is_left_to_numba(grid, monkeypatch):
     """Rows that no spring enters are told from rounding, whatever their length."""
     left = []
-    monkeypatch.setattr(energy, "_by_numba", lambda *given: left.append(given))
+    monkeypatch.setattr(energy, "_fill_by_numba", lambda *given: left.append(given))
     robot, postures = grid
     T, mismatch = stack(postures)
     for kappa in (0.1, 1.0):
@@ -111,7 +111,8 @@ def test_random_robots_have_numbas_energies_or_its_reasons():
         off = np.full(3, home.mismatch)
         lanes, numba = (rows_for(joints, robot, 3) for _ in range(2))
         assert assemble_side_by_side(structure, T, errors, off, lanes)
-        assemble_all(structure, T, errors, off, numba)
+        none = np.zeros((0, 2, T.shape[1], 6))
+        assemble_all(structure, T, errors, off, none, numba)
         left = numba.outcome >= COMPILED
         assert np.array_equal(lanes.outcome[left], numba.outcome[left])
         assert np.all(lanes.outcome[~left] < COMPILED)
@@ -135,7 +136,7 @@ def rows_for(joints, robot, count):
 
     closures = 6 * len(robot.closures)
     return Solutions(
-        np.zeros(count, dtype=np.int64), zeros(), zeros(), zeros(), zeros(6),
+        np.zeros(count, dtype=np.int64), zeros(), zeros(), zeros(), zeros(), zeros(6),
         zeros(joints.cones.shape[1]), zeros(joints.free.shape[1]), zeros(closures),
         zeros(), zeros(len(joints.links)),
     )  # fmt: skip

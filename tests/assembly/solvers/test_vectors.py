@@ -41,9 +41,9 @@ def test_multipliers_that_are_not_unique_are_the_least_ones(rng):
         3,
     )
     unfelt = Z[rank:].copy()
-    found = np.full(9, np.nan)
-    _least_multipliers(Z.copy(), rank, y, found)
     whole = Z[:rank].T @ y
+    found = whole.copy()
+    _least_multipliers(Z.copy(), rank, found)
     expected = whole - unfelt.T @ np.linalg.lstsq(unfelt.T, whole)[0]
     assert found == pytest.approx(expected, rel=1e-12)
     assert unfelt @ found == pytest.approx(np.zeros(2), abs=1e-13)
