@@ -8,6 +8,7 @@ The library is of ``same_random_numbers.cpp``.
 import ctypes
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -23,6 +24,9 @@ def main(given: Path, made: Path, library: str | None = None) -> None:
     """
     if library is not None:  # before the mesher is: the first definition counts
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
+    # pytetwild loads pyvista, half a second, to give its classes a method: here it
+    # finds an empty one instead
+    sys.modules["pyvista"] = ModuleType("pyvista")
     import pytetwild
 
     with np.load(given) as stored:
