@@ -36,6 +36,8 @@ from stiffness.mesh.lagrange import (
 from stiffness.mesh.mesh import Solid
 
 ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
+# derivatives of the barycentric coordinates by the reference element's
+_COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
 _CHUNK = 3_600_000  # numbers of the elements' matrices at a time, 30 MB
 
 
@@ -175,17 +177,20 @@ def gradients_on_faces(
     size = np.linalg.norm(area, axis=2)
     places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.faces[faces]])
     cells = mesh.cells[mesh.owner[faces]]
-    inner = mesh.nodes[cells].mean(axis=1)[:, None]
-    outward = np.sign(np.einsum("tqx,tqx->tq", area, places - inner))
     G = np.zeros((*size.shape, cells.shape[1], 3))
+    inward = np.zeros_like(area)
     corners = mesh.faces[faces, :3]
     for side in FACES:
         members = np.flatnonzero((cells[:, side] == corners).all(axis=1))
         L = np.zeros((len(N), 4))
         L[:, side] = quadrature(2 * mesh.order, corners=3)[0]
         slope = shape_functions(mesh.order, L)[1]
-        J = _jacobians(slope, mesh.nodes[cells[members]])
-        G[members] = slope @ np.linalg.inv(J)
+        inverse = np.linalg.inv(_jacobians(slope, mesh.nodes[cells[members]]))
+        G[members] = slope @ inverse
+        # the coordinate of the corner opposite grows inward, however bent the element
+        (opposite,) = set(range(4)) - set(side)
+        inward[members] = _COORDINATES[opposite] @ inverse
+    outward = -np.sign(np.einsum("tqx,tqx->tq", area, inward))
     return places, area * (outward / size)[..., None], size, G
 
 
