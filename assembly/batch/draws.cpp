@@ -10,7 +10,7 @@
 // gram      (r, r)    the springs' complementary energy is y.gram y / 2
 // ========  ========  =================================================================
 #include "../solvers/cpp/block.h"
-#include "../solvers/cpp/cones.h"
+#include "../solvers/cpp/dual_newton.h"
 
 // assembly/solvers/conic.py and assembly/batch/compiled_draws.py
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12, STOP = 1e-2, INWARDS = 0.8;

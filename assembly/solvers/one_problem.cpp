@@ -2,6 +2,7 @@
 // and farthest.py for callers with a single problem.
 #define FEW_LANES
 #include "cpp/block.h"
+#include "cpp/dual_newton.h"
 #include "cpp/farthest.h"
 
 // minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_k| <= 1 for each cone.

@@ -14,7 +14,7 @@
 // ========  =============  ============================================================
 #pragma once
 
-#include "../../solvers/cpp/cones.h"
+#include "../../solvers/cpp/dual_newton.h"
 #include "../../solvers/cpp/householder.h"
 #include "linearised.h"
 
