@@ -89,7 +89,7 @@ def test_what_no_solver_proves_is_not_certified(monkeypatch):
     energies = minimise_energies(robot, posture.transforms[None])
     monkeypatch.setattr(conic, "_SOLVERS", tuple(map(spoilt, conic._SOLVERS)))
     monkeypatch.setattr(conic.one_problem, "newton", lambda *_: True)
-    monkeypatch.setattr(energy, "_compiled_assembly", lambda _: None)
+    monkeypatch.setattr(energy, "_compiled_assembly", lambda *_: None)
     answer = solve_assembly(posture)
     # 1e-4 of some clearances more energy than the least: far above 1e-8
     assert answer.energy > good.energy * (1 + 1e-8)
