@@ -296,12 +296,12 @@ def _best(
     sure = np.flatnonzero(gains >= _SURE)
     if not len(sure):
         return []
-    best = [int(np.argmax(worth))]
     if judged.successive:
         some = simplest(judged, [refined[i] for i in sure], worth[sure])
-        best = [int(sure[i]) for i in some]
-    elif not judged.foretells((refined[best[0]],)):
-        return []
+        best = sure[list(some)].tolist()
+    else:
+        most = int(np.argmax(worth))
+        best = [most] if judged.foretells([refined[most]]) else []
     return [
         Learned(refined[i], _equivalent(refined, worth, i), float(gains[i]))
         for i in best

@@ -8,6 +8,7 @@ from scipy.stats import multivariate_normal
 
 from validation.diagnosis.background import NOTHING, background
 from validation.diagnosis.evidence import Evidence, Prior
+from validation.diagnosis.remainder import function_term
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
 
 CELLS = 300
@@ -164,6 +165,26 @@ def test_a_term_that_shows_by_rounding_alone_stays_away(rng):
     after = evidence.best_of(np.array([-5.8e-11, -5.8e-11, 2.4e6]), 400.0, start)
     assert not after.used[0].any()
     assert after.used[1].all()
+
+
+def test_functions_of_nearly_equal_columns_are_sized_whatever_rounding_says(rng):
+    """Products of columns up to 1e9, alike to 1e-12: none is definite by rounding.
+
+    Together they do what one column of twice the variance does.
+    """
+    column = rng.normal(size=CELLS)
+    J = 1e9 * column[:, None] * [1.0, 1.0] + rng.normal(size=(CELLS, 2)) * [0.0, 1e-3]
+    twin = function_term("f", np.zeros(2, int), J)
+    alone = function_term("f", np.zeros(1, int), np.sqrt(2) * J[:, :1])
+    z = 30.0 * column + rng.normal(size=CELLS)
+    gram = J.T @ J
+    gram[0, 1] = gram[1, 0] = gram[0, 0] * (1 + 1e-9)  # what rounding makes of it
+    used = Prior((np.ones(2, bool),), {}, 0.0, 0.0)
+    square = float(z @ z)
+    pair = Evidence([twin], CELLS, gram).best_of(J.T @ z, square, used)
+    one = Evidence([alone], CELLS).best(z)
+    assert pair.scales["f"][0] == pytest.approx(one.scales["f"][0], rel=1e-3)
+    assert pair.evidence == pytest.approx(one.evidence, rel=1e-5)
 
 
 def test_noise_has_no_small_terms(rng):

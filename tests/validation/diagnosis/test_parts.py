@@ -1,4 +1,4 @@
-"""Registration, refit and the next measurement, on a bar whose answers are known."""
+"""Registration, tangents and refit, on a bar whose answers are known."""
 
 from dataclasses import replace
 
@@ -8,53 +8,30 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
-from assembly.effects.effect import Unknown
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.predict import predict
-from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
+from tests.bar_for_tests import (
+    BEAM,
+    LENGTH,
+    LONGER,
+    SOFTER,
+    TURNED,
+    WARMER,
+    along,
+    bar,
+    fit_of,
+    gives_way,
+)
 from tests.planar_arm_for_tests import SIGMA
-from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.next_measurement import next_measurement
+from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.refit import refit
 from validation.diagnosis.registration import coarse_frame, register
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from validation.diagnosis.small_terms import SPRINGS, SmallTerm, with_small
-
-LENGTH = 0.8
-
-
-def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
-        **covariates):  # fmt: skip
-    """A drive about z and a bar along x, at ``rows`` angles; readings, or zeros."""
-    robot = Robot("bar", "tip", (
-        Frame("drive", joint="revolute", actuated=True, joint_stiffness=spring),
-        Frame("tip", "drive", [LENGTH, 0, 0], link=link),
-    ))  # fmt: skip
-    placed = [
-        place_robot(robot, joints={"drive": q}) for q in np.linspace(0, spread, rows)
-    ]
-    return Campaign(
-        name="bar", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
-        commanded="joints",
-        loads=np.zeros((rows, 6)) if load is None else np.tile(load, (rows, 1)),
-        measured=np.zeros((rows, 6)) if measured is None else measured,
-        sigma=np.tile(SIGMA, (rows, 1)), covariates=covariates,
-        reference_point=np.zeros(3), registration="known",
-        configuration=np.arange(rows), repeat=np.arange(rows),
-    )  # fmt: skip
-
-
-def along(campaign):
-    """(R, 3) direction of the bar."""
-    q = campaign.coordinates[:, 0]
-    return np.column_stack([np.cos(q), np.sin(q), 0 * q])
-
 
 # registration
 
@@ -194,22 +171,6 @@ def test_wrenches_are_as_small_as_their_loads():
 # refit
 
 
-def hypothesis(effect, frame, name, unknown):
-    return Hypothesis(effect, (frame,), (Slot((name,), unknown, unknown.start),))
-
-
-BEAM = BeamLink({"radius": 0.03}, 70e9, 0.33)
-LONGER = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4))
-WARMER = hypothesis("thermal_expansion", "tip", "tip", Unknown("", 1e-5, -5e-4, 5e-4))
-TURNED = hypothesis("encoder_offset", "drive", "drive", Unknown("", 1e-4))
-ECCENTRIC = hypothesis(
-    "encoder_eccentricity", "drive", "drive.cosine", Unknown("cosine", 1e-4)
-)
-SOFTER = hypothesis(
-    "drive_compliance", "drive", "drive.compliance", Unknown("compliance", 1e-6, 0, 1)
-)
-
-
 @pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
 def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
     """And its standard deviation sigma / sqrt(R): rotations have no say."""
@@ -228,17 +189,10 @@ def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
     )
 
 
-def fit_of(campaign, longer):
-    return np.hstack([np.zeros((len(campaign), 3)), longer * along(campaign)])
-
-
 def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
     """Turn M/k and arc M L/k in every row; std k = k^2 std(1/k)."""
     M, k = 30.0, 2e5
-    plain = bar()
-    across = np.cross([0, 0, 1], along(plain))
-    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
-    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    campaign = gives_way(M, k)
     fit = refit(campaign, conditions_of(campaign), [SOFTER], np.array([1e-6]))
     ((name, value, std),) = fit.parameters(0)
     assert name == "drive"
@@ -326,59 +280,6 @@ def test_an_offset_beside_finite_motions_is_exact():
     assert abs(linear.values[0] - e) > 1e-4
 
 
-# the measurement that would decide
-
-
-def test_another_temperature_tells_heat_from_length():
-    """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
-
-    R readings at T leave the length sigma^2 / R and the expansion that much over
-    (L T)^2; at T + 10 K the latter is open by ((T + 10) / T)^2 / R.
-    """
-    R, T, alpha = 8, 5.0, 2e-5
-    heat = {"temperature": np.full(R, T)}
-    plain = bar(link=BEAM, **heat)
-    campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
-    here = conditions_of(campaign)
-    longer, warmer = (
-        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
-    )
-    # a rival that is the fit itself, or nothing else, cannot be told from it
-    found = next_measurement(campaign, here, longer, [longer, warmer])
-    assert found.covariates == {"temperature": T + 10}
-    d = alpha * LENGTH * 10 / SIGMA[3]
-    assert found.power == pytest.approx(d**2 / (1 + ((T + 10) / T) ** 2 / R), rel=1e-3)
-    assert set(found.configuration) == {"q.drive"}
-    assert "link_length and thermal_expansion" in found.why
-
-
-def test_nothing_decides_between_one_explanation_and_itself():
-    campaign = bar(link=BEAM)
-    here = conditions_of(campaign)
-    fit = refit(campaign, here, [LONGER], np.zeros(1))
-    assert next_measurement(campaign, here, fit, [fit]) is None
-
-
-def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
-    """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
-
-    Between, they differ by e (1 - cos q) in the direction of either, of information
-    I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
-    """
-    e = 3e-4
-    seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
-    campaign = bar(rows=2, spread=2 * np.pi, measured=seen)
-    here = conditions_of(campaign)
-    turned = refit(campaign, here, [TURNED], np.zeros(1))
-    eccentric = refit(campaign, here, [ECCENTRIC], np.zeros(1))
-    found = next_measurement(campaign, here, turned, [eccentric])
-    q = found.configuration["q.drive"]
-    assert abs(q - np.pi) < 0.2
-    information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
-    power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
-    assert found.power == pytest.approx(power, rel=1e-3)
-
-
 # finite motions on request
 
 
@@ -414,35 +315,3 @@ def test_springs_of_passive_joints_leave_their_own_motion_free():
     K = with_small(robot, [springs], [np.array([1e-3, 1e-7])]).frame("hinge")
     stiffness = np.diag(K.joint_stiffness)
     assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
-
-
-def test_a_range_of_temperatures_is_left_by_half_of_it():
-    """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
-    heat = {"temperature": np.linspace(20.0, 60.0, 8)}
-    plain = bar(link=BEAM, **heat)
-    seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
-    campaign = bar(link=BEAM, measured=seen, **heat)
-    here = conditions_of(campaign)
-    longer, warmer = (
-        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
-    )
-    for fit, rival in ((longer, warmer), (warmer, longer)):
-        found = next_measurement(campaign, here, fit, [rival])
-        assert found.covariates == {"temperature": 80.0}
-
-
-def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
-    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
-    M, k = 30.0, 2e5
-    plain = bar()
-    across = np.cross([0, 0, 1], along(plain))
-    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
-    campaign = bar([0, 0, M, 0, 0, 0], seen)
-    here = conditions_of(campaign)
-    softer, turned = (
-        refit(campaign, here, [one], np.array([start]))
-        for one, start in ((SOFTER, 1e-6), (TURNED, 0.0))
-    )
-    found = next_measurement(campaign, here, softer, [turned])
-    assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
-    assert found.load[2] < 0  # against it they are farther apart

@@ -1,0 +1,68 @@
+"""A drive about z and a bar along x, measured at some angles; what may be wrong."""
+
+import numpy as np
+
+from assembly.effects.effect import Unknown
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import BeamLink, Frame, Robot
+from tests.planar_arm_for_tests import SIGMA
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.hypotheses import Hypothesis, Slot
+
+LENGTH = 0.8
+
+
+def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
+        **covariates):  # fmt: skip
+    """A drive about z and a bar along x, at ``rows`` angles; readings, or zeros."""
+    robot = Robot("bar", "tip", (
+        Frame("drive", joint="revolute", actuated=True, joint_stiffness=spring),
+        Frame("tip", "drive", [LENGTH, 0, 0], link=link),
+    ))  # fmt: skip
+    placed = [
+        place_robot(robot, joints={"drive": q}) for q in np.linspace(0, spread, rows)
+    ]
+    return Campaign(
+        name="bar", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
+        commanded="joints",
+        loads=np.zeros((rows, 6)) if load is None else np.tile(load, (rows, 1)),
+        measured=np.zeros((rows, 6)) if measured is None else measured,
+        sigma=np.tile(SIGMA, (rows, 1)), covariates=covariates,
+        reference_point=np.zeros(3), registration="known",
+        configuration=np.arange(rows), repeat=np.arange(rows),
+    )  # fmt: skip
+
+
+def along(campaign):
+    """(R, 3) direction of the bar."""
+    q = campaign.coordinates[:, 0]
+    return np.column_stack([np.cos(q), np.sin(q), 0 * q])
+
+
+def hypothesis(effect, frame, name, unknown):
+    return Hypothesis(effect, (frame,), (Slot((name,), unknown, unknown.start),))
+
+
+BEAM = BeamLink({"radius": 0.03}, 70e9, 0.33)
+LONGER = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4))
+WARMER = hypothesis("thermal_expansion", "tip", "tip", Unknown("", 1e-5, -5e-4, 5e-4))
+TURNED = hypothesis("encoder_offset", "drive", "drive", Unknown("", 1e-4))
+ECCENTRIC = hypothesis(
+    "encoder_eccentricity", "drive", "drive.cosine", Unknown("cosine", 1e-4)
+)
+SOFTER = hypothesis(
+    "drive_compliance", "drive", "drive.compliance", Unknown("compliance", 1e-6, 0, 1)
+)
+
+
+def fit_of(campaign, longer):
+    return np.hstack([np.zeros((len(campaign), 3)), longer * along(campaign)])
+
+
+def gives_way(M, k):
+    """The bar under a moment, its drive of stiffness k: turn M/k, arc M L/k."""
+    across = np.cross([0, 0, 1], along(bar()))
+    seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
+    return bar([0, 0, M, 0, 0, 0], seen)

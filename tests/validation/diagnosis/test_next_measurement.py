@@ -1,0 +1,100 @@
+"""The measurement that would decide, on a bar whose answers are known by hand."""
+
+import numpy as np
+import pytest
+
+from tests.bar_for_tests import (
+    BEAM,
+    ECCENTRIC,
+    LENGTH,
+    LONGER,
+    SOFTER,
+    TURNED,
+    WARMER,
+    bar,
+    fit_of,
+    gives_way,
+)
+from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis.next_measurement import next_measurement
+from validation.diagnosis.refit import refit
+from validation.diagnosis.signatures import conditions_of
+
+
+def test_another_temperature_tells_heat_from_length():
+    """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
+
+    R readings at T leave the length sigma^2 / R and the expansion that much over
+    (L T)^2; at T + 10 K the latter is open by ((T + 10) / T)^2 / R.
+    """
+    R, T, alpha = 8, 5.0, 2e-5
+    heat = {"temperature": np.full(R, T)}
+    plain = bar(link=BEAM, **heat)
+    campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
+    here = conditions_of(campaign)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    # a rival that is the fit itself, or nothing else, cannot be told from it
+    found = next_measurement(campaign, here, longer, [longer, warmer])
+    assert found.covariates == {"temperature": T + 10}
+    d = alpha * LENGTH * 10 / SIGMA[3]
+    assert found.power == pytest.approx(d**2 / (1 + ((T + 10) / T) ** 2 / R), rel=1e-3)
+    assert set(found.configuration) == {"q.drive"}
+    assert "link_length and thermal_expansion" in found.why
+
+
+def test_nothing_decides_between_one_explanation_and_itself():
+    campaign = bar(link=BEAM)
+    here = conditions_of(campaign)
+    fit = refit(campaign, here, [LONGER], np.zeros(1))
+    assert next_measurement(campaign, here, fit, [fit]) is None
+
+
+def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
+    """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
+
+    Between, they differ by e (1 - cos q) in the direction of either, of information
+    I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
+    """
+    e = 3e-4
+    seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
+    campaign = bar(rows=2, spread=2 * np.pi, measured=seen)
+    here = conditions_of(campaign)
+    turned = refit(campaign, here, [TURNED], np.zeros(1))
+    eccentric = refit(campaign, here, [ECCENTRIC], np.zeros(1))
+    found = next_measurement(campaign, here, turned, [eccentric])
+    q = found.configuration["q.drive"]
+    assert abs(q - np.pi) < 0.2
+    information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
+    power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
+    assert found.power == pytest.approx(power, rel=1e-3)
+
+
+def test_a_range_of_temperatures_is_left_by_half_of_it():
+    """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
+    heat = {"temperature": np.linspace(20.0, 60.0, 8)}
+    plain = bar(link=BEAM, **heat)
+    seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
+    campaign = bar(link=BEAM, measured=seen, **heat)
+    here = conditions_of(campaign)
+    longer, warmer = (
+        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
+    )
+    for fit, rival in ((longer, warmer), (warmer, longer)):
+        found = next_measurement(campaign, here, fit, [rival])
+        assert found.covariates == {"temperature": 80.0}
+
+
+def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
+    """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
+    M, k = 30.0, 2e5
+    campaign = gives_way(M, k)
+    here = conditions_of(campaign)
+    softer, turned = (
+        refit(campaign, here, [one], np.array([start]))
+        for one, start in ((SOFTER, 1e-6), (TURNED, 0.0))
+    )
+    found = next_measurement(campaign, here, softer, [turned])
+    assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
+    assert found.load[2] < 0  # against it they are farther apart
