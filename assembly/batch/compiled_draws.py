@@ -10,12 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.compiled_energy import (
-    NEAR,
-    NEAR_WITHOUT_CLEARANCE,
-    Limits,
-    small_answer,
-)
+from assembly.linear.compiled_energy import limits_of, small_answer
 from assembly.linear.compiled_zone import farthest, turn_first
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.solvers.compiled import kernel, part
@@ -114,9 +109,7 @@ def least_energies(reduced: Reduced, h: NDArray, out: Energies) -> None:
                 for c in range(nu):
                     G[c, i] = Gt[c, i] / size
             joule = size * size
-            absolute = GAP_WITHOUT_CLEARANCE * (without + stored) + GAP * stored
-            near = NEAR_WITHOUT_CLEARANCE * (without + stored) + NEAR * stored
-            limits = Limits(_STOP * GAP, _STOP * absolute / joule, near / joule)
+            limits = limits_of(_STOP, without / joule, stored / joule)
             small_answer(G, right, divide(loads, joule), starts, limits, own, own_y)
             for i in range(r):
                 own_y[i] *= size

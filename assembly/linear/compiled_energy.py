@@ -42,7 +42,7 @@ from assembly.solvers.vectors import (
 NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN = range(7)
 _STOP = 3e-3  # the solvers stop at this fraction of the accepted gap
 # gap from which Newton's method finishes: of the energy, of that without clearance
-NEAR, NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
+_NEAR, _NEAR_WITHOUT_CLEARANCE = 1e-8, 1e-9
 _STEPS_ALONE, _STEPS, _STEPS_LAST = 6, 20, 150  # of Newton's method
 _FIRST_SIGMA = 1e6  # after the interior-point method, see dual_newton
 
@@ -270,9 +270,7 @@ def _minimise(
         for i in range(r):
             G[c, i] = Gt[c, i] / size
     without, bent = 0.5 * inner(right, right), under.stored / (size * size)
-    absolute = GAP_WITHOUT_CLEARANCE * without + (GAP + GAP_WITHOUT_CLEARANCE) * bent
-    near = NEAR_WITHOUT_CLEARANCE * without + (NEAR + NEAR_WITHOUT_CLEARANCE) * bent
-    limits = Limits(_STOP * GAP, _STOP * absolute, near)
+    limits = limits_of(_STOP, without, bent)
     outcome = small_answer(G, right, d, s.starts, limits, u, y)
     for i in range(r):
         v[i] = h[i]
@@ -297,6 +295,14 @@ class Limits(NamedTuple):
 
 
 @part
+def limits_of(stop: float, without: float, bent: float) -> Limits:
+    """Of a fraction of the accepted gap, energies without clearances and of loads."""
+    absolute = GAP_WITHOUT_CLEARANCE * without + (GAP + GAP_WITHOUT_CLEARANCE) * bent
+    near = _NEAR_WITHOUT_CLEARANCE * without + (_NEAR + _NEAR_WITHOUT_CLEARANCE) * bent
+    return Limits(stop * GAP, stop * absolute, near)
+
+
+@part
 def small_answer(
     Gt: Matrix, h: Vector, d: Vector, starts: Indices, limits: Limits, u: Vector,
     y: Vector,
@@ -310,7 +316,7 @@ def small_answer(
     programme = Programme(G, h, d, H, vector(0), starts)
     # near a zone's edge the interior point stops early; Newton then takes longer
     for stop, most, steps in (
-        (NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
+        (_NEAR, near, _STEPS), (relative, absolute, _STEPS_LAST)
     ):  # fmt: skip
         inside, _, _ = interior_point(programme, most, stop)
         copy(inside, u)
