@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 
 from assembly.model.function import Function
+from validation.diagnosis import sentence as module
 from validation.diagnosis.report import _tiles
-from validation.diagnosis.sentence import calibration_text, formula, noise_text
+from validation.diagnosis.sentence import (
+    calibration_text,
+    formula,
+    noise_text,
+    open_text,
+    sentence,
+)
+from validation.diagnosis.structure import Trend
 from validation.diagnosis.verdict import Calibration
 
 
@@ -19,6 +27,9 @@ from validation.diagnosis.verdict import Calibration
          "rz = 0.001 + 0.002 drive + -0.004 drive^3"),
         ("waves", {"1.sine": 2e-5, "2.cosine": 3e-5},
          "rz = 2e-05 sin(1 drive) + 3e-05 cos(2 drive)"),
+        ("waves", {"0.cosine": 1e-3, "2.sine": 3e-5},
+         "rz = 0.001 + 3e-05 sin(2 drive)"),
+        ("step", {"size": 2.0, "at": 0.5}, "rz = 2 step.size(drive)"),
     ],
 )  # fmt: skip
 def test_numbers_stand_before_what_they_multiply(form, parameters, expected):
@@ -60,3 +71,44 @@ def test_noise_that_repeats_show_is_said_of_what_it_is_larger():
     assert both.endswith("taken 1.5 times (rotations) and 2.2 times (positions)")
     one = noise_text(np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]))
     assert one.endswith("taken 3 times (positions)")
+
+
+def test_a_compliance_is_said_to_be_times_the_wrench():
+    function = Function(
+        "drive", ("rz", "tx"), ("q.drive",), "powers",
+        {"rz.1": 2e-3, "tx.1": 3e-3}, "compliance",
+    )  # fmt: skip
+    expected = "rz = 0.002 drive; tx = 0.003 drive (times the wrench there)"
+    assert formula(function) == expected
+
+
+SAID = [
+    ({"verdict": "none_needed"}, "is noise as far as this design can tell (7.00 sigma"),
+    ({"verdict": "explained"}, "lacks a and b and springs; on rows kept aside the"),
+    ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
+    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on rows"),
+    ({"verdict": "outside_library"}, "sigma are left, which vary with x0, x1, x2"),
+    ({"verdict": "outside_library", "trends": ()}, "with nothing that was recorded;"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "expected"), SAID)
+def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected):
+    """Six names, four sets and three trends at most."""
+    monkeypatch.setattr(module, "titles", lambda one: [f"t{k}" for k in range(6)])
+    sets = ("a",), (), ("a", "b"), ("c",), ("d",)
+    one = SimpleNamespace(**{
+        "before": SimpleNamespace(normalised=7.0),
+        "after": SimpleNamespace(normalised=1.5), "lack": SimpleNamespace(rms=2.5),
+        "claimed": ("a", "b"), "alternatives": tuple((names, 0.2) for names in sets),
+        "behind": SimpleNamespace(terms=(SimpleNamespace(name="springs"),)),
+        "split": SimpleNamespace(fitted=np.array([True, False])),
+        "trends": tuple(Trend(f"x{k}", 0.1, 0.0) for k in range(5)),
+    } | changes)  # fmt: skip
+    assert expected in sentence(one)
+    one.split = SimpleNamespace(fitted=np.ones(2, bool))
+    assert "on the rows fitted, too few to spare any" in sentence(one)
+
+
+def test_open_rows_are_counted():
+    assert "free in 2 of 3 rows" in open_text(np.array([True, False, True]))

@@ -1,0 +1,175 @@
+"""What the terminal shows of a made-up diagnosis, line by line."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from validation.diagnosis import text as module
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.kept_aside import Errors, Rung
+from validation.diagnosis.next_measurement import NextMeasurement, load_text
+from validation.diagnosis.noise_in_time import NoiseInTime
+from validation.diagnosis.structure import Trend
+
+BEFORE, AFTER = Errors(3e-5, 2e-6, 7.0), Errors(1e-5, float("nan"), 1.5)
+
+
+def made(**changes):
+    """Four rows of which the last two were kept aside, and nothing found."""
+    return SimpleNamespace(**{
+        "campaign": SimpleNamespace(name="arm", ids=("m0", "m1", "m2", "m3")),
+        "verdict": "none_needed",
+        "alternatives": ((("drift",), 0.75), ((), 0.25)),
+        "split": SimpleNamespace(fitted=np.array([True, True, False, False])),
+        "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 0.2),
+        "trimmed": (Errors(2e-5, 1e-6, 6.0), Errors(9e-6, 1e-6, 1.25)),
+        "noise_factor": np.ones(6), "noise_in_time": None,
+        "outliers": np.zeros(4, bool), "open": np.zeros(4, bool),
+        "ladder": (Rung("declared", 0, BEFORE), Rung("geometry", 4.6, AFTER)),
+        "trends": (), "next": None, "remarks": (),
+    } | changes)  # fmt: skip
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """Lines of a diagnosis without small terms, effects and functions."""
+    for name in ("effects", "learned"):
+        monkeypatch.setattr(module, name, lambda diagnosis: [])
+    monkeypatch.setattr(module, "small", lambda diagnosis, name: None)
+    monkeypatch.setattr(module, "sentence", lambda diagnosis: "Enough.")
+
+    def lines(**changes):
+        return module.text(made(**changes)).splitlines()
+
+    return lines
+
+
+def test_what_is_not_there_is_not_said(shown):
+    """Head, sets by probability, errors before and after, and every step."""
+    said = shown()
+    assert said[:2] == ["arm: none_needed", "Enough."]
+    at = said.index("sets of effects, by probability:")
+    assert said[at + 1 : at + 3] == ["   0.750  drift", "   0.250  none"]
+    assert [line.split() for line in said[at + 4 : at + 8]] == [
+        ["rows", "kept", "aside", "before", "after", "noise"],
+        ["position", "[m]", "3e-05", "1e-05", "5e-06"],
+        ["rotation", "[rad]", "2e-06", "-", "1e-06"],
+        # noise is one sigma whatever it is in the rows at hand
+        ["normalised", "[sigma]", "7", "1.5", "1"],
+    ]
+    assert [line.split() for line in said[at + 9 :]] == [
+        ["step", "unknowns", "m", "sigma", "bought"],
+        ["declared", "0", "3e-05", "7"],
+        ["geometry", "5", "1e-05", "1.5", "2e-05"],
+    ]
+
+
+def test_one_step_alone_buys_nothing(shown):
+    """Where only rotations were read its rms is one of angles."""
+    declared = Rung("declared", 0, Errors(float("nan"), 2e-6, 7.0))
+    assert [line.split() for line in shown(ladder=(declared,))[-2:]] == [
+        ["step", "unknowns", "rad", "sigma", "bought"],
+        ["declared", "0", "2e-06", "7"],
+    ]
+
+
+def test_rows_fitted_are_called_so_where_none_was_kept_aside(shown):
+    said = shown(split=SimpleNamespace(fitted=np.ones(4, bool)))
+    assert any(line.startswith("rows fitted ") for line in said)
+
+
+def test_only_outliers_kept_aside_are_taken_out_of_the_errors(shown):
+    """An outlier among the rows fitted is named all the same."""
+    fitted = shown(outliers=np.array([False, True, False, False]))
+    assert "left out as outliers: m1" in fitted
+    assert not any(line.startswith("without outliers") for line in fitted)
+    aside = shown(outliers=np.array([False, True, False, True]))
+    assert "left out as outliers: m1, m3" in aside
+    (cut,) = [line for line in aside if line.startswith("without outliers")]
+    assert cut.split() == ["without", "outliers", "6", "1.25", "1"]
+
+
+def test_noise_is_said_where_repeats_scatter_more_or_time_correlates(shown):
+    assert not any("repeats" in line or "correlated" in line for line in shown())
+    factor = np.repeat([1.0, 1.5], 3)
+    assert any("1.5 times (positions)" in line for line in shown(noise_factor=factor))
+    (line,) = [
+        line
+        for line in shown(noise_in_time=NoiseInTime(0.35, 60.0, 1e-9))
+        if "correlated" in line
+    ]
+    assert "35 % of its variance over 60 s" in line
+
+
+def test_what_is_left_and_what_to_measure_is_said_last(shown):
+    following = NextMeasurement(
+        "a and b differ", {"q.one": 0.5}, (0.0, 0, 0, 10.0, 0, 0), {"temperature": 5.0},
+        12.0,
+    )  # fmt: skip
+    said = shown(
+        trends=(Trend("cov.bed", 0.42, 1e-9),), next=following, remarks=("odd",),
+        open=np.array([True, False, False, False]),
+    )  # fmt: skip
+    assert "odd" in said
+    assert any("free in 1 of 4 rows" in line for line in said)
+    assert "left varies with cov.bed: 42 %" in said
+    assert said[-2:] == [
+        "measure next: q.one=0.5; load fx=10, temperature 5",
+        "  a and b differ",
+    ]
+    assert load_text((0.0,) * 6) == "none"
+
+
+def test_the_best_known_frames_of_small_terms_are_named_six_at_most():
+    frames = [{"frame": f"f{k}", "identifiable": 0.1 * k} for k in range(1, 9)]
+    one = {
+        "scale": {"rotation": 2e-3}, "unit": {"rotation": "rad", "translation": "m"},
+        "frames": frames, "identifiable": 3.6, "unknowns": 48,
+    }  # fmt: skip
+    assert module._small_text(None, module.GEOMETRY) == []
+    assert module._small_text(one, module.GEOMETRY) == [
+        "geometric errors  (size 0.002 rad)",
+        "  3.6 of 48 known: f8 0.8, f7 0.7, f6 0.6, f5 0.5, f4 0.4, f3 0.3",
+    ]
+    declared = module._small_text(one | {"scale": {}}, module.SPRINGS)
+    assert declared[0] == "springs  (size as the tolerances say)"
+
+
+@pytest.mark.parametrize("verdict", ["explained", "none_needed"])
+def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdict):
+    """Effects where the verdict lists them; a long formula is cut at 160 letters."""
+    number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
+    effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
+    function = {
+        "where": "tool", "components": ["tx", "ty"], "variables": ["q.one"],
+        "formula": "x" * 200, "equivalent_places": [[], []],
+    }  # fmt: skip
+    monkeypatch.setattr(module, "effects", lambda diagnosis: [effect])
+    monkeypatch.setattr(module, "learned", lambda diagnosis: [function])
+    said = module._effects_text(made(verdict=verdict))
+    assert [line.split() for line in said] == (
+        []
+        if verdict == "none_needed"
+        else [
+            ["encoder_offset", "(probability", "0.980)"],
+            ["one", "2e-05", "+-", "1e-06", "rad"],
+        ]
+    )
+    assert module._learned_text(None) == [
+        "learned: tool tx, ty of q.one",
+        f"  {'x' * 157}...",
+        "  2 other places do as well",
+    ]
+
+
+def test_the_figures_of_a_diagnosis_name_the_three_likeliest():
+    one = made(claimed=(), probability={"a": 0.2, "b": 0.9, "c": 0.3, "d": 0.1})
+    one.campaign = type("Rows", (), {"name": "arm", "__len__": lambda self: 4})()
+    figures = Diagnosis._figures(one)
+    assert figures["likeliest"] == "b 0.900, c 0.300, a 0.200"
+    assert figures["claimed"] == "none"
+    assert figures["campaign"] == "arm, 4 rows"
+    one.probability, one.claimed = {}, ("b", "c")
+    figures = Diagnosis._figures(one)
+    assert (figures["likeliest"], figures["claimed"]) == ("none", "b, c")
