@@ -87,7 +87,7 @@ SAID = [
     ({"verdict": "explained"}, "lacks a and b and springs; on rows kept aside the"),
     ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
     ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on rows"),
-    ({"verdict": "outside_library"}, "sigma are left, which vary with x0, x1, x2"),
+    ({"verdict": "outside_library"}, "are left, which vary with x0, x1, x2;"),
     ({"verdict": "outside_library", "trends": ()}, "with nothing that was recorded;"),
 ]  # fmt: skip
 
