@@ -14,6 +14,7 @@ Order of things, each opened once:
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ def _without_outliers(
         The selection, and (R,) bool.
     """
     outliers, impossible = left_out
-    for turn in range(_TURNS + 1):
+    for turn in count():
         used = fitted & ~outliers
         earlier = selection = selected(
             campaign.take(used), conditions.take(used), earlier=earlier
@@ -236,7 +237,7 @@ def _with_errors(
                 break
         else:
             break
-        if np.abs(there - left).max(initial=0.0) < limit:
+        if np.abs(there - left).max() < limit:
             break
         conditions, known, lost, left = bent, values, trial, there
     return conditions

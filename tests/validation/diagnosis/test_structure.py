@@ -1,0 +1,141 @@
+"""All that a residual may vary with, against F tests by another routine."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import f
+
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import Frame, Robot
+from tests.bar_for_tests import bar
+from validation.diagnosis import structure
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.structure import trends
+
+ROWS = 30
+
+
+@pytest.fixture
+def varied(rng):
+    """A drive that turns and one that slides, loaded and warmed; some not measured."""
+    robot = Robot("crane", "tip", (
+        Frame("turn", joint="revolute", actuated=True),
+        Frame("slide", "turn", [0.3, 0, 0.1], joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.2, 0.1, 0]),
+    ))  # fmt: skip
+    q = rng.uniform(-1, 1, (ROWS, 2))
+    placed = [place_robot(robot, joints={"turn": a, "slide": b}) for a, b in q]
+    seen = rng.normal(size=(ROWS, 6))
+    seen[rng.random((ROWS, 6)) < 0.2] = np.nan
+    seen[4:, 5] = np.nan
+    return replace(
+        bar(rows=ROWS, measured=seen, time=rng.uniform(0, 500, ROWS),
+            humidity=rng.normal(size=ROWS)),
+        robot=robot, loads=rng.normal(size=(ROWS, 6)),
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )  # fmt: skip
+
+
+def functions(campaign):
+    """Names and functions, written down from what the trends are called."""
+    loads, (turn, slide) = campaign.loads, campaign.coordinates.T[:2]
+    T = campaign.transforms[:, -1]
+    turned = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
+    pose = np.hstack([T[:, :3, 3], turned])
+    size = np.sqrt((loads[:, 3:] ** 2).sum(axis=1))
+    every = {
+        "load, linearly": loads, "square of the load's size": size**2,
+        "size of the load": size, "pose, linearly": pose,
+        "q.turn, once a turn": np.array([np.sin(turn), np.cos(turn)]).T,
+        "q.turn, twice a turn": np.array([np.sin(2 * turn), np.cos(2 * turn)]).T,
+    }  # fmt: skip
+    for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):
+        every[f"load.{name}"] = loads[:, k]
+    squares = {f"pose.{n}": p for n, p in zip(structure.POSE, pose.T, strict=True)}
+    squares |= {"q.turn": turn, "q.slide": slide}
+    for name, values in campaign.covariates.items():
+        every[f"cov.{name}"] = values
+        squares[f"cov.{name}"] = values
+    for name, x in squares.items():
+        every[f"{name} and its square"] = np.array([x, x**2]).T
+    time = campaign.covariates["time"]
+    turns = 2 * np.pi * time / (time.max() - time.min())
+    every["cov.time, slow waves"] = np.array([
+        np.sin(turns), np.sin(2 * turns), np.cos(turns), np.cos(2 * turns)
+    ]).T  # fmt: skip
+    return {name: X.reshape(ROWS, -1) for name, X in every.items()}
+
+
+def by_least_squares(X, z):
+    """Share and F test of functions beside a constant, component by component."""
+    squares, unknowns = np.zeros(2), np.zeros(2)
+    for column in z.T:
+        known = np.isfinite(column)
+        if known.sum() < X.shape[1] + 3:
+            continue
+        y, one = column[known], np.ones((known.sum(), 1))
+        for k, A in enumerate((one, np.hstack([one, X[known]]))):
+            A = A / np.linalg.norm(A, axis=0).clip(1e-9)
+            x, _, rank, _ = np.linalg.lstsq(A, y, rcond=1e-9)
+            squares[k] += np.sum((y - A @ x) ** 2)
+            unknowns[k] += rank if k else len(y) - 1
+    extra = unknowns[1] - np.sum([
+        1 for c in z.T if np.isfinite(c).sum() >= X.shape[1] + 3
+    ])
+    freedom = unknowns[0] - extra
+    ratio = (squares[0] - squares[1]) / extra / (squares[1] / freedom)
+    return 1 - squares[1] / squares[0], f.sf(ratio, extra, freedom)
+
+
+def test_every_trend_is_an_f_test_of_what_its_name_says(varied, monkeypatch):
+    monkeypatch.setattr(structure, "_SEEN", 2.0)
+    monkeypatch.setattr(structure, "_MOST", 100)
+    found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
+    every = functions(varied)
+    # what stays zero is no function of the rows
+    moving = {n: X for n, X in every.items() if np.any(np.ptp(X, axis=0) > 1e-12)}
+    assert {t.against for t in found} == moving.keys()
+    for trend in found:
+        share, chance = by_least_squares(every[trend.against], varied.measured)
+        assert trend.share == pytest.approx(share, rel=1e-6)
+        assert trend.probability == pytest.approx(
+            min(1.0, len(every) * chance), rel=1e-6
+        )
+    shares = [t.share for t in found]
+    assert shares == sorted(shares, reverse=True)
+
+
+def test_noise_shows_none_and_six_are_named_at_most(varied):
+    here = conditions_of(varied)
+    assert trends(varied, here, varied.measured * varied.sigma) == []
+    lines = {f"c{k}": varied.covariates["humidity"] for k in range(9)}
+    many = replace(varied, covariates=lines)
+    rest = (varied.measured + 5 * lines["c0"][:, None]) * varied.sigma
+    assert len(trends(many, conditions_of(many), rest)) == 6
+
+
+@pytest.mark.parametrize("units", [1e-9, 1.0, 1e9])
+def test_a_trend_knows_no_units(varied, units):
+    x = varied.covariates["humidity"]
+    rest = (varied.measured + x[:, None]) * varied.sigma
+    scaled = replace(varied, covariates={"humidity": units * x})
+    found = trends(scaled, conditions_of(scaled), rest)
+    expected = by_least_squares(x[:, None], varied.measured + x[:, None])[0]
+    (line,) = [t for t in found if t.against == "cov.humidity"]
+    assert line.share == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_cannot_be_tested_is_no_trend():
+    """Too few readings; nothing varied; nothing left by it, or at all."""
+    x = np.linspace(0.0, 1.0, 5)[:, None]
+    for X, z in (
+        (x[:3], np.ones((3, 1))), (np.ones((5, 1)), x**2), (x, 3 * x),
+        (x, np.zeros((5, 1))), (x, np.ones((5, 1))), (x, np.full((5, 1), np.nan)),
+    ):  # fmt: skip
+        found = structure._test("x", X, z, 1)
+        assert found is None or found.share > 1 - 1e-12
+    assert structure._test("x", x[:4], x[:4] ** 2, 1).share > 0.9
+    assert structure._test("x", x[:3], x[:3] ** 2, 1) is None
