@@ -97,8 +97,8 @@ def believed_noise(campaign: Campaign, residual: NDArray) -> NDArray:
     """
     columns = np.nonzero(campaign.cells)[1]
     factors = np.ones(6)
-    for part in (slice(3), slice(3, 6)):
-        own = np.isin(columns, np.arange(6)[part])
+    for part in np.split(np.arange(6), 2):
+        own = np.isin(columns, part)
         squares, freedom = _repeats(campaign, residual, own)
         if freedom and float(chi2.sf(squares, freedom)) < SIGNIFICANT:
             factors[part] = np.sqrt(squares / freedom)
@@ -110,11 +110,10 @@ def _repeats(
 ) -> tuple[float, int]:
     """Squares between repeats under one condition, and their number; of ``own``."""
     rows, columns = np.nonzero(campaign.cells)
-    group = _alike(campaign)[rows] * 6 + columns
+    alike = _alike(campaign)[rows], columns
+    group = np.ravel_multi_index(alike, campaign.cells.shape)
     if own is not None:
         group, residual = group[own], residual[own]
-    if not len(group):
-        return 0.0, 0
     order = np.argsort(group, kind="stable")
     _, start, count = np.unique(group[order], return_index=True, return_counts=True)
     mean = np.add.reduceat(residual[order], start) / count

@@ -88,7 +88,7 @@ def _candidates(
         yield f"cov.{name}", values[:, None]
         yield f"cov.{name} and its square", _powers(values)
         span = float(np.ptp(values))
-        if name == "time" and span > 0:
+        if name == "time" and span:
             w = 2 * np.pi * np.outer(values / span, [1, 2])
             yield "cov.time, slow waves", np.hstack([np.sin(w), np.cos(w)])
 
@@ -110,7 +110,7 @@ def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
         y = column[known]
         varied = X[known] - X[known].mean(axis=0)
         size = np.linalg.norm(varied, axis=0)
-        varied = varied[:, size > 1e-12 * np.abs(X).max(initial=1.0)]
+        varied = varied[:, size > 1e-12 * np.abs(X).max(axis=0)]
         if not varied.shape[1]:
             continue
         y = y - y.mean()
@@ -121,7 +121,7 @@ def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
         after += float(left @ left)
         extra += u.shape[1]
         freedom += len(y) - 1 - u.shape[1]
-    if not extra or before == 0.0 or freedom <= 0 or after <= 0.0:
+    if not extra or not after:
         return None
     ratio = ((before - after) / extra) / (after / freedom)
     chance = min(1.0, tried * float(f.sf(ratio, extra, freedom)))

@@ -105,6 +105,7 @@ def test_repeats_that_are_equal_leave_no_noise_to_blame():
     judged = lack_of_fit(campaign, whiten(campaign, seen), 1)
     assert (judged.repeats, judged.repeats_freedom) == (0.0, 2)
     assert judged.against_repeats == 0.0
+    assert lack_of_fit(campaign, 0.1 * seen[:, 4], 1).against_repeats == 0.0
     assert lack_of_fit(campaign, np.zeros(4), 1).against_repeats == 1.0
 
 
@@ -147,6 +148,25 @@ def test_rows_are_alike_by_what_they_differ_and_not_by_where_zero_is():
         found = lack_of_fit(campaign, whiten(campaign, seen), 0)
         assert found.repeats_freedom in {1, 2}
         assert found.repeats == pytest.approx(np.sqrt(2))
+
+
+def test_rows_are_alike_within_thirtieths_of_the_range_from_its_least():
+    """0 and 0.02 of the range are alike and 0.04 is not, wherever that begins."""
+    warm = 0.5 / 60 + np.array([0.0, 0.02, 0.04, 1.0])
+    campaign = campaign_of(np.zeros((4, 6)), repeat=np.zeros(4, int), temperature=warm)
+    z = np.tile([1.0, 3.0, 50.0, 90.0], (6, 1)).T.ravel()
+    found = lack_of_fit(campaign, z, 0)
+    assert (found.repeats_freedom, found.repeats) == (6, pytest.approx(np.sqrt(2)))
+
+
+def test_only_what_is_nearly_as_far_as_the_farthest_is_a_worst():
+    """Rms of 100, 71 and 69: the third waits until the others are left out."""
+    z = np.ones((80, 6))
+    z[[5, 6, 7]] = np.array([100.0, 71.0, 69.0])[:, None]
+    campaign = campaign_of(z)
+    for worst, expected in ((False, [5, 6, 7]), (True, [5, 6])):
+        far = outlying(campaign, z.ravel(), worst=worst)
+        assert np.flatnonzero(far).tolist() == expected
 
 
 def test_the_same_command_on_a_warmer_day_is_no_repeat():

@@ -27,13 +27,15 @@ def varied(rng):
     ))  # fmt: skip
     q = rng.uniform(-1, 1, (ROWS, 2))
     placed = [place_robot(robot, joints={"turn": a, "slide": b}) for a, b in q]
-    seen = rng.normal(size=(ROWS, 6))
+    loads, humidity = rng.normal(size=(ROWS, 6)), rng.normal(size=ROWS)
+    shown = humidity + loads[:, 3] + 1.5 * np.sin(q[:, 0])
+    seen = rng.normal(size=(ROWS, 6)) + shown[:, None]
     seen[rng.random((ROWS, 6)) < 0.2] = np.nan
     seen[4:, 5] = np.nan
     return replace(
         bar(rows=ROWS, measured=seen, time=rng.uniform(0, 500, ROWS),
-            humidity=rng.normal(size=ROWS)),
-        robot=robot, loads=rng.normal(size=(ROWS, 6)),
+            humidity=humidity),
+        robot=robot, loads=loads,
         coordinates=np.stack([p.coordinates for p in placed]),
         transforms=np.stack([p.transforms for p in placed]),
     )  # fmt: skip
@@ -108,34 +110,52 @@ def test_every_trend_is_an_f_test_of_what_its_name_says(varied, monkeypatch):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_noise_shows_none_and_six_are_named_at_most(varied):
-    here = conditions_of(varied)
-    assert trends(varied, here, varied.measured * varied.sigma) == []
+def test_noise_shows_none_and_six_are_named_at_most(varied, rng):
+    here, noise = conditions_of(varied), rng.normal(size=(ROWS, 6))
+    assert trends(varied, here, noise * varied.sigma) == []
     lines = {f"c{k}": varied.covariates["humidity"] for k in range(9)}
     many = replace(varied, covariates=lines)
-    rest = (varied.measured + 5 * lines["c0"][:, None]) * varied.sigma
+    rest = (noise + 5 * lines["c0"][:, None]) * varied.sigma
     assert len(trends(many, conditions_of(many), rest)) == 6
 
 
-@pytest.mark.parametrize("units", [1e-9, 1.0, 1e9])
-def test_a_trend_knows_no_units(varied, units):
-    x = varied.covariates["humidity"]
-    rest = (varied.measured + x[:, None]) * varied.sigma
-    scaled = replace(varied, covariates={"humidity": units * x})
-    found = trends(scaled, conditions_of(scaled), rest)
-    expected = by_least_squares(x[:, None], varied.measured + x[:, None])[0]
-    (line,) = [t for t in found if t.against == "cov.humidity"]
-    assert line.share == pytest.approx(expected, rel=1e-6)
+@pytest.mark.parametrize("units", [1e-15, 1.0, 1e9])
+def test_a_trend_knows_no_units(units, rng):
+    """Each column may have its own; what is constant but for rounding is none."""
+    x, y = rng.normal(size=(2, 9, 1))
+    z = x + 0.5 * y + 0.1 * rng.normal(size=(9, 1))
+    expected = structure._test("x", np.hstack([x, y]), z, 1)
+    found = structure._test("x", np.hstack([units * x, y]), z, 1)
+    assert found.share == pytest.approx(expected.share, rel=1e-9)
+    assert found.probability == pytest.approx(expected.probability, rel=1e-6)
+    assert structure._test("x", np.full((9, 1), units / 3), z, 1) is None
+
+
+def test_a_square_is_seen_however_far_from_zero(rng):
+    """A megakelvin and up to one more, or half a second of time."""
+    x = rng.uniform(0, 1, 40)
+    z = ((x - 0.5) ** 2)[:, None]
+    assert structure._test("x", structure._powers(1e6 + x), z, 1).share > 1 - 1e-6
+    campaign = bar(rows=40, time=0.5 * x)
+    rest = np.sin(2 * np.pi * x)[:, None] * campaign.sigma
+    found = trends(campaign, conditions_of(campaign), rest)
+    assert "cov.time, slow waves" in [t.against for t in found]
+
+
+def test_rows_of_one_moment_have_no_waves():
+    campaign = bar(rows=9, time=np.full(9, 3.0))
+    names = [n for n, _ in structure._candidates(campaign, conditions_of(campaign))]
+    assert "cov.time" in names
+    assert "cov.time, slow waves" not in names
 
 
 def test_what_cannot_be_tested_is_no_trend():
-    """Too few readings; nothing varied; nothing left by it, or at all."""
+    """Too few readings; nothing varied; nothing there; nothing measured."""
     x = np.linspace(0.0, 1.0, 5)[:, None]
     for X, z in (
-        (x[:3], np.ones((3, 1))), (np.ones((5, 1)), x**2), (x, 3 * x),
-        (x, np.zeros((5, 1))), (x, np.ones((5, 1))), (x, np.full((5, 1), np.nan)),
+        (x[:3], x[:3] ** 2), (np.ones((5, 1)), x**2), (x, np.zeros((5, 1))),
+        (x, np.full((5, 1), np.nan)),
     ):  # fmt: skip
-        found = structure._test("x", X, z, 1)
-        assert found is None or found.share > 1 - 1e-12
-    assert structure._test("x", x[:4], x[:4] ** 2, 1).share > 0.9
-    assert structure._test("x", x[:3], x[:3] ** 2, 1) is None
+        assert structure._test("x", X, z, 1) is None
+    # one more reading than that; so small that squares are less than one
+    assert structure._test("x", x[:4], 1e-3 * x[:4] ** 2, 1).share > 0.9
