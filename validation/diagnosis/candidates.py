@@ -133,8 +133,8 @@ class Sensitivities:
 
     def _basis(self, name: str, shape: CandidateShape) -> tuple[NDArray, NDArray]:
         """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
-        numbers = dict.fromkeys(shape.names, 0.0) | dict(shape.given)
-        function = Function("reading", ("tx",), (name,), shape.form, numbers)
+        anywhere = CandidatePart("reading", ("tx",), name)
+        (function,) = Candidate((anywhere,), "screw", shape).functions()
         raw = np.nan_to_num(basis(self.conditions, function, shape.names))
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))

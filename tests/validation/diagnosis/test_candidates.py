@@ -1,0 +1,135 @@
+"""Candidates: their columns, their numbers, and where they may act."""
+
+import numpy as np
+import pytest
+
+from assembly.effects.forms import roughness
+from assembly.files.robot_file import read_robot
+from assembly.model.robot import BeamLink, Frame, Robot
+from tests.campaigns_for_tests import ARM
+from validation.campaign.campaign_file import read_commands
+from validation.diagnosis.candidates import (
+    Candidate,
+    CandidatePart,
+    Sensitivities,
+    places_of,
+)
+from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.responses import responses
+from validation.diagnosis.signatures import conditions_of
+
+LINE = CandidateShape("powers", ("0", "1"))
+
+
+@pytest.fixture
+def sensitivities(tmp_path):
+    """Twelve configurations of the planar arm, the second drive at rest."""
+    table = tmp_path / "commands.csv"
+    q = np.linspace(0.2, 1.7, 12).round(6)
+    lines = [f"m{i},{a:.6f},0" for i, a in enumerate(q)]
+    table.write_text("\n".join(["id,q.one,q.two", *lines]) + "\n")
+    (tmp_path / "arm.toml").write_text(ARM)
+    campaign = read_commands(table, read_robot(tmp_path / "arm.toml"))
+    conditions = conditions_of(campaign)
+    return Sensitivities(conditions, campaign.robot, responses(conditions)), q
+
+
+def one_at(components, shape=LINE):
+    part = CandidatePart("reading", components, "q.one")
+    return Candidate((part,), "screw", shape)
+
+
+def test_numbers_of_a_function_are_zero_until_they_are_found():
+    shape = CandidateShape("step", ("size",), (("at", 0.5),))
+    (function,) = one_at(("tx",), shape).functions()
+    assert function.parameters == {"size": 0.0, "at": 0.5}
+    assert (function.where, function.variables) == ("reading", ("q.one",))
+
+
+def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities):
+    s, q = sensitivities
+    columns, mixed = s.basis("q.one", LINE)
+    np.testing.assert_allclose(columns.T @ columns / 12, np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(np.array([q**0, q]).T @ mixed, columns, atol=1e-12)
+    columns, mixed = s.basis("q.two", CandidateShape("powers", ("1",)))
+    assert not columns.any()
+    assert mixed.tolist() == [[1.0]]
+
+
+def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):
+    """Its values have the covariance (roughness + 0.1)^-1, to a factor."""
+    s, q = sensitivities
+    ends = (("first", q[0]), ("last", q[-1]))
+    shape = CandidateShape("spline", tuple("12345"), ends)
+    columns, mixed = s.basis("q.one", shape)
+    assert np.sum(np.mean(columns**2, axis=0)) == pytest.approx(1.0)
+    covariance = np.linalg.inv(roughness(5) + 0.1 * np.eye(5))
+    factor = np.trace(covariance) / np.trace(mixed @ mixed.T)
+    np.testing.assert_allclose(factor * mixed @ mixed.T, covariance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("units", [1.0, 1e-12])
+def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
+    """T x, and their deviations; as small as they may be."""
+    s, _ = sensitivities
+    _, mixed = s.basis("q.one", LINE)
+    x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
+    (function,) = s.fitted(one_at(("tx", "rz")), x, std)
+    assert function.components == ("tx", "rz")
+    expected = dict(zip(("tx.0", "tx.1"), mixed @ x[:2], strict=True)) | dict(
+        zip(("rz.0", "rz.1"), mixed @ x[2:], strict=True)
+    )
+    assert function.parameters == pytest.approx(expected, rel=1e-9, abs=0)
+    spread = 0.1 * units * np.linalg.norm(mixed, axis=1)
+    assert [function.std[f"rz.{k}"] for k in "01"] == pytest.approx(
+        spread, rel=1e-9, abs=0
+    )
+
+
+def test_components_that_are_not_seen_are_left_out(sensitivities):
+    """Of one that is left its numbers have no name before theirs; of none, nothing."""
+    s, _ = sensitivities
+    _, mixed = s.basis("q.one", LINE)
+    x = np.array([1e-12, 0.0, 1e-3, 2e-3])
+    (function,) = s.fitted(one_at(("tx", "rz")), x, np.full(4, 1e-4))
+    assert function.components == ("rz",)
+    values = dict(zip("01", mixed @ x[2:], strict=True))
+    assert function.parameters == pytest.approx(values | {"0": values["0"]})
+    assert set(function.std) == {"0", "1"}
+    (whole,) = s.fitted(one_at(("rz",)), x[2:], np.full(2, 1e-4))
+    assert whole.parameters == pytest.approx(values)
+    assert s.fitted(one_at(("tx", "rz")), np.zeros(4), np.full(4, 1e-4)) == []
+
+
+def arm(drives, beams):
+    """A chain of so many drives and, behind them, of so many beams along x."""
+    beam = BeamLink({"radius": 0.03}, 70e9, 0.33)
+    frames, parent = [], "base"
+    for k in range(drives):
+        turning = {"joint": "revolute", "actuated": True}
+        frames.append(Frame(f"j{k}", parent, **turning))
+        parent = f"j{k}"
+    for k in range(beams):
+        frames.append(Frame(f"b{k}", parent, [0.5, 0, 0], link=beam))
+        parent = f"b{k}"
+    return Robot("arm", parent, tuple(frames))
+
+
+@pytest.mark.parametrize("drives", [1, 2, 3])
+@pytest.mark.parametrize("beams", [1, 2, 3])
+def test_drives_and_beams_act_together_where_there_are_two(drives, beams):
+    """Each drive with its own coordinate, beams along themselves; else one by one."""
+    robot = arm(drives, beams)
+    found = list(places_of(robot, ["q.j0", "cov.temperature"]))
+    together = [(kind, parts) for kind, parts in found if len(parts) > 1]
+    own = tuple(CandidatePart(f"j{k}", ("rz",), f"q.j{k}") for k in range(drives))
+    along = tuple(
+        CandidatePart(f"b{k}", ("tx",), "cov.temperature") for k in range(beams)
+    )
+    expected = [("screw", along)] if beams > 1 else []
+    expected += [("screw", own), ("compliance", own)] if drives > 1 else []
+    assert together == expected
+    # by variable: a frame's six components as screw and compliance, its turns, its
+    # shifts; the reading's six and all; turns and shifts of the base
+    single = len(found) - len(together)
+    assert single == 2 * (14 * len(robot.frames) + 7 + 2)
