@@ -83,8 +83,7 @@ class Evidence:
         self._penalty = 0.5 * np.log(cells)  # of each size asked for
         self._begin = np.cumsum([0, *(len(term) for term in terms)])
         group = [
-            np.where(t.group < 0, t.group, 2 * i + t.group)
-            for i, t in enumerate(terms)
+            np.where(t.group < 0, t.group, 2 * i + t.group) for i, t in enumerate(terms)
         ]
         self._group = np.concatenate([np.zeros(0, int), *group])
         self._most = np.array([size for t in terms for size in t.most])

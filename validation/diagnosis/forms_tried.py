@@ -1,5 +1,6 @@
 """Forms in which a candidate may depend on its variable, general ones first."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,9 +48,8 @@ def first_shapes(robot: Robot, name: str) -> list[CandidateShape]:
         return [_powers(1)]
     if is_angle(robot, name):
         return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
-    if name.startswith("q."):
-        return [_powers(0, 1, 2, 3), REVERSAL]
-    return [_powers(0, 1, 2, 3)]
+    cubic = _powers(0, 1, 2, 3)
+    return [cubic, REVERSAL] if name.startswith("q.") else [cubic]
 
 
 def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
@@ -85,12 +85,8 @@ def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateSh
             CandidateShape("step", ("size",), (("at", float(v)),))
             for v in np.unique(levels)
         ]
-    if (
-        name.startswith("cov.")
-        and np.isfinite(conditions.time).all()
-        and np.ptp(conditions.time) > 0
-    ):
-        span = float(np.ptp(conditions.time))
+    span = float(np.ptp(conditions.time))
+    if name.startswith("cov.") and math.isfinite(span) and span:
         shapes += [
             CandidateShape("lag", ("gain", "start"), (("time_constant", part * span),))
             for part in LAGS

@@ -1,12 +1,14 @@
 """Forms in which a readings' remainder may depend on a variable."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from assembly.model.robot import Frame, Robot
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.forms_tried import MANY, all_shapes, first_shapes
+from validation.diagnosis.forms_tried import LAGS, MANY, all_shapes, first_shapes
 from validation.diagnosis.signatures import conditions_of
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "base_compliance_drift"
@@ -89,7 +91,29 @@ def test_a_first_look_takes_the_general_forms(conditions):
     robot = conditions.robot
     angle = first_shapes(robot, f"q.{angle_of(conditions)}")
     assert [one.form for one in angle] == ["waves", "powers", "reversal"]
-    assert len(angle[0].names) == 8
+    orders = [f"{k}.{w}" for k in range(1, 5) for w in ("sine", "cosine")]
+    assert list(angle[0].names) == orders
     assert angle[1].names == ("0", "1", "2")
     (other,) = first_shapes(robot, "cov.temperature")
     assert (other.form, other.names) == ("powers", ("0", "1", "2", "3"))
+    sliding = Frame("slide", joint="prismatic", actuated=True)
+    slide = Robot("axis", "tool", (sliding, Frame("tool", "slide")))
+    cubic, reversal = first_shapes(slide, "q.slide")
+    assert (cubic.names, reversal.form) == (("0", "1", "2", "3"), "reversal")
+
+
+@pytest.mark.parametrize(
+    ("begin", "span"), [(0.0, 0.5), (1e3, 60.0), (0.0, 0.0), (0.0, np.nan)]
+)
+def test_periods_and_lags_are_parts_of_the_span_of_time(conditions, begin, span):
+    """However short it is and whenever it began; none without any."""
+    count = len(conditions)
+    time = begin + span * np.linspace(0, 1, count)
+    wet = {"wet": np.linspace(0, 1, count)}
+    found = shapes(replace(conditions, time=time, covariates=wet), "cov.wet")
+    lags = [given["time_constant"] for _, given in found.get("lag", [])]
+    assert lags == pytest.approx([span * part for part in LAGS] if span > 0 else [])
+    if span > 0:
+        found = shapes(replace(conditions, time=time), "time")
+        periods = [given["period"] for _, given in found["slow_wave"]]
+        assert max(periods) == pytest.approx(2 * span)

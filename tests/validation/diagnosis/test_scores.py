@@ -190,6 +190,9 @@ VERDICTS = [
     ([((), 0.4), (("a",), 0.35), (("b",), 0.25)], {"a": 0.35, "b": 0.25}, False,
      "ambiguous", ()),
     ([(("a",), 1.0)], {"a": 1.0}, True, "outside_library", ()),
+    # each is sure, the pair of both alone is none of the sets
+    ([(("a", "b", "c"), 0.49), (("a", "b", "d"), 0.46)],
+     {"a": 0.95, "b": 0.95, "c": 0.49, "d": 0.46}, False, "ambiguous", ()),
 ]  # fmt: skip
 
 
