@@ -197,7 +197,7 @@ class Screen:
         for own in ways.values():
             chosen.update(sorted(own, key=alone.index)[:_WAYS])
         pairs: set[tuple[int, ...]] = {*combinations(sorted(chosen), 2)}
-        pairs |= {(i, j) for i in alone[:_BEST] for j in indices if i != j}
+        pairs |= {(i, j) for i in alone[:_BEST] for j in indices}
         self._enlarge(scored, pairs)
         for size in range(3, largest + 1):
             best = [s for s in scored.values() if len(s.members) == size - 1]

@@ -96,9 +96,12 @@ def test_larger_sets_have_the_best_smaller_ones(rng):
     z = np.zeros(40)
     z[10], z[20], z[30] = 9.0, 8.0, 7.0
     others = [signature(n, columns[:, [k]]) for n, k in (("b", 20), ("c", 30))]
-    sets = Screen(z, [*ways, *others]).search()
+    screen = Screen(z, [*ways, *others])
+    sets = screen.search()
     assert sets[0].members == (10, 11, 12)
-    assert all(len(s.members) <= 2 for s in Screen(z, [*ways, *others]).search(2))
+    for one in sets:  # no effect is there twice
+        assert len({screen.effects[i] for i in one.members}) == len(one.members)
+    assert all(len(s.members) <= 2 for s in screen.search(2))
 
 
 class Known:
