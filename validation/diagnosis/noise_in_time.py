@@ -67,8 +67,8 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
         return None
     series = [(times, residual[cells]) for times, cells in _series(campaign)]
     steps = np.concatenate([np.diff(times) for times, _ in series])
-    longest = max((np.ptp(times) for times, _ in series if len(times)), default=0.0)
-    if not (steps > 0).any():
+    longest = max(np.ptp(times) for times, _ in series)
+    if not steps.any():
         return None
     constants = np.geomspace(float(np.median(steps[steps > 0])), longest, _CONSTANTS)
     squares, logs = np.zeros((2, len(_SHARES), len(constants)))

@@ -116,9 +116,10 @@ def compare_signatures(
         The comparison.
     """
     names = tuple(columns)
-    rows = len(next(iter(columns.values()))) if names else 0
-    out = _basis(np.zeros((rows, 0)) if nuisance is None else nuisance)
-    left = {e: A - out @ (out.T @ A) for e, A in columns.items()}
+    left = dict(columns)
+    if nuisance is not None:
+        out = _basis(nuisance)
+        left = {e: A - out @ (out.T @ A) for e, A in columns.items()}
     bases = {e: _basis(left[e], float(np.linalg.norm(columns[e]))) for e in names}
     sizes = np.array([np.linalg.norm(columns[e]) for e in names])
     cosine, shared = np.eye(len(names)), np.eye(len(names))

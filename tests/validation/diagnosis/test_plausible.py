@@ -122,3 +122,28 @@ def test_what_is_far_from_the_usual_temperature_is_flagged_not_what_is_hot(campa
         heat[2], heat[4] = usual + 149.0, usual - 151.0
         odd = replace(campaign, covariates={"temperature": heat})
         assert np.flatnonzero(impossible_rows(odd)).tolist() == [4]
+
+
+def test_what_nothing_loads_but_its_weight_may_give_by_a_fifth_too(campaign):
+    """10 kg and 5 N along x alone: 103.1 N at the longest body's 0.6 m."""
+    frames = campaign.robot.frames
+    heavy = replace(frames[-1], mass=10.0)
+    robot = replace(campaign.robot, frames=(*frames[:-1], heavy))
+    loads = np.zeros((len(campaign), 6))
+    loads[:, 3] = -5.0
+    loaded = replace(campaign, robot=robot, loads=loads)
+    force = 5.0 + 9.81 * (10.0 + sum(f.mass for f in frames[:-1]))
+    softest = force / (0.2 * 0.6)
+    for value, count in ((1.001 * softest, 0), (0.999 * softest, 1)):
+        fit = SimpleNamespace(effects={"base_compliance": {"stiffness.tx": value}})
+        assert len(implausible(loaded, fit, NOTHING)) == count
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "value"),
+    [("load_gain", "offset.fx", 20.0), ("contact_stiffening", "one.exponent", 7.0),
+     ("encoder_eccentricity", "one.phase", 3.0)],
+)  # fmt: skip
+def test_other_numbers_may_be_anything(campaign, effect, name, value):
+    fit = SimpleNamespace(effects={effect: {name: value}})
+    assert implausible(campaign, fit, NOTHING) == ()

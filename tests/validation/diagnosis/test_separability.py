@@ -64,6 +64,23 @@ def test_nuisances_take_what_they_can_imitate(rng):
     np.testing.assert_array_equal(found.visible, [True, True, False])
 
 
+@pytest.mark.parametrize("units", [1e-9, 1.0])
+def test_nuisances_are_taken_out_whatever_their_size(units, rng):
+    """Two at right angles, one 200 times the other; none at all takes nothing."""
+    Q, _ = np.linalg.qr(rng.normal(size=(40, 3)))
+    out = units * Q[:, :2] * [1e4, 50.0]
+    found = compare_signatures({"a": Q @ [[3.0], [4.0], [12.0]]}, out)
+    assert found.left == pytest.approx(12 / 13)
+    assert compare_signatures({"a": Q[:, :1]}, out[:, :0]).left == pytest.approx(1.0)
+
+
+def test_no_cosine_is_larger_than_one(rng):
+    for _ in range(20):
+        A = rng.normal(size=(30, 3))
+        found = compare_signatures({"a": A, "b": A @ rng.normal(size=(3, 3))})
+        assert max(found.cosine.max(), found.shared.max()) <= 1.0
+
+
 def test_what_is_too_small_to_be_seen_may_be_larger_than_thought(rng):
     """2 sigma in all rows together does not show; a twin it is at any size."""
     line = rng.normal(size=(30, 1))
