@@ -29,6 +29,7 @@ Sources:
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -38,6 +39,7 @@ from numpy.typing import NDArray
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
 _MOST = 999  # powers, waves and knots
+_INDEX = re.compile("0|-?[1-9][0-9]{0,8}")  # a whole number, as it is written
 
 
 @dataclass(frozen=True)
@@ -78,15 +80,8 @@ class Form:
         count = 1 if self.name == "reversal" else variables
         least, most = self.indices
         return len(parts) == count and all(
-            str(_whole(p)) == p and least <= _whole(p) <= most for p in parts
+            _INDEX.fullmatch(part) and least <= int(part) <= most for part in parts
         )
-
-
-def _whole(text: str) -> int:
-    """A whole number, or one that no index is."""
-    digits = text.removeprefix("-")
-    proper = digits.isascii() and digits.isdigit() and len(digits) < 9
-    return int(text) if proper else -(10**9)
 
 
 def column_indices(name: str) -> list[int]:

@@ -161,7 +161,7 @@ def _compiled_assembly(
     drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
     multipliers = out.multipliers[0]
     # without loads no wrenches mean no deformation but rounding
-    bent = len(out.elastic) > 0 and (loaded or multipliers.any())
+    bent = len(out.elastic) > 0 and (loaded or np.count_nonzero(multipliers) > 0)
     assembly = Assembly(
         linearisation=linearise(posture),
         joints=joints,
@@ -187,12 +187,6 @@ def _rounding_of(robot: Robot) -> float:
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
-def _any_load(loads: NDArray | None, count: int) -> NDArray:
-    """(k,) bool: which points are under loads."""
-    rows = np.zeros((count, 1)) if loads is None else loads.reshape(count, -1)
-    return np.any(rows, axis=1)
-
-
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
     springs: int, loads: NDArray | None,
@@ -214,21 +208,24 @@ def _solve_compiled(
         elastic=np.zeros((count if springs else 0, springs)),
     )
     given = structure, T, errors, mismatch, out
-    loaded = _any_load(loads, count)
     if stiffness_spread(joints, structure.size) > SPREAD:
         out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
-    elif loaded.all() or not loaded.any():
-        _fill(given, loads if loaded.any() else None)
+    elif loads is None:
+        _fill(given, None)
     else:  # points that no load acts on have the bits of those without
-        _fill_some(_fill, loaded, given, loads)
-        _fill_some(_fill, ~loaded, given, None)
+        loaded = np.any(loads, axis=(1, 2, 3))
+        for some, acting in ((loaded, loads), (~loaded, None)):
+            if some.all():
+                _fill(given, acting)
+            elif some.any():
+                _fill_some(_fill, some, given, acting)
     return out
 
 
 def _fill(given: _Given, loads: NDArray | None) -> None:
     """Every point, by what there is: a device, a compiler for C++, numba."""
     structure, T, errors, mismatch, out = given
-    if loads is None and not errors.any():
+    if loads is None and not np.count_nonzero(errors):
         return  # nothing has to move, and zeros are the answer
     if loads is None and assemble_on_device(*given):
         pass
@@ -236,7 +233,7 @@ def _fill(given: _Given, loads: NDArray | None) -> None:
         return _fill_by_numba(given, loads)
     # what was not certified side by side; rounding is another
     left = out.outcome >= COMPILED
-    if left.any():
+    if np.count_nonzero(left):
         _fill_some(_fill_by_numba, left, given, loads)
 
 
@@ -352,6 +349,9 @@ def _minimise_all(
     joints, structure = structure_of(robot, compliant)
     out = _solve_compiled(robot, T, errors, off, compliant, 0, loads)
     count = len(T)
+    loaded = np.zeros(count, dtype=bool)
+    if loads is not None:
+        loaded = np.any(loads, axis=(1, 2, 3))
     energies = Assemblies(
         energy=out.energy,
         bound=out.bound,
@@ -364,7 +364,7 @@ def _minimise_all(
         motions=out.motions,
         multipliers=out.multipliers,
         outcome=out.outcome,
-        loaded=_any_load(loads, count),
+        loaded=loaded,
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
         joints=joints,

@@ -156,7 +156,8 @@ def _side_by_side(
     if library is None:
         return False
     given = PointsRecord(len(T), *map(_address, points), len(errors) > 1)
-    given.loads = None if loads is None else _address(loads)
+    if loads is not None:
+        given.loads = _address(loads)
     rows = [(ctypes.c_void_p * len(table))(*map(_address, table)) for table in tables]
     getattr(library, name)(*map(ctypes.byref, (_robot(structure), given, *rows)))
     return True

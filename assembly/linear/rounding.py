@@ -56,7 +56,7 @@ def differs_from_zero(
     Returns:
         (...,) bool; also where the energy is not a number.
     """
-    uncertainty = np.asarray(gap) + residual * np.abs(multipliers).sum(axis=-1)
+    uncertainty = gap + residual * np.add.reduce(np.abs(multipliers), axis=-1)
     return ~(np.asarray(energy) <= uncertainty)
 
 
@@ -75,7 +75,7 @@ def drop_zeros(
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    if not zero.any():  # nor is any no more than rounding
+    if not np.count_nonzero(zero):  # nor is any no more than rounding
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
         loaded

@@ -70,3 +70,36 @@ def test_roughness_is_the_integral_of_squared_curvature():
 ])  # fmt: skip
 def test_names_of_columns(form, name, count, known):
     assert FORMS[form].is_column(name, count) is known
+
+
+@pytest.mark.parametrize(("form", "name", "known"), [
+    ("waves", "-999.sine", True), ("waves", "999.cosine", True),
+    ("waves", "1000.sine", False), ("waves", "-1000.sine", False),
+    ("waves", "-0.sine", False), ("waves", "0.cosine", True),
+    ("waves", "1.tangent", False), ("powers", "20", True), ("powers", "21", False),
+    ("powers", "+1", False), ("powers", " 1", False), ("powers", "1e0", False),
+    ("powers", "0000000001", False), ("powers", "\u0661", False),  # an Arabic one
+    ("spline", "1", True), ("spline", "999", True), ("spline", "1000", False),
+    ("powers", "9" * 5000, False), ("waves", "-" + "9" * 5000 + ".sine", False),
+])  # fmt: skip
+def test_indices_of_columns_are_whole_numbers_within_their_range(form, name, known):
+    assert FORMS[form].is_column(name, 1) is known
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_fewer_than_three_knots_are_not_rough(count):
+    """A natural spline through two values is a line."""
+    assert np.array_equal(roughness(count), np.zeros((count, count)))
+
+
+def test_no_names_are_no_columns():
+    for form in ("powers", "waves", "step"):
+        assert columns(form, [], at=0.0).shape == (len(X), 0)
+
+
+def test_variables_that_forms_may_have():
+    """As docs/robot_files.md says: what remembers by itself has one, a reversal two."""
+    assert {name: form.most for name, form in FORMS.items()} == {
+        "powers": 2, "waves": 2, "spline": 2, "lag": 1, "creep": 1, "step": 1,
+        "slow_wave": 1, "reversal": 2,
+    }  # fmt: skip

@@ -1,0 +1,155 @@
+"""Effects whose parameters are left out in part, and what fits give instead of them."""
+
+from dataclasses import replace
+from math import atan2, cos, hypot, sin
+
+import numpy as np
+import pytest
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.base_compliance import FOUNDATION, on_foundation, with_foundation
+from assembly.effects.functions import covariates_of
+from assembly.effects.joint_clearance import moving_joints
+from assembly.kinematics.posture import place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.model.function import Function
+from assembly.model.robot import Clearance, Frame
+from assembly.robots import load_robot
+from tests.assembly.effects.test_effects import K, L, arm, change, here, standing
+
+
+def public(name, values, robot=None):
+    """Parameters of an effect from what a fit finds."""
+    return LIBRARY[name].public(robot or arm(), values)
+
+
+def test_a_contact_of_unknown_exponent_is_hertzs():
+    F, c = 25.0, 1e7
+    load = (0, 0, 0, 0, F, 0)
+    seen = change(
+        here(arm(rigid=True), load), "contact_stiffening", {"drive.coefficient": c}
+    )
+    assert seen[2] == pytest.approx((F * L / c) ** (2 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [None, 2.0])
+def test_a_contacts_coefficient_is_what_gives_so_much_under_one_newton_metre(exponent):
+    give, n = 1e-4, exponent or 1.5
+    values = {"drive.give": give}
+    if exponent:
+        values["drive.exponent"] = exponent
+    found = public("contact_stiffening", values)
+    assert found["drive.coefficient"] * give**n == pytest.approx(1.0, rel=1e-12)
+    assert found["drive.exponent"] == n
+    assert public("contact_stiffening", {"drive.give": 0.0}) == {}
+
+
+def test_an_encoders_amplitude_and_phase():
+    """s sin q + c cos q = a sin(q + p)."""
+    for values in ({"drive.sine": 2e-5, "drive.cosine": 3e-5}, {"drive.sine": -2e-5},
+                   {"drive.cosine": 3e-5}):  # fmt: skip
+        s, c = (values.get(f"drive.{part}", 0.0) for part in ("sine", "cosine"))
+        found = public("encoder_eccentricity", values)
+        assert found["drive.amplitude"] == pytest.approx(hypot(s, c), rel=1e-12)
+        assert found["drive.phase"] == pytest.approx(atan2(c, s), rel=1e-12)
+        q = 0.7
+        wave = found["drive.amplitude"] * sin(q + found["drive.phase"])
+        assert wave == pytest.approx(s * sin(q) + c * cos(q), rel=1e-12)
+
+
+def test_an_eccentric_encoder_without_a_phase_is_right_at_zero():
+    for q in (0.0, 0.9):
+        seen = change(
+            here(arm(), q=q), "encoder_eccentricity", {"drive.amplitude": 1e-5}
+        )
+        assert seen[2] == pytest.approx(1e-5 * sin(q), rel=1e-9, abs=1e-18)
+
+
+def test_a_joint_that_was_not_approached_knows_no_friction():
+    values = {"drive": 2.0}
+    for approach, part in ((0.0, 0.0), (0.5, -0.5)):
+        seen = change(here(arm(K), approach=approach), "friction_hysteresis", values)
+        assert seen[2] == pytest.approx(part * 2.0 / K, rel=1e-9, abs=1e-18)
+
+
+def test_two_feet_need_a_foundation_though_the_first_would_do():
+    robot = standing()
+    both = replace(robot, frames=(*robot.frames, Frame("other")))
+    found = on_foundation(as_declared(place_robot(both), np.zeros(6))).robot
+    assert [f.name for f in found.frames] == [
+        FOUNDATION,
+        *(f.name for f in both.frames),
+    ]
+    assert [f.parent for f in found.frames] == ["base", FOUNDATION, "foot", "drive",
+                                               FOUNDATION]  # fmt: skip
+
+
+def test_a_foundation_has_a_name_of_its_own():
+    once = with_foundation(load_robot("arm6"), {})
+    twice = with_foundation(once, {"stiffness.tz": 1e6})
+    assert [f.name for f in twice.frames[:2]] == [FOUNDATION + "_", FOUNDATION]
+    assert np.diag(twice.frames[0].joint_stiffness)[5] == 1e6
+    assert np.isinf(np.diag(twice.frames[0].joint_stiffness)[:5]).all()
+
+
+def test_a_foundations_own_rows_come_first_and_are_still():
+    """What is known of the other frames stays theirs."""
+    rng = np.random.default_rng(1)
+    given = here(arm(), q=0.3)
+    given = replace(
+        given, rest=rng.normal(size=(1, 2, 6)), errors=rng.normal(size=(1, 2, 6))
+    )
+    found = on_foundation(given)
+    for name in ("rest", "errors", "coordinates"):
+        rows, before = getattr(found, name), getattr(given, name)
+        assert rows.shape == (1, 3, *before.shape[2:])
+        assert np.array_equal(rows[:, 1:], before)
+        assert not rows[:, 0].any()
+    assert np.array_equal(found.transforms[0, 0], np.eye(4))
+    assert np.array_equal(found.transforms[:, 1:], given.transforms)
+
+
+@pytest.mark.parametrize(("clearance", "tight"), [
+    (None, True), (Clearance(), True), (Clearance(radial=1e-5), False),
+    (Clearance(axial=1e-5), False), (Clearance(tilt=1e-5), False),
+])  # fmt: skip
+def test_joints_that_may_have_clearance_are_those_declared_tight(clearance, tight):
+    robot = arm()
+    drive = replace(robot.frames[0], clearance=clearance)
+    robot = replace(robot, frames=(drive, robot.frames[1]))
+    assert moving_joints(robot) == (("drive",) if tight else ())
+
+
+def test_clearance_adds_to_what_is_declared():
+    robot = arm(rigid=True)
+    drive = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
+    robot = replace(robot, frames=(drive, robot.frames[1]))
+    values = {"drive.axial": 3e-5, "drive.radial": 1e-5, "drive.tilt": 0.0}
+    found = apply_effects(here(robot), {"joint_clearance": values}).robot.frames[0]
+    assert found.clearance.axial == pytest.approx(5e-5, rel=1e-12)
+    assert found.clearance.radial == 1e-5
+    assert not found.clearance.tilt
+    fitted = {"drive.radial": 2e-9, "drive.axial": 1e-9, "drive.tilt": 0.0}
+    assert public("joint_clearance", fitted) == {"drive.radial": 2e-9}
+
+
+def test_a_factor_on_the_modulus_from_how_much_softer():
+    assert public("modulus_scale", {"tip.softer": 0.25}) == {"tip": 0.8}
+    assert public("modulus_scale", {"tip.softer": -0.5}) == {"tip": 2.0}
+
+
+@pytest.mark.parametrize(("form", "variables", "needed"), [
+    ("reversal", ("q.drive",), ["approach"]),
+    ("lag", ("cov.speed",), ["speed", "time"]),
+    ("creep", ("load.fz",), ["time"]),
+    ("powers", ("cov.speed",), ["speed"]),
+    ("powers", ("time",), ["time"]),
+    ("powers", ("q.drive",), []),
+])  # fmt: skip
+def test_covariates_that_functions_need(form, variables, needed):
+    function = Function("drive", ("rz",), variables, form, {"1": 0.0})
+    robot = replace(arm(), functions=(function,))
+    assert list(covariates_of(robot, [])) == needed
+    in_one = replace(robot, functions=(replace(function, session="a"),))
+    assert list(covariates_of(in_one, ["b"])) == []
+    assert list(covariates_of(in_one, ["b", "a"])) == needed

@@ -1,0 +1,107 @@
+"""Places that give by a law of what goes through them, or of another place's wrench."""
+
+from dataclasses import replace
+from math import cos
+
+import numpy as np
+import pytest
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.model.function import Function
+from assembly.model.robot import Frame, MatrixLink, Robot
+from tests.assembly.effects.test_effects import L, here
+from tests.assembly.effects.test_functions import (
+    RIGID,
+    at_drive,
+    campaign_of,
+    seen,
+    turned,
+)
+
+F = 30.0  # [N] across the arm
+
+
+def loaded(q):
+    return here(RIGID, (0, 0, 0, 0, F, 0), q=q)
+
+
+@pytest.mark.parametrize("place", ["base", "drive"])
+def test_what_the_base_carries_turns_the_drive(place):
+    """The moment about z is the same in both: the drive stands at the base's origin."""
+    law = at_drive({"2": 1e-7}, variables=(f"wrench.{place}.mz",))
+    turn = 1e-7 * (F * L * cos(0.5)) ** 2
+    found = seen(loaded(0.5), law)[0]
+    assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
+
+
+def test_each_component_of_a_wrench_is_its_own():
+    """The force F along y at the tip is Fy in the drive, its moment F L about z."""
+    turns = {"fy": F, "mz": F * L, "fx": 0.0, "fz": 0.0, "mx": 0.0, "my": 0.0}
+    for component, wrench in turns.items():
+        law = at_drive({"1": 1e-6}, variables=(f"wrench.drive.{component}",))
+        expected = turned(1e-6 * wrench, 0.0)
+        assert seen(loaded(0.0), law)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+def test_a_compliance_that_grows_with_its_moment():
+    """(c + d M) M, no spring."""
+    soft = at_drive(
+        {"0": 1e-5, "1": 2e-7}, variables=("wrench.drive.mz",), kind="compliance"
+    )
+    M = F * L * cos(0.3)
+    found = seen(loaded(0.3), soft)[0]
+    turn = (1e-5 + 2e-7 * M) * M
+    assert found == pytest.approx(turned(turn, 0.3), rel=1e-3, abs=1e-8)
+
+
+def test_a_place_gives_in_its_session_alone():
+    rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
+    rows = replace(rows, load=np.tile([0, 0, 0, 0, F, 0], (3, 1)))
+    for kind, parameters, variables in (
+        ("compliance", {"0": 1e-5}, ("time",)),
+        ("screw", {"1": 1e-5}, ("wrench.drive.mz",)),
+    ):
+        own = at_drive(parameters, variables=variables, kind=kind, session="a")
+        turn = 1e-5 * F * L
+        assert seen(rows, own)[:, 2] == pytest.approx([turn, 0, turn], rel=1e-6)
+
+
+def test_friction_grows_with_the_size_of_a_moment():
+    """A reversal of a wrench: direction times |M|, whichever way M acts."""
+    q = [0.0, 0.5, 0.2]
+    rows = campaign_of(np.arange(3.0), q=q, approach=1.0)
+    side = np.array([1, 1, -1])
+    for sign in (1.0, -1.0):
+        there = replace(rows, load=np.tile([0, 0, sign * 4.0, 0, 0, 0], (3, 1)))
+        back = at_drive({"1": 1e-6}, "reversal", ("q.drive", "wrench.drive.mz"))
+        assert seen(there, back)[:, 2] == pytest.approx(side * 4e-6, rel=1e-6)
+
+
+def test_a_function_of_two_components_has_numbers_of_its_own_for_each():
+    both = Function(
+        "drive", ("rz", "tx"), ("q.drive",), "powers", {"rz.0": 1e-5, "tx.0": 2e-5}
+    )
+    found = seen(here(RIGID), both)[0]
+    assert found == pytest.approx([0, 0, 1e-5, 2e-5, 1e-5 * L, 0], rel=1e-4, abs=1e-9)
+
+
+def test_a_matrix_twice_as_stiff_bends_half():
+    tip = replace(RIGID.frames[1], link=MatrixLink(np.diag([1e4] * 3 + [1e6] * 3)))
+    there = here(replace(RIGID, frames=(RIGID.frames[0], tip)), (0, 0, 0, 0, F, 0))
+    link = apply_effects(there, {"modulus_scale": {"tip": 2.0}}).robot.frames[1].link
+    assert np.array_equal(link.stiffness, 2.0 * tip.link.stiffness)
+
+
+def test_units_where_a_joint_slides():
+    slides = Robot("slides", "tip", (Frame("slide", joint="prismatic", actuated=True),
+                                     Frame("tip", "slide")))  # fmt: skip
+    for name, parameter, sliding, turning in (
+        ("friction_hysteresis", "", "N", "N m"),
+        ("contact_stiffening", ".coefficient", "N/m^n", "N m/rad^n"),
+        ("contact_stiffening", ".exponent", "1", "1"),
+        ("encoder_offset", "", "m", "rad"),
+        ("drive_compliance", "", "N/m", "N m/rad"),
+    ):
+        unit = LIBRARY[name].unit
+        assert unit(slides, "slide" + parameter) == sliding
+        assert unit(RIGID, "drive" + parameter) == turning
