@@ -189,8 +189,9 @@ def _rounding_of(robot: Robot) -> float:
 
 def _any_load(loads: NDArray | None, count: int) -> NDArray:
     """(k,) bool: which points are under loads."""
-    rows = np.zeros((count, 1)) if loads is None else loads.reshape(count, -1)
-    return np.any(rows, axis=1)
+    if loads is None:
+        return np.zeros(count, dtype=bool)
+    return np.any(loads.reshape(count, -1), axis=1)
 
 
 def _solve_compiled(
