@@ -6,7 +6,12 @@ from numpy.typing import ArrayLike
 from assembly.batch.one_posture import OnePosture
 from assembly.batch.posture_loads import posture_loads
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import closure_signs, linearise, virtual_joints
+from assembly.linear.closure import (
+    closure_signs,
+    cone_starts,
+    linearise,
+    virtual_joints,
+)
 from assembly.linear.load import loads_with_weight
 from assembly.linear.reduction import complement, reduce_problem
 from assembly.linear.thresholds import RANK
@@ -55,11 +60,10 @@ def prepare_energies(
     size = np.tile(np.repeat([1.0, lin.size], 3), len(robot.closures))
     signs = closure_signs(robot)
     wrenches = np.einsum("nji,kn->nikj", posture.paths, signs)
-    starts = np.searchsorted(joints.group, np.arange(joints.group.max(initial=-1) + 2))
     return OnePosture(
         posture=posture,
         joints=joints,
-        starts=starts.astype(np.int64),
+        starts=cone_starts(joints.group),
         G=reduced.G,
         H=reduced.H,
         closures=A,

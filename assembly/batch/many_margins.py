@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
+from assembly.linear.closure import (
+    VirtualJoints,
+    cone_starts,
+    linearise,
+    virtual_joints,
+)
 from assembly.linear.reduction import complement, reduce_problem
 from assembly.linear.thresholds import INFEASIBLE, RANK
 from assembly.linear.zone import zone_margin
@@ -142,11 +147,10 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     inverse = np.linalg.pinv(A @ joints.free, rcond=RANK)
     screws = np.hstack([joints.cones, np.eye(A.shape[1])])
     bounds = component_bounds(clearance_bounds(robot, compliant)).ravel()
-    starts = np.searchsorted(joints.group, np.arange(joints.group.max(initial=-1) + 2))
     return PostureMargins(
         posture=posture,
         joints=joints,
-        starts=starts.astype(np.int64),
+        starts=cone_starts(joints.group),
         B=np.ascontiguousarray(B),
         K=-(U.T / S[:, None]) @ rigid.T @ reduced.basis.T @ A,
         infeasible=redundant.T @ A,

@@ -122,7 +122,8 @@ def _virtual_joints(
     bounds = np.where(
         np.array(left_out)[:, None] & ~scaled & (bounds > 0), np.inf, bounds
     )
-    links = joints = np.zeros((0, 6, 6))
+    none: NDArray = np.zeros(0)
+    links = joints = none
     if compliant in {"elastic", "hinged"}:
         links, joints = link_compliances(robot), joint_compliances(robot)
     if compliant == "hinged":
@@ -184,6 +185,30 @@ def _free(bounds: NDArray) -> NDArray:
     return columns
 
 
+def cone_starts(group: NDArray) -> NDArray:
+    """First column of every cone.
+
+    Args:
+        group: (nu,) cone of each column, in order.
+
+    Returns:
+        (cones + 1,) and nu after the last.
+    """
+    return np.append(0, np.cumsum(np.bincount(group)))
+
+
+def in_reference_lengths(size: float) -> NDArray:
+    """Factors that make lengths of screws comparable with angles.
+
+    Args:
+        size: [m] reference length.
+
+    Returns:
+        (6,) 1 for angles [-] and 1 / size for lengths [1/m].
+    """
+    return np.repeat([1.0, 1.0 / size], 3)
+
+
 @dataclass(frozen=True, eq=False)
 class Linearisation:
     """The assembly constraints at a posture.
@@ -205,9 +230,8 @@ class Linearisation:
         The blocks sign_kj M_j; translations divided by :attr:`size`.
         """
         robot = self.posture.robot
-        scale = np.repeat([1.0, 1.0 / self.size], 3)
         blocks = closure_signs(robot)[:, :, None, None] * self.posture.paths
-        rows = np.swapaxes(blocks * scale[:, None], 1, 2)
+        rows = np.swapaxes(blocks * in_reference_lengths(self.size)[:, None], 1, 2)
         return rows.reshape(6 * len(robot.closures), 6 * len(robot.frames))
 
     @cached_property

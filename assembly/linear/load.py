@@ -210,8 +210,8 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
     if given is None:
         return
     values = np.asarray(given, dtype=float)
-    if not np.abs(values).max(initial=0.0) <= largest:  # NaN is refused
-        refused = ~(np.abs(values) <= largest)
+    refused = ~(np.abs(values) <= largest)  # NaN, too
+    if refused.any():
         raise BadInput(
             f"{whose}: found {values[refused].flat[0]:g}, expected finite numbers of "
             f"size at most {largest:g} [{unit}]"

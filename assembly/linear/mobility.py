@@ -7,6 +7,7 @@ import numpy as np
 from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import closure_signs
+from assembly.linear.thresholds import rank_of
 
 
 @dataclass(frozen=True)
@@ -44,18 +45,13 @@ def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
     A = np.swapaxes(blocks, 1, 2).reshape(6 * len(robot.closures), len(robot.frames))
     moves = mobile(robot)
     passive = moves & ~np.array([f.actuated for f in robot.frames])
-    values = _values(A[:, moves])
-    rank = int(np.sum(values > tolerance * values.max(initial=0.0)))
-    locked = _values(A[:, passive])
-    locked_rank = int(np.sum(locked > tolerance * values.max(initial=0.0)))
+    values = np.linalg.svd(A[:, moves], compute_uv=False)
+    rank = rank_of(values, tolerance)
+    locked = np.linalg.svd(A[:, passive], compute_uv=False)
+    locked_rank = int(np.sum(locked > tolerance * values[:1]))
     return Mobility(
         freedoms=int(moves.sum()) - rank,
         locked_freedoms=int(passive.sum()) - locked_rank,
         overconstraint=len(A) - rank,
         smallest_singular_value=float(values[rank - 1]) if rank else 0.0,
     )
-
-
-def _values(A: np.ndarray) -> np.ndarray:
-    """Singular values, largest first; none for an empty matrix."""
-    return np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)

@@ -25,7 +25,13 @@ from assembly.linear.closure import virtual_joints
 from assembly.linear.fallback import solve_with
 from assembly.linear.reach import loaded_cones
 from assembly.linear.reduction import complement
-from assembly.linear.thresholds import NOISE, RANK, ROWS_RANK, rank_tolerance
+from assembly.linear.thresholds import (
+    RANK,
+    ROWS_RANK,
+    noise_of,
+    rank_of,
+    rank_tolerance,
+)
 from assembly.model.clearance import has_bounded_motion
 from assembly.solvers.conic import into_cones, minimise_energy
 from stiffness.screws import skew
@@ -106,7 +112,6 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
     A_q, A_v = lin.rows @ joints.free, lin.rows @ columns
     Z = complement(A_q, rank_tolerance(assembly.posture.mismatch))
     _, S, Vt = np.linalg.svd(Z.T @ A_v, full_matrices=False)
-    noise = max(NOISE * np.abs(A_v).max(initial=0.0), ROWS_RANK * S.max(initial=0.0))
     follow = np.linalg.lstsq(A_q, -A_v, rcond=RANK)[0]
     at_point = np.eye(6)
     at_point[3:, :3] = -skew(np.asarray(offset, dtype=float))
@@ -115,7 +120,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
         unloaded=unloaded,
         deviation=at_point @ assembly.platform_screw,
         map=at_point @ lin.platform @ (columns + joints.free @ follow),
-        rows=Vt[: int(np.sum(S > noise))],
+        rows=Vt[: rank_of(S, ROWS_RANK, noise_of(A_v))],
         start=into_cones(assembly.clearances[unloaded], group),
         group=group,
     )

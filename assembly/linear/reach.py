@@ -22,15 +22,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
 from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, virtual_joints
+from assembly.linear.closure import VirtualJoints, cone_starts, virtual_joints
 from assembly.linear.fallback import without_own_springs
 from assembly.linear.reduction import complement
 from assembly.linear.thresholds import (
-    MISMATCH_FACTOR,
-    NOISE,
     RANK,
     ROWS_RANK,
     UNBOUNDED,
+    noise_of,
+    rank_of,
+    rank_tolerance,
 )
 from assembly.model.clearance import (
     Compliant,
@@ -146,7 +147,7 @@ class ReachableSet:
         direction = np.asarray(direction, dtype=float)
         gradient = self.map.T @ direction
         along = np.abs(direction @ self.free).max(initial=0.0)
-        if along > UNBOUNDED * np.abs(direction).max(initial=0.0):
+        if along > UNBOUNDED * np.abs(direction).max():
             return Support(np.inf, self.centre, gradient)
         at_centre = float(direction @ self.centre)
         size = float(np.linalg.norm(gradient))
@@ -226,8 +227,7 @@ class ReachableSet:
     @property
     def _starts(self) -> NDArray:
         """(cones + 1,) first column of each cone, and nv."""
-        cones = np.arange(self.group.max(initial=-1) + 2)
-        return np.searchsorted(self.group, cones)
+        return cone_starts(self.group)
 
 
 def reachable_screws(
@@ -268,7 +268,7 @@ def reachable_screws(
             columns = np.hstack([columns, joints.elastic * radius])
             spring = assembly.elastic / max(radius, 1e-300)
             start = np.concatenate([start, spring])
-            last = group.max(initial=-1) + 1
+            last = np.bincount(group).size
             group = np.concatenate([group, np.full(len(spring), last)])
         lin = assembly.linearisation
         return MovingCones(lin.rows @ columns, lin.platform @ columns, start, group)
@@ -322,7 +322,7 @@ class _Motion:
 
     def _with_mismatch(self, threshold: float) -> float:
         """[-] a threshold plus the rounding of the nominal closures."""
-        return threshold + MISMATCH_FACTOR * self.assembly.posture.mismatch
+        return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
@@ -339,7 +339,7 @@ class _Motion:
         step = -inverse @ self.cones.closures
         middle = self.assembly.clearance_screws.ravel()[row] - step @ self.cones.start
         most = np.abs(middle)
-        for c in range(group.max(initial=-1) + 1):
+        for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
         # a motion that nothing but its bound resists goes up to it
         passing = limited & ((most > limit) | free.any(axis=0))
@@ -355,7 +355,7 @@ class _Motion:
         return ReachableSet(
             centre=self.assembly.platform_screw,
             map=self.cones.platform - follow @ A_v,
-            rows=_rows(Z.T @ A_v, NOISE * np.abs(A_v).max(initial=0.0)),
+            rows=_rows(Z.T @ A_v, noise_of(A_v)),
             start=self.cones.start,
             group=self.cones.group,
             free=free,
@@ -372,7 +372,7 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 def _rows(A: NDArray, noise: float) -> NDArray:
     """Orthonormal rows spanning those of A, but for rounding."""
     _, S, Vt = svd(A, full_matrices=False)
-    return Vt[: int(np.sum(S > max(noise, ROWS_RANK * S.max(initial=0.0))))]
+    return Vt[: rank_of(S, ROWS_RANK, noise)]
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:

@@ -26,9 +26,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, svd
 
-from assembly.linear.closure import Linearisation, VirtualJoints
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    in_reference_lengths,
+)
 from assembly.linear.load import FrameLoads, loads_on_frames
-from assembly.linear.thresholds import NOISE, RANK, ROWS_RANK, rank_tolerance
+from assembly.linear.thresholds import (
+    RANK,
+    ROWS_RANK,
+    noise_of,
+    rank_of,
+    rank_tolerance,
+)
 from forcefit.inputs.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW
 
@@ -143,14 +153,13 @@ def reduce_problem(
     right = -Z.T @ linearisation.misfit - A_y @ load_springs
 
     U, S, Vt = svd(A_y, full_matrices=True)
-    noise = NOISE * np.abs(A @ joints.elastic).max(initial=0.0)
-    rank = int(np.sum(S > max(noise, tolerance * S.max(initial=0.0))))
+    rank = rank_of(S, tolerance, noise_of(A @ joints.elastic))
     elastic_rows, rigid_rows = U[:, :rank], U[:, rank:]  # springs enter, none does
     G = -(elastic_rows.T @ A_u) / S[:rank, None]
     h = elastic_rows.T @ right / S[:rank]
     H, k, rigid, inconsistent = _rigid_rows(
         rigid_rows, A_u, right, linearisation, tolerance,
-        noise=NOISE * np.abs(A @ joints.cones).max(initial=0.0),
+        noise=noise_of(A @ joints.cones),
     )  # fmt: skip
     return Reduction(
         linearisation=linearisation,
@@ -187,9 +196,7 @@ def complement(A: NDArray, tolerance: float) -> NDArray:
         (m, m - rank).
     """
     Q, R, _ = qr(A, pivoting=True)
-    size = np.abs(np.diag(R))
-    rank = int(np.sum(size > tolerance * size.max(initial=0.0)))
-    return Q[:, rank:]
+    return Q[:, rank_of(np.abs(np.diag(R)), tolerance) :]
 
 
 def spring_deformations(
@@ -234,7 +241,7 @@ def _load_multipliers(
 def _motion_text(lin: Linearisation, screws: NDArray) -> str:
     """A free motion in words: the joints that make it and the platform's unit screw."""
     robot = lin.posture.robot
-    sizes = np.abs(screws.reshape(-1, 6) * np.repeat([1.0, 1.0 / lin.size], 3))
+    sizes = np.abs(screws.reshape(-1, 6) * in_reference_lengths(lin.size))
     moved = sizes.max(axis=1)
     joints = [
         f"{robot.frames[i].name} {SCREW[sizes[i].argmax()].lower()}"
@@ -264,9 +271,7 @@ def _rigid_rows(
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
     # clearances are small: their columns count against their own size
-    rank = (
-        int(np.sum(S > max(noise, ROWS_RANK * S.max(initial=0.0)))) if A_u.size else 0
-    )
+    rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
     # rows count as rigid by a tolerance: of what loads bend that much is left in them

@@ -61,7 +61,7 @@ def reference_energy(
         constraints.append(screws[hard] == 0)
         roots = [_root_of_stiffness(one) for one in C]
         energy += cp.sum_squares(block_diag(*roots) @ cp.vec(screws, "C")) / 2
-    work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
+    work = np.asarray(np.zeros(6) if load is None else load, dtype=float) @ x_p * _UNIT
     _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
@@ -94,7 +94,7 @@ def reference_margin(posture: Posture, compliant: Compliant = "rigid") -> float 
 def _root_of_stiffness(C: NDArray) -> NDArray:
     """(6, 6) R with R^T R the stiffness, zero in directions that do not yield."""
     soft = np.flatnonzero(np.diag(C) > 0)
-    root = np.zeros((6, 6))
+    root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
         np.linalg.inv(C[np.ix_(soft, soft)])
     ).T

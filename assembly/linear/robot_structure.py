@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
-from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
+from assembly.linear.closure import (
+    VirtualJoints,
+    closure_signs,
+    cone_starts,
+    virtual_joints,
+)
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.model.robot import Robot
 from assembly.solvers.layouts import Indices, Matrix, Vector
@@ -110,8 +115,6 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
     bounds = component_bounds(clearance_bounds(robot, compliant))
     free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
-    cone_count = int(joints.group.max(initial=-1)) + 1
-    cone_starts = np.searchsorted(joints.group, np.arange(cone_count + 1))
     return Structure(
         size=size_of(robot),
         platform=tree.platform,
@@ -128,7 +131,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
         cone_frame=cone_frame,
         cone_axis=cone_axis,
         cone_size=cones.sum(axis=1),
-        starts=cone_starts.astype(np.int64),
+        starts=cone_starts(joints.group),
         free_frame=free_frame,
         free_axis=free_axis,
         free_bound=bounds[free_frame, free_axis],

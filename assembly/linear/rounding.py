@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.closure import VirtualJoints
+from assembly.linear.closure import VirtualJoints, in_reference_lengths
 
 ROUNDING = 8 * float(np.finfo(float).eps)  # of sums of some tens of terms
 SPREAD = 1e13  # of stiffnesses: rounding of the stiffest is 1e-3 of the softest
@@ -26,17 +26,15 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
     Returns:
         8 units in the last place of the sum of errors and clearances.
     """
-    weights = np.array([1.0] * 3 + [1.0 / size] * 3)
-    sums = (np.abs(errors) @ weights).sum(axis=-1)
+    sums = (np.abs(errors) @ in_reference_lengths(size)).sum(axis=-1)
     return ROUNDING * (sums + _clearance_sum(joints, size))
 
 
 @lru_cache(maxsize=64)
 def _clearance_sum(joints: VirtualJoints, size: float) -> float:
     """[rad, lengths] all clearances together."""
-    weights = np.repeat([1.0, 1.0 / size], 3)
     clearances = np.abs(joints.cones[:, joints.scaled]).sum(axis=1).reshape(-1, 6)
-    return float((clearances @ weights).sum())
+    return float((clearances @ in_reference_lengths(size)).sum())
 
 
 def differs_from_zero(
@@ -87,6 +85,6 @@ def drop_zeros(
 @lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
     """[-] stiffest over softest spring, turns counted at the reference length."""
-    weights = np.tile(np.repeat([1.0, 1.0 / size], 3), len(joints.elastic) // 6)
+    weights = np.tile(in_reference_lengths(size), len(joints.elastic) // 6)
     compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
     return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

@@ -83,7 +83,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
-        last = group.max(initial=-1) + 1
+        last = np.bincount(group).size
         rows, ny = len(lin.rows), springs.shape[1]
         return MovingCones(
             closures=np.hstack([lin.rows @ columns, residual * np.eye(rows)]),
@@ -101,15 +101,11 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
     with np.errstate(invalid="ignore"):
         error = np.maximum(total - not_unique, 0.0)
     error = np.where(np.isinf(not_unique), 0.0, error)
-    turn, shift = slice(0, 3), slice(3, 6)
-    return ScrewBound(
-        rotation=float(np.linalg.norm(total[turn])),
-        translation=float(np.linalg.norm(total[shift])),
-        rotation_open=float(np.linalg.norm(not_unique[turn])),
-        translation_open=float(np.linalg.norm(not_unique[shift])),
-        rotation_error=float(np.linalg.norm(error[turn])),
-        translation_error=float(np.linalg.norm(error[shift])),
+    (rotation, translation), open_, errors = (
+        np.linalg.norm(half.reshape(2, 3), axis=1).tolist()
+        for half in (total, not_unique, error)
     )
+    return ScrewBound(rotation, translation, *open_, *errors)
 
 
 def _room(

@@ -1,5 +1,8 @@
 """Thresholds that the equations and their compiled counterparts share."""
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 RANK = 1e-10  # relative size below which a singular value counts as zero
 ROWS_RANK = 1e-9  # the same among rows that only clearances can satisfy
 # added to RANK for the rounding of robot files, times the nominal closure error left
@@ -14,13 +17,40 @@ INFEASIBLE = (
 MARGIN_GAP = 1e-8  # of a zone margin, accepted above its bound
 
 
-def rank_tolerance(mismatch: float) -> float:
+def rank_tolerance(mismatch: float, least: float = RANK) -> float:
     """Relative size below which a singular value of closures counts as zero.
 
     Args:
         mismatch: [rad, m] nominal closure error left.
+        least: the threshold of closures that hold exactly.
 
     Returns:
         The threshold.
     """
-    return RANK + MISMATCH_FACTOR * mismatch
+    return least + MISMATCH_FACTOR * mismatch
+
+
+def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
+    """How many singular values do not count as zero.
+
+    Args:
+        values: (k,) the largest first.
+        tolerance: share of the largest that a value has to pass.
+        noise: size that it has to pass.
+
+    Returns:
+        The rank; 0 without values.
+    """
+    return int(np.sum(values > np.maximum(noise, tolerance * values[:1])))
+
+
+def noise_of(columns: ArrayLike) -> float:
+    """What a projection may leave of columns that it removes whole.
+
+    Args:
+        columns: (m, n), before the projection.
+
+    Returns:
+        The noise of :func:`rank_of`; 0 without columns.
+    """
+    return NOISE * float(np.abs(columns).max(initial=0.0))

@@ -28,7 +28,11 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Content, Posture, Unchanged, content_of
-from assembly.linear.closure import closure_signs, virtual_joints
+from assembly.linear.closure import (
+    closure_signs,
+    in_reference_lengths,
+    virtual_joints,
+)
 from assembly.linear.load import FrameLoads
 from assembly.linear.thresholds import RANK
 from assembly.model.clearance import clearance_bounds, component_bounds
@@ -268,7 +272,7 @@ def _factorise(content: Content) -> Flexibility:
         raise ValueError(f"{robot.name} has clearance, which is not linear")
     n, count = len(robot.frames), len(postures.transforms)
     size = size_of(robot)
-    scale = np.array([1, 1, 1, 1 / size, 1 / size, 1 / size])
+    scale = in_reference_lengths(size)
     paths = postures.paths
     J = np.einsum("kn,cnij,i->ckinj", closure_signs(robot), paths, scale)
     J = J.reshape(count, 6 * len(robot.closures), 6 * n)
