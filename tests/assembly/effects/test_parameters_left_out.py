@@ -10,11 +10,13 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.base_compliance import FOUNDATION, on_foundation, with_foundation
 from assembly.effects.functions import covariates_of
 from assembly.effects.joint_clearance import moving_joints
+from assembly.effects.robot_effects import check_covariates
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.conditions import as_declared
 from assembly.model.function import Function
 from assembly.model.robot import Clearance, Frame
 from assembly.robots import load_robot
+from forcefit.inputs.errors import BadInput
 from tests.assembly.effects.test_effects import K, L, arm, change, here, standing
 
 
@@ -153,3 +155,11 @@ def test_covariates_that_functions_need(form, variables, needed):
     in_one = replace(robot, functions=(replace(function, session="a"),))
     assert list(covariates_of(in_one, ["b"])) == []
     assert list(covariates_of(in_one, ["b", "a"])) == needed
+
+
+def test_finite_motions_belong_to_the_exact_model():
+    robot = replace(arm(K), effects={"geometric_stiffening": {}})
+    check_covariates(robot, {}, finite=True)
+    with pytest.raises(BadInput, match="asks for finite motions"):
+        check_covariates(robot, {})
+    check_covariates(arm(K), {})
