@@ -270,6 +270,8 @@ def test_places_that_do_as_well_are_told_the_likelier_first(monkeypatch):
     (one,) = best_of(monkeypatch, worths)
     assert one.candidate.parts == PARTS[0]
     assert one.equivalent == (PARTS[2], PARTS[1])
+    (one,) = best_of(monkeypatch, table(tx_powers=50.0, ty_powers=46.9))
+    assert one.equivalent == ()
 
 
 def test_where_rows_follow_one_another_the_simplest_are_chosen(monkeypatch):
