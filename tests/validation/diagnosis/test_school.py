@@ -1,5 +1,6 @@
 """What is known while functions are looked for, against plain least squares."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.stats import chi2
 from tests.campaigns_for_tests import campaign_of
 from validation.diagnosis import learning as module
 from validation.diagnosis.candidates import CandidatePart
-from validation.diagnosis.evidence import Prior
+from validation.diagnosis.evidence import Evidence, Prior
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.learning import Learned, Lesson, _School, cost, learn
 from validation.diagnosis.remainder import Unexplained, function_term
@@ -96,6 +97,10 @@ def test_what_is_left_is_that_of_the_posterior(school, large, noise):
     assert s.freedom == round(CELLS - 2 - s.unknowns)
     assert s.noise == pytest.approx(max(1.0, np.sqrt(s.left / s.freedom)))
     assert s.noise == pytest.approx(max(1.0, noise), rel=0.2)
+    of_one = [replace(t, columns=free @ t.columns / s.noise) for t in s.terms]
+    likeliest = Evidence(of_one, CELLS).best(free @ z / s.noise)
+    for name, sizes in likeliest.scales.items():
+        assert s.prior.scales[name] == pytest.approx(sizes, rel=0.1)
     # columns of large groups are turned so that their products are diagonal
     assert [turn is not None for turn in s._turns] == [large <= 5, False, False]
     gram = J.T @ J
