@@ -291,7 +291,7 @@ def _best(
         return []
     unnamed = np.array([one.shape.form == "spline" for one in refined])
     worth = judged.worths(refined) - _SPLINE * unnamed
-    tried = len(looked) * max(1, len(refined) // len(chosen))
+    tried = len(looked) * (len(refined) // len(chosen))
     gains = worth - np.log(tried) - 0.5 * np.log(judged.count)
     sure = np.flatnonzero(gains >= _SURE)
     if not len(sure):

@@ -1,0 +1,192 @@
+"""Small unknowns of a loaded bar, worked out by hand, and what they add."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.measurement.predict import predict
+from assembly.model.robot import Frame, Robot
+from tests.bar_for_tests import LENGTH, along, bar
+from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis.background import background
+from validation.diagnosis.evidence import Prior
+from validation.diagnosis.kept_aside import FittedModel, _with_terms, errors_of
+from validation.diagnosis.responses import responses
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.small_terms import (
+    GEOMETRY,
+    SPRINGS,
+    SmallTerm,
+    added,
+    screws_of,
+    small_terms,
+    with_small,
+)
+
+LOAD = [0.0, 0, 4.0, 0, 0, 30.0]
+
+
+@pytest.fixture
+def loaded():
+    campaign = bar(LOAD)
+    conditions = conditions_of(campaign)
+    return campaign, conditions, responses(conditions)
+
+
+def column(campaign, screws):
+    """Whitened readings of screws (R, 6) of the tip, base axes."""
+    return (screws / SIGMA).ravel()
+
+
+def test_columns_are_what_a_unit_of_each_does(loaded):
+    """A drive turned about z, a tip shifted along itself; springs times the moment."""
+    campaign, conditions, response = loaded
+    geometry, springs = small_terms(campaign, conditions, response)
+    assert (geometry.name, springs.name) == (GEOMETRY, SPRINGS)
+    assert (geometry.lower, springs.lower) == (-np.inf, 0.0)
+    assert not (geometry.sure)
+    assert not (springs.sure)
+    # 0.2 rad and a tenth of the longest body
+    assert geometry.most == pytest.approx((0.2, 0.1 * LENGTH))
+    assert springs.most == (np.inf, np.inf)
+    assert len(geometry) == 12
+    by_place = dict(
+        zip(zip(geometry.frame.tolist(), geometry.axis.tolist(), strict=True),
+            geometry.columns.T, strict=True)
+    )  # fmt: skip
+    across = np.cross([0, 0, 1.0], along(campaign))
+    turned = np.hstack([np.tile([0, 0, 1.0], (8, 1)), LENGTH * across])
+    shifted = np.hstack([np.zeros((8, 3)), along(campaign)])
+    atol = 1e-6 / SIGMA.min()
+    np.testing.assert_allclose(by_place[0, 2], column(campaign, turned), atol=atol)
+    np.testing.assert_allclose(by_place[1, 3], column(campaign, shifted), atol=atol)
+    # of the platform, no spring; the drive carries 4 N m about z
+    assert set(springs.frame.tolist()) == {0}
+    (about,) = np.flatnonzero(springs.axis == 2)
+    np.testing.assert_allclose(
+        springs.columns[:, about], 4 * column(campaign, turned), atol=atol
+    )
+    # 30 N along z at the end of the bar bend it about x and y of the base
+    assert set(springs.axis.tolist()) == {0, 1, 2, 5}
+
+
+def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
+    campaign, _, _ = loaded
+    tolerance = np.array([1e-3, 0, 1e-3, 2e-4, 0, 1e-4])
+    frames = (replace(campaign.robot.frames[0], tolerance=tolerance),
+              campaign.robot.frames[1])  # fmt: skip
+    campaign = replace(campaign, robot=replace(campaign.robot, frames=frames))
+    conditions = conditions_of(campaign)
+    geometry, springs = small_terms(campaign, conditions, responses(conditions))
+    own = geometry.frame == 0
+    assert geometry.axis[own].tolist() == [0, 2, 3, 5]
+    np.testing.assert_array_equal(geometry.given[own], [1e-3, 1e-3, 2e-4, 1e-4])
+    assert geometry.group[own].tolist() == [-1, -1, -1, -1]
+    assert geometry.group[~own].tolist() == [0, 0, 0, 1, 1, 1]
+    assert geometry.sure
+    assert not springs.sure
+    some = geometry.take(own, slice(0, 6))
+    assert (some.columns.shape, len(some)) == ((6, 4), 4)
+
+
+def test_what_is_not_loaded_or_not_read_has_no_unknowns():
+    """Nothing is loaded: no springs; only x is read: what moves it."""
+    seen = np.full((8, 6), np.nan)
+    seen[:, 3] = 0.0
+    campaign = bar(measured=seen)
+    conditions = conditions_of(campaign)
+    (geometry,) = small_terms(campaign, conditions, responses(conditions))
+    places = set(zip(geometry.frame.tolist(), geometry.axis.tolist(), strict=True))
+    assert places == {(0, 2), (0, 3), (1, 3), (1, 4)}
+    assert geometry.columns.shape == (8, 4)
+
+
+def test_what_they_add_is_what_the_model_with_them_reads(loaded):
+    """Errors and springs of a size that is small; functions are passed over."""
+    campaign, conditions, response = loaded
+    terms = small_terms(campaign, conditions, response)
+    rng = np.random.default_rng(1)
+    values = [1e-6 * rng.normal(size=len(terms[0])), 1e-8 * rng.uniform(0.5, 1, 4)]
+    total = added(campaign, response, conditions, terms, values)
+    robot = with_small(campaign.robot, terms, values)
+    there = conditions_of(replace(campaign, robot=robot))
+    moved = predict(there).deviation - predict(conditions).deviation
+    np.testing.assert_allclose(total, moved, atol=1e-3 * np.abs(moved).max())
+    screws = screws_of(campaign, terms, values)
+    assert screws[terms[0].frame, terms[0].axis].tolist() == values[0].tolist()
+    np.testing.assert_allclose(
+        [f.geometric_error for f in robot.frames], screws, atol=1e-15
+    )
+    function = SmallTerm("function 1", np.zeros(1, int), np.zeros(1, int),
+                         np.zeros((48, 1)), np.full(1, np.nan), -np.inf)  # fmt: skip
+    more, also = [*terms, function], [*values, np.ones(1)]
+    np.testing.assert_array_equal(
+        added(campaign, response, conditions, more, also), total
+    )
+    assert screws_of(campaign, more, also).tolist() == screws.tolist()
+    same = with_small(campaign.robot, [function], [np.ones(1)])
+    assert same.frames == campaign.robot.frames
+
+
+def test_springs_of_no_compliance_stay_as_declared():
+    robot = Robot("a", "tip", (Frame("one", joint="revolute"), Frame("tip", "one")))
+    springs = SmallTerm(SPRINGS, np.zeros(2, int), np.array([0, 1]), np.zeros((1, 2)),
+                        np.full(2, np.nan), 0.0)  # fmt: skip
+    same = with_small(robot, [springs], [np.array([0.0, -1e-6])])
+    assert same.frame("one").joint_stiffness is robot.frame("one").joint_stiffness
+
+
+def test_some_terms_keep_their_sizes(loaded):
+    """Of geometry and springs, the geometry alone."""
+    campaign, conditions, response = loaded
+    terms = small_terms(campaign, conditions, response)
+    used = tuple(np.ones(len(t), bool) for t in terms)
+    scales = {GEOMETRY: (1e-4, 2e-5), SPRINGS: (1e-7, 1e-9)}
+    both = background(terms, Prior(used, scales, -4.0, 0.0))
+    assert _with_terms(both, [GEOMETRY, SPRINGS]) is both
+    one = _with_terms(both, [GEOMETRY])
+    assert [t.name for t in one.terms] == [GEOMETRY]
+    assert one.size.tolist() == both.size[:12].tolist()
+    assert one.score == 0.0
+    assert not _with_terms(both, [])
+
+
+def test_errors_of_readings_are_by_kind_and_by_sigma(loaded):
+    campaign, _, _ = loaded
+    left = np.zeros((8, 6))
+    left[2, 0], left[2, 3] = 3e-5, 4e-5
+    judged = errors_of(campaign, left, np.arange(8) == 2)
+    assert judged.rotation == pytest.approx(3e-5 / np.sqrt(3))
+    assert judged.position == pytest.approx(4e-5 / np.sqrt(3))
+    z = np.hypot(3e-5 / SIGMA[0], 4e-5 / SIGMA[3])
+    assert judged.normalised == pytest.approx(z / np.sqrt(6))
+
+
+def test_a_fitted_model_adds_functions_that_are_known(loaded):
+    """The first of two, of which the second was left out of this step."""
+    campaign, conditions, response = loaded
+
+    class Functions:
+        def moved(self, candidate, x):
+            return np.full((8, 6), candidate * x[0])
+
+    class Behind:
+        terms = (SmallTerm("function 1", *[np.zeros(1, int)] * 2, np.zeros((48, 1)),
+                           np.full(1, np.nan), -np.inf),)  # fmt: skip
+
+        def values(self, residual):
+            return [np.array([3.0])]
+
+    class Nothing:
+        effects, residual = {}, None
+
+    class One:
+        def __init__(self, candidate):
+            self.candidate = candidate
+
+    model = FittedModel(conditions, response, Nothing(), Behind(), (One(2.0), One(9.0)))
+    object.__setattr__(model, "sensitivities", Functions())
+    left = model.residual(campaign)
+    expected = campaign.measured - predict(conditions).deviation - 6.0
+    np.testing.assert_allclose(left, expected)
