@@ -305,9 +305,9 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    relative = size / size.max(axis=1, keepdims=True)
-    kept = relative > RANK
-    ambiguous = np.any((relative > _ROUNDING) & ~kept, axis=1)
+    largest = size.max(axis=1, keepdims=True)  # zero where nothing holds a free motion
+    kept = size > RANK * largest
+    ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
     return np.einsum("cij,cj,ckj->cik", vectors, inverted, vectors), ambiguous
 

@@ -9,8 +9,9 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.screw_bound import _room, bound_screw
-from assembly.model.robot import Clearance, MatrixLink
+from assembly.linear.reach import ReachableSet
+from assembly.linear.screw_bound import _extents, _room, bound_screw
+from assembly.model.robot import Clearance, Frame, MatrixLink
 from assembly.robots import load_robot
 from assembly.solvers.conic import cone_sizes
 from tests.robots_for_tests import coaxial_beams, random_robot
@@ -190,3 +191,27 @@ def test_room_of_an_interval_and_of_a_disc(share):
         expected = expected if expected < 0.1 else 1.0
         assert room == pytest.approx(expected, rel=share)
         assert (room >= expected).all()
+
+
+def test_a_set_extends_to_its_farther_side():
+    """An interval of 1e-3 m that starts at a quarter: 1.25e-3 m."""
+    reachable = ReachableSet(
+        np.zeros(6), 1e-3 * np.eye(6)[:, 3:4], np.zeros((0, 1)), np.array([0.25]),
+        np.zeros(1, dtype=int),
+    )  # fmt: skip
+    assert _extents(reachable) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
+    other = replace(reachable, start=np.array([-0.25]))
+    assert _extents(other) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
+
+
+def test_play_outside_the_loop_is_open_and_no_error():
+    """A hand with radial and axial play on two bent beams: sqrt(2 r^2 + a^2)."""
+    r, a = 3e-5, 2e-5
+    beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
+    hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))
+    robot = replace(beams, frames=(*beams.frames, hand), platform="hand")
+    found = bound_screw(solve_assembly(home_posture(robot)))
+    assert found.translation_open == pytest.approx(np.sqrt(2 * r**2 + a**2), rel=1e-4)
+    assert found.rotation_open == pytest.approx(0.0, abs=1e-10)
+    assert found.translation_error < 1e-7
+    assert found.rotation_error < 1e-7
