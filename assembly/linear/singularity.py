@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.nominal import Target, follow, mobile, motion_screws, size_of
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import closure_signs
+from assembly.linear.thresholds import rank_of
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import SCREW
@@ -139,13 +140,13 @@ def _generic_ranks(robot: Robot) -> _Ranks:
         size_of(robot) if f.joint == "prismatic" else 1.0 for f in robot.frames
     ])
     # the drives move unequally: symmetric steps may stay in a singular set
-    spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
+    spread = np.cos(np.arange(len(robot.frames)))
     goals = np.where(
         driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
     )
     track = follow(robot, home.coordinates, Target(coordinates=goals))
     A, B, P = _matrices(robot, track.transforms[track.reached])
-    rank = max(map(_rank, A)) if A.shape[1] else 0
+    rank = max(map(_rank, A))
     N = _null_space(A, rank)[0]
     motions = max(map(_rank, N @ B))
     return _Ranks(rank, motions, max(map(_rank, N @ P)))
@@ -153,8 +154,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 def _rank(A: NDArray) -> int:
     """How many singular values are above rounding."""
-    values = np.linalg.svd(A, compute_uv=False) if A.size else np.zeros(0)
-    return int(np.sum(values > _RANK * max(1.0, values.max(initial=0.0))))
+    return rank_of(np.linalg.svd(A, compute_uv=False), _RANK, noise=_RANK)
 
 
 def _matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:

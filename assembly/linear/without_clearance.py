@@ -107,11 +107,11 @@ class Flexibility:
         x -= times(self.inverse, times(self.system, x) - b)  # iterative refinement
         count = J.shape[1]
         multipliers, motions = x[:, :count] / size, x[:, count:]
-        residual = np.abs(times(self.system, x) - b).max(axis=1, initial=0.0)
-        scale = np.abs(b).max(axis=1, initial=0.0)
+        residual = np.abs(times(self.system, x) - b).max(axis=1)
+        scale = np.abs(b).max(axis=1)
         closed = residual <= np.maximum(_CLOSED * scale, _CLOSED_ABSOLUTE)
         within = np.all(np.abs(motions) <= self.limit, axis=1)
-        closing = times(np.swapaxes(J, 1, 2), multipliers)
+        closing = times(J.mT, multipliers)
         screws = unclosed + _each(self.compliance, closing) + motions @ self.free.T
         return FlexibleAssembly(
             platform_screw=times(self.platform, screws),
@@ -135,7 +135,7 @@ class Flexibility:
         met = through if read is None else self.rows @ read
         count = self.rows.shape[1]
         inner = self.inverse[:, :count, :count] / self.softness
-        return -(np.swapaxes(met, 1, 2) @ (inner @ through))
+        return -(met.mT @ (inner @ through))
 
     def platform_of(self, columns: NDArray) -> NDArray:
         """Platform screw that stress-free screws at the frames cause.
@@ -150,7 +150,7 @@ class Flexibility:
         if not count:
             return self.platform @ columns
         x = -(self.inverse[:, :, :count] @ (self.rows @ columns))
-        closing = np.swapaxes(self.rows, 1, 2) @ (x[:, :count] / self.softness)
+        closing = self.rows.mT @ (x[:, :count] / self.softness)
         n = len(self.compliance)
         bent = self.compliance @ closing.reshape(len(x), n, 6, -1)
         screws = columns + bent.reshape(closing.shape) + self.free @ x[:, count:]
@@ -239,7 +239,7 @@ def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
             return products
         together = np.zeros((len(names), most, vectors.shape[1]))
         together[own, place] = vectors
-        return (together @ np.swapaxes(used, 1, 2))[own, place]
+        return (together @ used.mT)[own, place]
 
     return times
 
@@ -282,11 +282,8 @@ def _factorise(content: Content) -> Flexibility:
     S = np.einsum("cki,cli->ckl", through.reshape(J.shape), J)
     softness = float(np.abs(S).max(initial=0.0)) or 1.0
     JF = J @ joints.free
-    q = JF.shape[2]
-    M = np.zeros((count, S.shape[1] + q, S.shape[1] + q))
-    M[:, : S.shape[1], : S.shape[1]] = S / softness
-    M[:, : S.shape[1], S.shape[1] :] = JF
-    M[:, S.shape[1] :, : S.shape[1]] = np.swapaxes(JF, 1, 2)
+    nothing = np.zeros((count, *JF.shape[2:] * 2))
+    M = np.block([[S / softness, JF], [JF.mT, nothing]])
     inverse, ambiguous = pseudo_inverse(M)
     return Flexibility(
         rows=J,
@@ -304,13 +301,13 @@ def _factorise(content: Content) -> Flexibility:
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
     """(c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
-    if not M.shape[1]:
+    if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    relative = size / size.max(axis=1, keepdims=True)
-    kept = relative > RANK
-    ambiguous = np.any((relative > _ROUNDING) & ~kept, axis=1)
+    largest = size.max(axis=1, keepdims=True)  # zero where nothing holds a free motion
+    kept = size > RANK * largest
+    ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
     inverted = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
     return np.einsum("cij,cj,ckj->cik", vectors, inverted, vectors), ambiguous
 
@@ -318,11 +315,11 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
 def _limits(postures: Posture, free: NDArray) -> NDArray:
     """(q,) bounds of the free motions."""
     bounds = component_bounds(clearance_bounds(postures.robot)).ravel()
-    return bounds[np.abs(free).argmax(axis=0)] if free.size else np.zeros(0)
+    return bounds[np.abs(free).argmax(axis=0)]
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
     """(R, 6n) every frame's own (6, 6) times its screw or wrench."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
-    products = blocks @ np.swapaxes(matrices, 1, 2)
+    products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

@@ -14,7 +14,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.model.error_distributions import draw_generator, tolerance_sources
-from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.clearance_positions import position_clearances
@@ -182,3 +182,28 @@ def test_errors_drawn_replace_the_robots_own(load):
     np.testing.assert_allclose(
         other.platform_screw, plain.platform_screw, rtol=1e-4, atol=1e-8
     )
+
+
+def test_loads_and_errors_together_bring_a_joint_to_its_bound():
+    """A pin of L at most against a spring of K: it turns by M / K less the error.
+
+    Where M = K L, errors of L / 2 either way leave it free, or at its bound.
+    """
+    L, K = 1e-3, 2e4
+    robot = Robot("pin", "end", (
+        Frame("pin", joint="revolute", clearance=Clearance(spin=L)),
+        Frame("end", "pin", [1.0, 0, 0]),
+        Frame("stop", link=MatrixLink(K * np.eye(6))),
+        Frame("at_end", "stop", [1.0, 0, 0]),
+    ), (("end", "at_end"),))  # fmt: skip
+    load = np.array([0, 0, K * L, 0, 0, 0])
+    errors = np.zeros((2, 4, 6))
+    errors[:, 0, 2] = 0.5 * L, -0.5 * L
+    found = prepare_energies(home_posture(robot), load).solve(errors)
+    assert found.fallback.tolist() == [False, True]
+    # the spring turns by L, or with the pin at its bound by L - L / 2
+    expected = K * np.array([L, 0.5 * L]) ** 2 / 2
+    assert found.energy == pytest.approx(expected, rel=1e-6)
+    assert found.platform_screw[:, 2] == pytest.approx([L, 0.5 * L], rel=1e-6)
+    # energies without the work are compared in the certificate
+    assert (found.energy >= found.bound).all()

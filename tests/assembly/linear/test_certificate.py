@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_many, place_robot
 from assembly.linear.assemblies import excess_of, solve_each
-from assembly.linear.certificate import unproved
+from assembly.linear.certificate import (
+    _AMPLIFIED,
+    _springs_determined,
+    unproved,
+    unproved_screw,
+)
 from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
 from assembly.linear.reference import reference_energy
 from assembly.linear.screw_bound import bound_screw
@@ -316,3 +321,27 @@ def test_points_solved_one_by_one_are_what_each_is():
     assert found.fallbacks() == {"one by one": 2}
     two = np.array([[0.6, 0.8, 0.1], [0.9, 1.2, 0.0]])
     assert excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])
+
+
+def test_each_half_of_the_screw_is_proved_to_its_own_size():
+    """1e-5 and a thousandth: a turn of 0.1 rad to 1.1e-4, no shift to 1e-5."""
+    gap = np.array([0.2, 0, 0, 0, 0, 0])
+    assembly = solve_assembly(home_posture(coaxial_beams(gap)))
+    assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)
+    open_ = replace(bound_screw(assembly), rotation_error=9e-5, translation_error=2e-5)
+    (sentence,) = unproved_screw(assembly, open_)
+    assert "translation is proved to 2.0e-05 m only, expected 1.0e-05" in sentence
+    open_ = replace(open_, rotation_error=2e-4, translation_error=9e-6)
+    (sentence,) = unproved_screw(assembly, open_)
+    assert "rotation is proved to 2.0e-04 rad only, expected 1.1e-04" in sentence
+
+
+@pytest.mark.parametrize(("share", "determined"), [(0.95, True), (1.05, False)])
+def test_springs_are_determined_by_what_their_uncertainty_moves(share, determined):
+    """Two links of k: six springs along each half, sqrt(2 u) sqrt(6 / k) at most."""
+    k = 1e6
+    assembly = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (k, k))))
+    # a platform that stands still is known to 1e-5
+    most = share * 1e-5 / _AMPLIFIED
+    vars(assembly)["uncertainty"] = most**2 * k / 12
+    assert _springs_determined(assembly) == determined

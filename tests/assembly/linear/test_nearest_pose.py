@@ -10,7 +10,12 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.nearest_pose import nearest_pose
+from assembly.linear.nearest_pose import (
+    _FreeClearances,
+    _heights,
+    _moves,
+    nearest_pose,
+)
 from assembly.linear.reference import reference_energy
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, with_rest_positions
@@ -19,7 +24,7 @@ from assembly.model.links import joint_compliances, link_compliances
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import load_robot
 from tests.campaigns_for_tests import write_campaign
-from tests.robots_for_tests import coaxial_beams
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 POINT = np.array([0.03, -0.05, 0.02])  # [m] platform axes
 UNIT = 1e-4  # [rad, m] of screws in cvxpy
@@ -263,3 +268,55 @@ def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
     assert "clearances leave the pose free in 24 of 24 rows" in said
     assert "in a closed chain the nearest to nominal" in said
     assert json.loads(target.read_text())["open"] == [f"r{k}" for k in range(24)]
+
+
+def shift_along_x(start, rows=()):
+    """One interval that moves the platform by up to 1e-3 m along x."""
+    return _FreeClearances(
+        unloaded=np.ones(1, dtype=bool), deviation=np.zeros(6),
+        map=1e-3 * np.eye(6)[:, 3:4], rows=np.reshape(rows, (-1, 1)),
+        start=np.array([start]), group=np.zeros(1, dtype=int),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("start", [0.25, -0.6, 0.0])
+def test_how_far_an_interval_goes_both_ways(start):
+    """From its start to either bound; not at all where a closure holds it."""
+    x = np.eye(6)[3]
+    ways = list(_heights(shift_along_x(start), x))
+    assert ways == pytest.approx([1e-3 * (1 - start), 1e-3 * (1 + start)], abs=1e-9)
+    assert _moves(shift_along_x(start))
+    assert not _moves(shift_along_x(start, [1.0]))
+
+
+def test_the_nearest_pose_closes_what_springs_and_plays_closed():
+    """Springs stay bent, free motions follow, nothing opens, nothing is farther."""
+    moved = 0
+    for seed in range(12):
+        robot = random_robot(np.random.default_rng(seed), 2, link_share=0.5)
+        assembly = solve_assembly(home_posture(robot))
+        nearest, _ = nearest_pose(assembly)
+        assert nearest.closure_residual() < 1e-9 * np.abs(assembly.screws).max()
+        sizes = [np.linalg.norm(a.platform_screw) for a in (nearest, assembly)]
+        assert sizes[0] <= sizes[1] * (1 + 1e-7)
+        bent = assembly.elastic.any() and nearest.motions.any()
+        moved += nearest is not assembly and bent
+    assert moved
+
+
+def test_the_nearest_pose_keeps_to_the_bound_of_a_joints_own_motion():
+    """A pin of 1e-3 rad at most, off by 1.5e-3: it cannot come back to nominal.
+
+    Closed against a play of 2e-3 the platform turns by q + 1.5e-3 = v: 5e-4 at least.
+    """
+    robot = Robot("pin", "end", (
+        Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3),
+              geometric_error=[0, 0, 1.5e-3, 0, 0, 0]),
+        Frame("end", "pin", [1.0, 0, 0]),
+        Frame("stop", clearance=Clearance(spin=2e-3)),
+        Frame("at_end", "stop", [1.0, 0, 0]),
+    ), (("end", "at_end"),))  # fmt: skip
+    found, free = nearest_pose(solve_assembly(home_posture(robot)))
+    assert free
+    assert found.platform_screw[2] == pytest.approx(5e-4, rel=1e-3)
+    assert found.clearance_excess() < 1e-7

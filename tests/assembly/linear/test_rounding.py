@@ -26,7 +26,7 @@ def test_rounding_counts_all_that_a_closure_sums_up(size):
     clearances = 2 * 5e-4 + (2 * 1e-5 + 2e-5) / size
     expected = [6e-3 + 6e-4 / size + clearances, clearances]
     found = closure_rounding(errors, joints, size)
-    assert found == pytest.approx(8 * EPS * np.array(expected), rel=1e-12)
+    assert found == pytest.approx(8 * EPS * np.array(expected), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 10.0])

@@ -9,10 +9,12 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.screw_bound import bound_screw
-from assembly.model.robot import MatrixLink
+from assembly.linear.reach import ReachableSet
+from assembly.linear.screw_bound import _extents, _room, bound_screw
+from assembly.model.robot import Clearance, Frame, MatrixLink
 from assembly.robots import load_robot
-from tests.robots_for_tests import random_robot
+from assembly.solvers.conic import cone_sizes
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def exactly(A):
@@ -132,3 +134,84 @@ def test_the_true_error_is_below_the_stated_one_however_stiff_the_links(name, yo
         assert off > 1e-6
         assert "the platform's rotation is proved to" in unproved(answer)
         assert "stiffnesses differ" in unproved(answer)
+
+
+def two_springs(k, gap, open_):
+    """Two links of k that meet: energies known to ``gap`` [J], closures ``open_``."""
+    assembly = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (k, k))))
+    vars(assembly).update(uncertainty=gap, rounding=open_)
+    return assembly
+
+
+def test_two_springs_are_open_by_what_their_energies_leave():
+    """(y_1, y_2) within sqrt(2 g), equal if closed: sqrt(g / k) along every axis.
+
+    Where the closure may stay open y_2 may be zero, and y_1 all: sqrt(2 g / k).
+    The box around a ball is sqrt(3) times as far.
+    """
+    k, gap = 4e4, 1e-6
+    closed = bound_screw(two_springs(k, gap, 1e-15))
+    expected = np.sqrt(3 * gap / k)
+    for found in (closed.rotation, closed.translation, closed.translation_error):
+        assert found == pytest.approx(expected, rel=1e-4)
+    assert closed.rotation_open == closed.translation_open == 0.0
+    # lengths are counted in the longest body's, which is 1 m
+    open_ = bound_screw(two_springs(k, gap, 1.0))
+    assert open_.rotation == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
+    assert open_.translation_error == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
+
+
+def test_a_residual_adds_to_what_rounding_leaves_open():
+    """Both r: y_1 and y_2 part by 2 r sqrt(k) at most, within sqrt(8 k) r."""
+    k, r = 4e4, 1e-6
+    assembly = two_springs(k, 4 * k * r**2, r)
+    moved = assembly.elastic.copy()
+    moved[3] += r * np.sqrt(k)  # one of the springs stands off by r
+    apart = replace(assembly, elastic=moved)
+    assert apart.closure_residual() == pytest.approx(r)
+    vars(apart).update(uncertainty=4 * k * r**2, rounding=r)
+    # half the sum of y_1 and y_2, and half of what they part
+    expected = np.sqrt(3) * (np.sqrt(4 - 1) + 1) * r
+    assert bound_screw(apart).translation == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-3])
+def test_room_of_an_interval_and_of_a_disc(share):
+    """Within g of the bound: the last share of the interval, the chord of the disc."""
+    play = Clearance(radial=1e-5, axial=2e-5)
+    gap = [0, 0, 0, 1e-4, 1e-4, 1e-4]
+    assembly = solve_assembly(home_posture(coaxial_beams(gap, clearance=play)))
+    joints = assembly.joints
+    loads = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), joints.group)
+    for cone, load in enumerate(loads):
+        room = _room(assembly, joints, share * load)[3][joints.group == cone]
+        # of all points of the disc whose height is within the share of the bound
+        chord = 2 * np.sqrt(2 * share - share**2)
+        expected = share if len(room) == 1 else chord
+        expected = expected if expected < 0.1 else 1.0
+        assert room == pytest.approx(expected, rel=share)
+        assert (room >= expected).all()
+
+
+def test_a_set_extends_to_its_farther_side():
+    """An interval of 1e-3 m that starts at a quarter: 1.25e-3 m."""
+    reachable = ReachableSet(
+        np.zeros(6), 1e-3 * np.eye(6)[:, 3:4], np.zeros((0, 1)), np.array([0.25]),
+        np.zeros(1, dtype=int),
+    )  # fmt: skip
+    assert _extents(reachable) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
+    other = replace(reachable, start=np.array([-0.25]))
+    assert _extents(other) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
+
+
+def test_play_outside_the_loop_is_open_and_no_error():
+    """A hand with radial and axial play on two bent beams: sqrt(2 r^2 + a^2)."""
+    r, a = 3e-5, 2e-5
+    beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
+    hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))
+    robot = replace(beams, frames=(*beams.frames, hand), platform="hand")
+    found = bound_screw(solve_assembly(home_posture(robot)))
+    assert found.translation_open == pytest.approx(np.sqrt(2 * r**2 + a**2), rel=1e-4)
+    assert found.rotation_open == pytest.approx(0.0, abs=1e-10)
+    assert found.translation_error < 1e-7
+    assert found.rotation_error < 1e-7

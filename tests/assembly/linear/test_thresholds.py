@@ -23,8 +23,9 @@ def test_nothing_and_zeros_have_no_rank():
 
 def test_noise_is_relative_to_the_largest_entry():
     """In any unit, 1e-12 of it; nothing leaves none."""
-    assert noise_of(np.array([[3.0, -4.0], [0.0, 1.0]])) == pytest.approx(4e-12)
-    assert noise_of(1e-9 * np.array([[3.0, -4.0]])) == pytest.approx(4e-21)
+    A = np.array([[3.0, -4.0], [0.0, 1.0]])
+    assert noise_of(A) == pytest.approx(4e-12, rel=1e-9, abs=0.0)
+    assert noise_of(1e-9 * A) == pytest.approx(4e-21, rel=1e-9, abs=0.0)
     assert noise_of(np.zeros((3, 0))) == 0.0
 
 

@@ -11,11 +11,16 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import flexibility
+from assembly.linear.without_clearance import (
+    _each,
+    at_postures,
+    flexibility,
+    pseudo_inverse,
+)
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.model.robot import Clearance
+from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 
 seeds = st.integers(0, 2**32 - 1)
@@ -173,3 +178,64 @@ def test_built_in_screws_push_back_with_the_energy_they_store(seed):
     assert -x @ A @ x / 2 == pytest.approx(energy, rel=1e-6)
     force = solved(built_in, np.zeros(6)).joint_wrenches[0] @ columns
     assert force == pytest.approx(A @ x, abs=1e-7 * np.abs(A).max())
+
+
+@pytest.mark.parametrize("own", [
+    [], [0], [2, 0, 1], [1, 1, 1, 1], [0, 2, 0, 2, 2], [3, 3, 0],
+    [0] * 9 + [1, 2, 3],
+], ids=str)  # fmt: skip
+def test_rows_are_multiplied_with_their_postures_matrices(rng, own):
+    """Row by row, in any order; of four postures some may have no row."""
+    matrices, posture = rng.normal(size=(4, 3, 5)), np.array(own, dtype=int)
+    vectors = rng.normal(size=(len(own), 5))
+    found = at_postures(posture)(matrices, vectors)
+    expected = [matrices[i] @ v for i, v in zip(own, vectors, strict=True)]
+    assert found == pytest.approx(np.reshape(expected, (-1, 3)), rel=1e-13)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_an_inverse_and_its_rank_are_the_same_in_any_unit(rng, unit):
+    """Eigenvalues 2, -1 and 1e-11 or 1e-15: ambiguous, or zero."""
+    Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    M = np.array([(Q * [2.0, -1.0, small]) @ Q.T for small in (1e-11, 1e-15, 0.5)])
+    inverse, ambiguous = pseudo_inverse(unit * M)
+    assert ambiguous.tolist() == [True, False, False]
+    on_range = (Q * [0.5, -1.0, 0.0]) @ Q.T
+    assert unit * inverse[1] == pytest.approx(on_range, abs=1e-9)
+    assert unit * inverse[2] == pytest.approx(np.linalg.inv(M[2]), abs=1e-9)
+    nothing, certain = pseudo_inverse(np.zeros((2, 0, 0)))
+    assert nothing.shape == (2, 0, 0)
+    assert certain.tolist() == [False, False]
+
+
+def test_every_frame_has_its_own_matrix(rng):
+    C, screws = rng.normal(size=(3, 6, 6)), rng.normal(size=(2, 18))
+    expected = [[C[i] @ row[6 * i : 6 * i + 6] for i in range(3)] for row in screws]
+    assert _each(C, screws) == pytest.approx(np.reshape(expected, (2, 18)))
+
+
+@pytest.mark.parametrize("error", [1e-4, 1e-6, 1e-8])
+def test_an_error_that_rigid_bars_cannot_take_up_is_refused_at_any_size(error):
+    across = np.array([0, 0, 0, 0, 0, error])
+    assert not solved(rigid_four_bar(across), np.zeros(6)).solved.any()
+
+
+@pytest.mark.parametrize("stiffer", [1e-6, 1e6, 1e12])
+def test_forces_grow_with_stiffness_and_the_pose_stays(stiffer):
+    """The errors' pose is of no unit of force."""
+    gap = np.array([1e-4, -2e-4, 3e-4, 1e-5, 2e-5, -3e-5])
+    soft = solved(coaxial_beams(gap, (1e4, 3e4)), np.zeros(6))
+    stiff = solved(coaxial_beams(gap, (1e4 * stiffer, 3e4 * stiffer)), np.zeros(6))
+    assert stiff.solved.all()
+    assert stiff.platform_screw == pytest.approx(soft.platform_screw, rel=1e-9)
+    expected = stiffer * soft.joint_wrenches
+    assert stiff.joint_wrenches == pytest.approx(expected, rel=1e-9, abs=1e-9 * stiffer)
+
+
+def test_an_open_chain_has_no_multipliers():
+    robot = Robot("arm", "tip", (Frame("tip", translation=[1.0, 0, 0]),))
+    found = solved(robot, np.zeros(6), np.array([[0, 0, 1e-3, 0, 0, 0]]))
+    assert found.multipliers.shape == (1, 0)
+    assert found.solved.tolist() == [True]
+    # the error turns the tip about itself
+    assert found.platform_screw.tolist() == [[0, 0, 1e-3, 0, 0, 0]]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.reference import reference_margin
-from assembly.linear.zone import zone_margin
+from assembly.linear.zone import Zone, zone_margin
 from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import (
     NUMBERS,
@@ -123,3 +123,26 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
             assert zone.margin == pytest.approx(expected, rel=1e-6, abs=1e-7)
             assert zone.bound <= zone.margin * (1 + 1e-9) + 1e-12
             assert zone.bound == pytest.approx(zone.margin, rel=1e-6, abs=1e-9)
+
+
+def test_many_errors_or_postures_have_their_own_margins():
+    """Sets at one posture, a set for each, and postures alone: gap over play."""
+    gaps = np.array([1e-5, 4e-5, -3e-5])
+    sets = np.zeros((3, 6, 6))
+    sets[:, 2, 5] = gaps
+    robot = coaxial_beams(np.zeros(6), clearance=PLAY)
+    at = home_posture(robot)
+    expected = np.abs(gaps) / PLAY.axial
+    assert zone_margin(at, errors=sets).margin == pytest.approx(expected)
+    assert zone_margin([at], errors=sets).margin == pytest.approx(expected)
+    assert zone_margin([at] * 3, errors=sets).margin == pytest.approx(expected)
+    erring = home_posture(robot.with_errors(sets[1]))
+    assert zone_margin([erring]).margin == pytest.approx(expected[[1]])
+    assert zone_margin([erring] * 2).margin == pytest.approx(expected[[1, 1]])
+
+
+def test_a_margin_that_does_not_exist_needs_no_proof():
+    assert not Zone(None, None).unproved
+    assert not Zone(None, None).assemblable
+    assert not Zone(2.0, 2.0).unproved
+    assert Zone(2.0, 1.99).unproved

@@ -16,6 +16,7 @@ from assembly.measurement.predict import assemble_row, predict, read
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
+from tests.robots_for_tests import in_millimetres, random_robot
 
 ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
 
@@ -154,3 +155,24 @@ def test_contacts_are_found_in_a_few_steps_of_newtons_method(rng, monkeypatch):
     A = np.broadcast_to(-5e4 * np.array([[2.0, 1.0], [1.0, 2.0]]), (30, 2, 2))
     monkeypatch.setattr(contacts, "ITERATIONS", 20)
     assert contact_deflections(laws, w, A)[1].all()
+
+
+@pytest.mark.parametrize("seed", [0, 3, 5, 7])
+def test_rows_in_another_unit_of_length_turn_alike(seed, rng):
+    """And shift by as many millimetres; neither is refused."""
+    robot = random_robot(np.random.default_rng(seed), 2, link_share=1.0)
+    tight = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=tight).with_errors(1e-2 * robot.errors)
+    load = rng.uniform(-1, 1, (1, 6)) * 0.1
+    found = []
+    for s in (1.0, 1e3, 1e-3):
+        at = home_posture(in_millimetres(robot, s))
+        postures = replace(
+            at, coordinates=at.coordinates[None], transforms=at.transforms[None]
+        )
+        here = as_declared(postures, load * np.repeat([s, 1.0], 3))
+        screws, converged = solve_rows(replace(here, exact=True), np.zeros((1, 0)))
+        assert converged.all()
+        found.append(screws / np.repeat([1.0, s], 3))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-6, abs=1e-10)

@@ -55,3 +55,54 @@ def test_sessions_begin_anew_and_rows_may_come_in_any_order(rng):
         own = own[np.argsort(times[own], kind="stable")]
         by_itself, _ = in_order({"time": times[own], "u": values[own]}, None)
         assert found[own] == pytest.approx(by_itself.lagged("u", 20.0))
+
+
+def directions_by_hand(values, session, approach):
+    """Row after row: the sign of the last step of the session, or how it came."""
+    found = []
+    for i, value in enumerate(values):
+        if i == 0 or session[i] != session[i - 1]:
+            sign = approach[i]
+            known = False
+        elif abs(value - values[i - 1]) > 1e-9:
+            sign, known = np.sign(value - values[i - 1]), True
+        elif not known:
+            sign = approach[i]
+        found.append(sign)
+    return found
+
+
+def test_a_direction_is_that_of_the_last_step_within_its_session(rng):
+    """Sessions that begin anywhere, variables that stand still or hardly move."""
+    for _ in range(30):
+        count = int(rng.integers(1, 9))
+        values = np.cumsum(rng.choice([-1.0, 0.0, 0.0, 5e-10, 1.0], count))
+        session = np.sort(rng.integers(0, 3, count))
+        approach = rng.choice([-1.0, 1.0], count)
+        given = {"time": np.arange(count), "u": values, "approach": approach}
+        history, row = in_order(given, session)
+        assert row.tolist() == list(range(count))
+        expected = directions_by_hand(values, session, approach)
+        assert history.direction("u").tolist() == expected
+        assert history.direction("approach").tolist() == approach.tolist()
+
+
+def test_sessions_stay_in_their_order_and_rows_in_that_of_time(rng):
+    """Each session begins anew, wherever its rows stand in the table."""
+    session = np.array([1, 0, 1, 0, 1])
+    time = np.array([5.0, 2.0, 1.0, 1.0, 3.0])
+    history, row = in_order({"time": time, "u": time}, session)
+    assert row.tolist() == [2, 4, 0, 3, 1]
+    assert history.first.tolist() == [True, False, False, True, False]
+    one, _ = in_order({"time": time, "u": time}, None)
+    assert one.first.tolist() == [True, False, False, False, False]
+    assert history.fading(2.0) == pytest.approx(np.exp([-0.5, -1.5, -2.5, -0.5, -1]))
+
+
+def test_nothing_settles_in_no_time():
+    """A row at time 0 has not begun to lag; one at the moment of another as that."""
+    given = {"time": np.array([0.0, 2.0, 2.0]), "u": np.array([3.0, 3.0, 7.0])}
+    history, _ = in_order(given, None)
+    held = history.lagged("u", 4.0, held=True)
+    settled = 3.0 * (1 - np.exp(-0.5))
+    assert held == pytest.approx([0.0, settled, settled])

@@ -1,0 +1,169 @@
+"""Certificates of an assembly that is not the best, against their definitions."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.assemblies import assemblies_of, solve_each
+from assembly.linear.energy import solve_assembly
+from assembly.model.clearance import CONES, clearance_bounds
+from assembly.model.links import joint_compliances, link_compliances
+from assembly.model.robot import Frame, Robot
+from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
+
+EPS = 2.0**-52
+
+
+def disturbed(rng, seed):
+    """A random robot's assembly, and the same with anything else for its solution."""
+    robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
+    load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
+    best = solve_assembly(home_posture(robot), load)
+    other = replace(
+        best,
+        elastic=best.elastic + 1e-2 * rng.normal(size=best.elastic.shape),
+        clearances=0.3 * rng.normal(size=best.clearances.shape),
+        motions=best.motions + 1e-4 * rng.normal(size=best.motions.shape),
+        multipliers=best.multipliers + 0.1 * rng.normal(size=best.multipliers.shape),
+    )
+    return best, other
+
+
+def bound_by_hand(assembly):
+    """-w.dl - w C w / 2 - what clearances gain - |w q|, frame by frame."""
+    robot, total = assembly.posture.robot, 0.0
+    C_link, C_joint = link_compliances(robot), joint_compliances(robot)
+    bounds = clearance_bounds(robot)
+    free = (assembly.joints.free * np.abs(assembly.motions)).sum(axis=1).reshape(-1, 6)
+    for i in range(len(robot.frames)):
+        w, j = assembly.wrenches[i], assembly.joint_wrenches[i]
+        total -= w @ robot.errors[i] + w @ C_link[i] @ w / 2 + j @ C_joint[i] @ j / 2
+        for size, rows in zip(bounds[i], CONES, strict=True):
+            unbounded = free[i, list(rows)].any() or np.isinf(size)
+            total -= 0.0 if unbounded else size * np.linalg.norm(j[list(rows)])
+        total -= np.abs(j) @ free[i]
+    return total
+
+
+SEEDS = (1, 3, 4, 6, 9, 12)
+
+
+def solvable(rng):
+    """Random assemblies, where there are any."""
+    for seed in SEEDS:
+        try:
+            yield disturbed(rng, seed)
+        except (ValueError, RuntimeError):
+            continue
+
+
+def test_any_wrenches_bound_the_energy(rng):
+    """Weak duality, and the bound as its docstring has it."""
+    some = list(solvable(rng))
+    assert len(some) >= 3
+    assert any(len(other.motions) for _, other in some)
+    for best, other in some:
+        bounded = replace(other, motions=best.motions)
+        scale = best.energy_without_clearance + abs(best.work)
+        assert bounded.bound <= best.potential + 1e-9 * scale
+        by_hand = bound_by_hand(other)
+        assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
+
+
+def test_the_uncertainty_is_the_gap_without_cancellation(rng):
+    """Potential minus bound, each term at its worst sign: 2 |slip q|, |l residual|."""
+    for _, other in solvable(rng):
+        slip = other.joints.free.T @ other.joint_wrenches.ravel() * other.motions
+        left = other.multipliers * (other.linearisation.rows @ other.screws.ravel())
+        # signs at which they are largest
+        gap = other.potential - other.bound
+        worst = gap + np.sum(np.abs(slip) + slip) + np.sum(np.abs(left) - left)
+        vars(other)["rounding"] = 0.0
+        sizes = np.abs(other.clearances)
+        assert sizes.max(initial=0.0) < 5.0
+        assert other.uncertainty == pytest.approx(worst, rel=1e-8)
+
+
+def test_a_large_work_is_uncertain_by_its_rounding():
+    """Nothing else is: an arm that hangs from a spring, without closures."""
+    K = 1e4 * np.eye(6)
+    robot = Robot("arm", "tip", (
+        Frame("hinge", joint="revolute", joint_stiffness=K), Frame("tip", "hinge"),
+    ))  # fmt: skip
+    assembly = solve_assembly(home_posture(robot), [0, 0, 0, 100.0, 0, 0])
+    assert assembly.work == pytest.approx(1.0)
+    assert assembly.uncertainty == pytest.approx(8 * EPS, rel=0.5, abs=0.0)
+
+
+def test_an_energy_within_the_work_on_what_rounding_leaves_open_is_none():
+    assembly = solve_assembly(home_posture(coaxial_beams([0, 0, 0, 1e-4, 0, 0])))
+    stored, wrenches = assembly.stored, np.abs(assembly.multipliers).sum()
+    assert assembly.energy == pytest.approx(0.0025, rel=1e-9)  # k gap^2 / 4
+    again = replace(assembly)
+    vars(again)["rounding"] = 2 * stored / wrenches
+    assert again.energy == 0.0
+    again = replace(assembly)
+    vars(again)["rounding"] = 0.5 * stored / wrenches
+    assert again.energy == pytest.approx(stored, rel=1e-9)
+
+
+def test_a_gap_is_relative_to_an_energy_of_any_size():
+    """1e-4 of the energy without clearance is the least it is compared with."""
+    assembly = solve_assembly(home_posture(coaxial_beams([0, 0, 0, 1e-6, 0, 0])))
+    other = replace(assembly, elastic=1.1 * assembly.elastic)
+    assert other.stored < 1e-5
+    # y + (y - s)^2 / 2 beyond s, and the work on the open closure
+    assert other.relative_gap() == pytest.approx(other.duality_gap() / other.stored)
+    none = np.zeros_like(assembly.multipliers)
+    little = replace(assembly, elastic=1e-4 * assembly.elastic, multipliers=none)
+    least = 1e-4 * assembly.energy_without_clearance
+    # without wrenches the bound is zero, and the gap is the energy
+    assert little.relative_gap() == pytest.approx(little.stored / least, rel=1e-6)
+
+
+def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
+    """Bodies in a row carry the same, whatever rounding says; the idle one none."""
+    robot = coaxial_beams([0, 0, 0, 1e-4, 2e-5, 3e-5])
+    idle = replace(
+        robot, frames=(Frame("idle", translation=[0.1, 0, 0]), *robot.frames)
+    )
+    figures = solve_assembly(home_posture(idle))._figures()
+    assert figures["largest force"].endswith(" N, in one")
+
+
+def test_one_assembly_is_one_row():
+    """In every array that has a row for each point."""
+    one = assemblies_of(solve_assembly(home_posture(planar_four_bar())))
+    for each in fields(one):
+        values = getattr(one, each.name)
+        if isinstance(values, np.ndarray):
+            assert len(values) == 1, each.name
+    assert len(one) == 1
+
+
+def test_points_solved_one_by_one_keep_their_own_certificate():
+    """The bound is the energy less the gap, also of what is not the best."""
+    robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
+    best = solve_assembly(home_posture(robot))
+    worse = replace(best, elastic=1.001 * best.elastic)
+    found = solve_each(robot, 2, lambda i: (best, worse)[i])
+    assert found.gap == pytest.approx([best.duality_gap(), worse.duality_gap()])
+    assert found.bound[1] < found.energy[1]
+    assert found.bound[1] == pytest.approx(worse.energy - worse.duality_gap())
+
+
+@pytest.mark.parametrize(
+    ("work", "certified"), [(0.5, False), (-3.0, True), (3.0, True)]
+)
+def test_a_gap_is_accepted_relative_to_energies_and_to_work_of_either_sign(
+    work, certified
+):
+    """1e-12 of 1 J without clearance and of |work|: 1.5e-12 or 4e-12 against 2e-12."""
+    one = assemblies_of(solve_assembly(home_posture(planar_four_bar())))
+    one = replace(
+        one, energy=np.zeros(1), bound=np.array([-2e-12]), work=np.array([work]),
+        energy_without_clearance=np.ones(1),
+    )  # fmt: skip
+    assert one.certified.tolist() == [certified]

@@ -1,0 +1,111 @@
+"""Many points: each has its own errors, loads and way to be solved."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear import lanes, pose_error
+from assembly.linear.energy import minimise_under_loads, solve_assembly
+from assembly.linear.load import FrameLoads, loads_on_frames
+from assembly.linear.pose_error import bound_pose_error, reference_pose_error
+from assembly.linear.reach import reachable_screws
+from assembly.linear.robot_structure import structure_of
+from assembly.model.robot import Clearance
+from tests.robots_for_tests import coaxial_beams, planar_four_bar
+
+LOAD = np.array([0.0, 0, 0, 100.0, 0, 0])
+K = 1e6
+
+
+def two_sets():
+    """Beams that meet 1e-4 m and 3e-4 m apart along x."""
+    sets = np.zeros((2, 6, 6))
+    sets[:, 2, 3] = 1e-4, 3e-4
+    return coaxial_beams(np.zeros(6), (K, K)), sets
+
+
+@pytest.mark.parametrize("loaded", [(1, 0), (0, 1), (1, 1), (0, 0)])
+def test_points_with_and_without_loads_have_their_own_errors(loaded):
+    """Stored: k g^2 / 4 of the gap and F^2 / 4 k of the load, which do not mix."""
+    robot, sets = two_sets()
+    at = home_posture(robot)
+    forces = np.array(loaded)[:, None] * LOAD
+    each = [loads_on_frames(at, force) for force in forces]
+    loads = FrameLoads(*(np.array([getattr(one, part) for one in each])
+                         for part in ("body", "joint")))  # fmt: skip
+
+    def one(i):
+        return solve_assembly(home_posture(robot.with_errors(sets[i])), forces[i])
+
+    found = minimise_under_loads(robot, np.array([at.transforms] * 2), loads, one, sets)
+    expected = K * sets[:, 2, 3] ** 2 / 4 + forces[:, 3] ** 2 / (4 * K)
+    assert found.energy == pytest.approx(expected, rel=1e-9)
+    assert found.loaded.tolist() == [bool(one) for one in loaded]
+
+
+def test_a_point_knows_its_own_errors():
+    robot, sets = two_sets()
+    found = solve_assembly(home_posture(robot), errors=sets)
+    for i in range(2):
+        assert (found[i].posture.robot.errors == sets[i]).all()
+        assert found[i].energy == pytest.approx(K * sets[i, 2, 3] ** 2 / 4)
+
+
+def test_what_is_solved_compiled_is_bounded_compiled(monkeypatch):
+    """The reference is asked for loads alone."""
+    robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=2e-5))
+    asked = []
+    monkeypatch.setattr(
+        pose_error, "reference_pose_error",
+        lambda *given: asked.append(given) or reference_pose_error(*given),
+    )  # fmt: skip
+    bound_pose_error(solve_assembly(home_posture(robot)))
+    assert not asked
+    bound_pose_error(solve_assembly(home_posture(robot), LOAD))
+    assert len(asked) == 1
+
+
+def test_supports_of_both_halves_are_counted():
+    """What each search took, one after the other."""
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], clearance=play)
+    assembly = solve_assembly(home_posture(robot), LOAD)
+    asked = pose_error.Asked("frozen", 0.05, 1e-6, 1e-6, (0.0, 0.3, 0.0))
+    reachable = reachable_screws(assembly, "frozen").at_point(asked.offset)
+    both = [reachable.farthest(part, 1e-6)[2] for part in (0, 3)]
+    assert min(both) > 0
+    assert reference_pose_error(assembly, asked).cuts == sum(both)
+
+
+def test_bounds_are_too_wide_beyond_what_was_asked():
+    """Not where both are infinite: the platform moves without bound."""
+    for bounds, wide in (
+        ((1.0, 1.1), False), ((1.0, 1.3), True), ((np.inf, np.inf), False),
+        ((1.0, np.inf), True),
+    ):  # fmt: skip
+        assert bool(pose_error._too_wide("rotation", bounds, 0.2, "rad")) == wide
+
+
+def test_a_robots_addresses_are_found_again():
+    """Those of one robot stay when another one comes."""
+    one, other = (structure_of(r)[1] for r in (two_sets()[0], planar_four_bar()))
+    first = lanes._robot(one)
+    lanes._robot(other)
+    assert lanes._robot(one) is first
+
+
+def test_deformations_side_by_side_need_closures_alone(monkeypatch):
+    """An open chain is left to others; whatever else is asked of the library."""
+    asked = []
+    monkeypatch.setattr(
+        lanes, "_side_by_side", lambda *given: asked.append(given) or True
+    )
+    closed = structure_of(planar_four_bar())[1]
+    T = home_posture(planar_four_bar()).transforms[None]
+    rows = np.zeros(1), np.zeros((1, 6, 1)), np.zeros(1)
+    assert lanes.compliances_side_by_side(closed, T, *rows)
+    assert len(asked) == 1
+    assert not lanes.compliances_side_by_side(
+        closed._replace(patterns=np.zeros((1, 0))), T, *rows
+    )
+    assert len(asked) == 1
