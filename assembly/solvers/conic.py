@@ -130,7 +130,7 @@ def minimise_energy(
                 bound=np.inf,
                 feasible=False,
             )
-        if u is None or rigid is None:
+        if u is None:
             continue
         for candidate in _certified(scaled, into_cones(u, group), rigid):
             if best is None or candidate.gap < best.gap:
@@ -159,7 +159,7 @@ def _proved(least: LeastEnergy, h: NDArray) -> bool:
 
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
-) -> tuple[NDArray | None, NDArray | None, str]:
+) -> tuple[NDArray | None, NDArray, str]:
     """The interior-point method of this package; its solution must satisfy H."""
     starts = _starts(group)
     solution = one_problem.interior_point((G, h, d, H, k), starts, _GAP_WITHIN)
@@ -171,7 +171,7 @@ def _compiled(
     u, n = solution
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
-        return None, None, "no feasible point found"
+        return None, -n, "no feasible point found"
     return u, -n, "Solved"
 
 
@@ -188,13 +188,13 @@ def _starts(group: NDArray) -> NDArray:
 def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
-) -> tuple[NDArray | None, NDArray | None, str]:  # fmt: skip
-    """The same by Clarabel, with v = G u + h as variables of their own."""
+) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
+    """The same by Clarabel, with v = -G u - h as variables of their own."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     A = vstack(
         [
-            hstack([csc_matrix(G), -diags_array(np.ones(r))]),
+            hstack([csc_matrix(G), diags_array(np.ones(r))]),
             hstack([csc_matrix(H), csc_matrix((len(k), r))]),
             hstack([cones, csc_matrix((cones.shape[0], r))]),
         ],
@@ -210,11 +210,11 @@ def _by_clarabel(
     if status == "PrimalInfeasible":
         if not _proves_no_point(rigid, H, k, group, np.ones(group[-1] + 1)):
             status = _UNPROVED
-        return None, None, status
+        return None, rigid, status
     return (None if x is None else x[:nu]), rigid, status
 
 
-_SOLVERS: tuple[Callable[..., tuple[NDArray | None, NDArray | None, str]], ...] = (
+_SOLVERS: tuple[Callable[..., tuple[NDArray | None, NDArray, str]], ...] = (
     _compiled,
     *(partial(_by_clarabel, value) for value in _REGULARISATIONS),
 )
@@ -226,7 +226,7 @@ def _certified(
     """A solution with the bound of its own springs; the same refined by Newton."""
     G, h, d, H, k, group = problem
     yield _certify(problem, u, G @ u + h, rigid)
-    if group.max() >= 0 and np.bincount(group).max() > 2:
+    if np.bincount(group).max() > 2:
         return  # Newton's method knows discs and intervals only
     u, y, starts = u.copy(), np.concatenate([h, -rigid]), _starts(group)
     relative = _STOP * GAP
@@ -341,11 +341,11 @@ def into_cones(u: NDArray, group: NDArray) -> NDArray:
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
-    """Rows s = b - A u with s in second-order cones [radius; u_k], as (A, b)."""
+    """Rows s = b - A u with s in second-order cones [radius; -u_k], as (A, b)."""
     nu, cones = len(group), int(group.max()) + 1
     # each cone's rows: one for the radius, then its columns, in order
     at = np.arange(nu) + group + 1
-    A = csc_matrix((-np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
+    A = csc_matrix((np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
     b = np.zeros(nu + cones)
     starts = np.searchsorted(group, np.arange(cones)) + np.arange(cones)
     b[starts] = radius[np.searchsorted(group, np.arange(cones))]
@@ -371,7 +371,7 @@ def _clarabel(
     settings.verbose = False
     settings.max_iter = 200
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
-    settings.static_regularization_enable = regularisation > 0
+    settings.static_regularization_enable = bool(regularisation)
     settings.static_regularization_constant = regularisation
     sets = [clarabel.ZeroConeT(cones.equal)] if cones.equal else []
     sets += [clarabel.NonnegativeConeT(cones.positive)] if cones.positive else []
