@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.errors import BadInput, describe, nearest
 from stiffness.beam.sections import Section, check_material, check_positive
+from stiffness.screws import UNIT_VECTORS
 
 THEORIES = ("timoshenko", "euler")
 
@@ -115,8 +116,8 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
     """
     x = unit_vector("axis", axis)
     if up is None:
-        along_y = np.linalg.norm(np.cross(x, [0.0, 1.0, 0.0])) < 1e-9
-        up = (0.0, 0.0, 1.0) if along_y else (0.0, 1.0, 0.0)
+        along_y = np.linalg.norm(np.cross(x, UNIT_VECTORS["y"])) < 1e-9
+        up = UNIT_VECTORS["z" if along_y else "y"]
     z = unit_vector("up", up)
     across = z - (z @ x) * x
     if np.linalg.norm(across) < 1e-9:

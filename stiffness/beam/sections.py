@@ -83,7 +83,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
             f"round_section: inner_radius = {inner_radius:g} must lie between 0 "
             f"and radius = {radius:g}"
         )
-    check_material("round_section", 1.0, nu)
+    check_poisson("round_section", nu)
     m2 = (inner_radius / radius) ** 2
     area = math.pi * radius**2 * (1 - m2)
     second_moment = math.pi / 4 * radius**4 * (1 - m2**2)
@@ -112,7 +112,7 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
     """
     check_positive("rectangular_section", "width", width)
     check_positive("rectangular_section", "height", height)
-    check_material("rectangular_section", 1.0, nu)
+    check_poisson("rectangular_section", nu)
     shear = 10 * (1 + nu) / (12 + 11 * nu)
     return Section(
         area=width * height,
@@ -153,7 +153,7 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
         Bredt (1896) for torsion; Cowper (1966) for the shear factor of a thin box.
     """
     _check(width=width, height=height, wall=wall)
-    check_material("box_section", 1.0, nu)
+    check_poisson("box_section", nu)
     if not 2 * wall < min(width, height):
         raise BadInput(f"box_section: wall = {wall:g} m must leave a hole")
     inner_width, inner_height = width - 2 * wall, height - 2 * wall
@@ -201,7 +201,7 @@ def i_section(
         Cowper (1966) for the shear factors of a thin I and of a rectangle.
     """
     _check(width=width, height=height, web=web, flange=flange)
-    check_material("i_section", 1.0, nu)
+    check_poisson("i_section", nu)
     if not (web < width and 2 * flange < height):
         raise BadInput("i_section: web or flange is thicker than the section allows")
     clear, h = height - 2 * flange, height - flange
@@ -285,6 +285,11 @@ def check_material(who: str, E: float, nu: float) -> None:
         BadInput: E is not finite and positive, or nu not in (-1, 0.5).
     """
     check_positive(who, "E", E)
+    check_poisson(who, nu)
+
+
+def check_poisson(who: str, nu: float) -> None:
+    """Refuse Poisson's ratio of no isotropic solid: it lies in (-1, 0.5)."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 

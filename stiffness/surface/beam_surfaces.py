@@ -70,30 +70,35 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
         # the height stands along y: `up` of a beam along z
         sides = np.array([lengths["width"], lengths["height"]])
         hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
-        return _prism([corner * sides] * 2, L, shape, hole)
+        return _prism(corner * sides, corner * sides, L, shape, hole)
     angle = 2 * np.pi * np.arange(_FACETS) / _FACETS
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     r = lengths["radius"]
     if shape == "tube":
-        return _prism([r * circle] * 2, L, shape, lengths["inner_radius"] * circle)
+        hole = lengths["inner_radius"] * circle
+        return _prism(r * circle, r * circle, L, shape, hole)
     tip = lengths["tip_radius"] if shape == "cone" else r
-    return _prism([r * circle, tip * circle], L, shape)
+    return _prism(r * circle, tip * circle, L, shape)
 
 
 def _prism(
-    rings: list[NDArray], length: float, name: str, hole: NDArray | None = None
+    base: NDArray,
+    tip: NDArray,
+    length: float,
+    name: str,
+    hole: NDArray | None = None,
 ) -> Surface:
     """Two outlines joined, closed by fans, or by rings around a hole."""
-    count = len(rings[0])
-    inner = [np.zeros((1, 2))] * 2 if hole is None else [hole, hole]
-    layers = [rings[0], rings[1], *inner]
+    count = len(base)
+    inner = np.zeros((1, 2)) if hole is None else hole
+    layers = [base, tip, inner, inner]
     heights = [0.0, length, 0.0, length]
     points = np.concatenate([
         np.insert(p, 2, z, axis=1) for p, z in zip(layers, heights, strict=True)
     ])
     i = np.arange(count)
     j = (i + 1) % count
-    many = len(inner[0])
+    many = len(inner)
     low, high = 2 * count + i % many, 2 * count + many + i % many
     low_j, high_j = 2 * count + j % many, 2 * count + many + j % many
     sides = [(i, j, j + count), (i, j + count, i + count)]
@@ -121,8 +126,8 @@ def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piec
     """
     check_shape(shape, lengths)
     top = [0.0, 0.0, lengths["length"]]
-    r = lengths.get("radius", 0.0)
     if shape == "cone":
+        r = lengths["radius"]
         taper = lengths["tip_radius"] - r
 
         def section(t: float) -> Section:

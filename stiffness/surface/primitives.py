@@ -131,7 +131,8 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
     """
     center = points.mean(axis=0)
     normal = np.linalg.svd(points - center, full_matrices=False)[2][2]
-    return Plane(center, normal * np.sign(normal @ normals.sum(axis=0) or 1.0))
+    agrees = normal @ normals.sum(axis=0) >= 0
+    return Plane(center, normal if agrees else -normal)
 
 
 def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
@@ -145,13 +146,17 @@ def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
         The sphere.
     """
     origin = points.mean(axis=0)
-    system = np.column_stack([2 * (points - origin), np.ones(len(points))])
-    rhs = np.sum((points - origin) ** 2, axis=1)
-    solution = np.linalg.lstsq(system, rhs, rcond=None)[0]
-    center = solution[:3]
-    return Sphere(
-        origin + center, float(np.sqrt(max(solution[3] + center @ center, 0)))
-    )
+    center, radius = _circle(points - origin)
+    return Sphere(origin + center, radius)
+
+
+def _circle(points: NDArray) -> tuple[NDArray, float]:
+    """Centre and radius of the circle (n, 2) or the sphere (n, 3) nearest to points."""
+    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and the bracket
+    system = np.column_stack([2 * points, np.ones(len(points))])
+    squares = np.sum(points**2, axis=1)
+    center = np.linalg.lstsq(system, squares, rcond=None)[0][:-1]
+    return center, float(np.sqrt(np.mean(np.sum((points - center) ** 2, axis=1))))
 
 
 def fit_cone(points: NDArray, normals: NDArray) -> Cone:
@@ -168,17 +173,14 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
     center = points.mean(axis=0)
     size = float(np.ptp(points, axis=0).max())
     frame = np.linalg.svd(axis[None])[2]
-    across = frame[1:] @ ((points - center) / size).T
-    system = np.column_stack([2 * across.T, np.ones(len(points))])
-    circle = np.linalg.lstsq(system, np.sum(across**2, axis=0), rcond=None)[0]
-    radius = np.sqrt(max(circle[2] + circle[:2] @ circle[:2], 0.0))
+    circle, radius = _circle((points - center) / size @ frame[1:].T)
 
     def shape(p: NDArray) -> Cone:
-        direction = frame[0] + p[2] * frame[1] + p[3] * frame[2]
-        point = center + size * (p[0] * frame[1] + p[1] * frame[2])
+        direction = np.r_[1.0, p[2:4]] @ frame
+        point = center + size * p[:2] @ frame[1:]
         return Cone(point, direction / np.linalg.norm(direction), size * p[4], p[5])
 
-    return _refined_fit(shape, np.r_[circle[:2], 0.0, 0.0, radius, 0.0], points, size)
+    return _refined_fit(shape, np.r_[circle, 0.0, 0.0, radius, 0.0], points, size)
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
@@ -197,21 +199,17 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
     candidates = []
     for axis in directions:
         frame = np.linalg.svd(axis[None])[2]
-        across = frame[1:] @ ((points - center) / size).T
-        system = np.column_stack([2 * across.T, np.ones(len(points))])
-        circle = np.linalg.lstsq(system, np.sum(across**2, axis=0), rcond=None)[0]
-        radius = np.sqrt(max(circle[2] + circle[:2] @ circle[:2], 1e-6))
-        tube = float(np.std(np.linalg.norm(across.T - circle[:2], axis=1)) + 0.05)
+        across = (points - center) / size @ frame[1:].T
+        circle, radius = _circle(across)
+        tube = float(np.std(np.linalg.norm(across - circle, axis=1)) + 0.05)
 
         def shape(p: NDArray, frame: NDArray = frame) -> Torus:
-            direction = frame[0] + p[3] * frame[1] + p[4] * frame[2]
-            point = center + size * (
-                p[0] * frame[1] + p[1] * frame[2] + p[2] * frame[0]
-            )
+            direction = np.r_[1.0, p[3:5]] @ frame
+            point = center + size * p[:3] @ frame
             unit = direction / np.linalg.norm(direction)
             return Torus(point, unit, size * p[5], size * p[6])
 
-        start = np.r_[circle[:2], 0.0, 0.0, 0.0, radius, tube]
+        start = np.r_[0.0, circle, 0.0, 0.0, radius, tube]
         candidates.append(_refined_fit(shape, start, points, size))
     return min(candidates, key=lambda t: float(np.abs(t.signed(points)[0]).max()))
 

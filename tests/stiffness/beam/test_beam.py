@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.beam.beam import beam_compliance, section_axes
+from stiffness.beam.beam import beam_compliance, section_axes, unit_vector
 from stiffness.beam.sections import Section, rectangular_section, round_section
 from stiffness.link import LinkStiffness, inverted, scaled, turn_link
 from stiffness.screws import rotation_matrix, screw_map
@@ -211,3 +211,9 @@ def test_what_is_no_compliance_is_refused(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("vector", [[1.0, math.nan, 0.0], [1.0, 2.0], [1.0] * 4])
+def test_a_direction_is_three_finite_numbers(vector):
+    with pytest.raises(BadInput, match="axis: found .*, expected 3 finite numbers"):
+        unit_vector("axis", vector)

@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.curve import (
+    Piece,
     arc_piece,
     curve_compliance,
     curve_length,
@@ -266,3 +267,39 @@ def test_a_curve_cut_in_two_is_the_curve_wherever_it_stands(away, size):
         curve_compliance([one[1], one[0]], E, NU)
     with pytest.raises(BadInput, match="across the radius"):
         arc_piece(o, centre + [0, 1e-3 * size, 0], turn, CROOKED)
+
+
+def test_the_length_of_a_parabola_is_that_of_the_books():
+    """y = x^2 from 0 to 1: sqrt(5) / 2 + asinh(2) / 4; the speed changes with t."""
+    parabola = Piece(
+        place=lambda t: np.array([t, t**2, 0.0]),
+        tangent=lambda t: np.array([1.0, 2 * t, 0.0]),
+        section=lambda t: BAR,
+    )
+    expected = math.sqrt(5) / 2 + math.asinh(2) / 4
+    assert curve_length([parabola]) == pytest.approx(expected, rel=1e-8)
+    line = straight_piece([1, 1, 0], [1, 1, 3], BAR)
+    assert curve_length([parabola, line]) == pytest.approx(expected + 3, rel=1e-8)
+
+
+def test_the_tolerance_is_a_share_in_any_unit():
+    """A cone of 60 to 1, long or short: along its axis it gives L / (E pi r0 r1)."""
+    for unit in (1e-3, 1e3):
+        thick, thin = 0.06 * unit, 1e-3 * unit
+        needle = straight_piece(
+            [0, 0, 0], [0.4 * unit, 0, 0],
+            lambda t, a=thick, b=thin: round_section(a + t * (b - a), NU),
+        )  # fmt: skip
+        C = curve_compliance([needle], E, NU, theory="euler", tolerance=1e-8)
+        expected = 0.4 * unit / (E * math.pi * thick * thin)
+        assert C[3, 3] == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_piece_may_run_through_the_origin():
+    """From -x to x: a piece twice as long; both ends at x: none."""
+    x = np.array([0.1, 0.2, 0.3])
+    C = curve_compliance([straight_piece(-x, x, CROOKED)], E, NU)
+    length = 2 * np.linalg.norm(x)
+    assert_same(C, beam_compliance(length, CROOKED, E, NU, axis=x), 1e-13)
+    with pytest.raises(BadInput, match="is zero"):
+        straight_piece(x, x, CROOKED)

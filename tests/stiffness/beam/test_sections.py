@@ -4,7 +4,15 @@ import math
 
 import pytest
 
-from stiffness.beam.sections import declared_section, i_section
+from forcefit.inputs.table import BadInput
+from stiffness.beam.sections import (
+    box_section,
+    check_section,
+    declared_section,
+    i_section,
+    rectangular_section,
+    round_section,
+)
 
 NU = 0.3
 
@@ -61,3 +69,42 @@ def test_a_rectangle_twists_by_the_series_of_saint_venant(width, height):
     assert (rectangle.area, rectangle.I_y, rectangle.I_z) == pytest.approx(
         (area, I_y, I_z), rel=1e-12
     )
+
+
+def test_the_size_of_a_bar_is_its_radius_in_any_unit():
+    """Of a rectangle it is the longer side over sqrt(3): 2 sqrt(h^2 / 12)."""
+    for unit in (1e-3, 1.0, 1e3):
+        assert round_section(unit, NU).size == pytest.approx(unit, rel=1e-14)
+        for sides in ((3 * unit, unit), (unit, 3 * unit)):
+            size = rectangular_section(*sides, NU).size
+            assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
+
+
+def test_a_wall_may_be_nearly_half_of_the_section():
+    """What is left of a 1 x 1 box with a wall of 0.45 is a hole of 0.1 x 0.1."""
+    assert box_section(1.0, 1.0, 0.45, NU).area == pytest.approx(0.99, rel=1e-12)
+    assert i_section(1.0, 1.0, 0.5, 0.45, NU).area == pytest.approx(0.95, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        lambda nu: round_section(1.0, nu),
+        lambda nu: rectangular_section(1.0, 2.0, nu),
+        lambda nu: box_section(1.0, 2.0, 0.1, nu),
+        lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
+    ],
+)
+def test_poissons_ratio_lies_between_minus_one_and_a_half(section):
+    for nu in (-0.999, 0.499):
+        assert section(nu).area > 0
+    for nu in (-1.0, -1.5, 0.5, math.nan):
+        with pytest.raises(BadInput, match="must lie between"):
+            section(nu)
+
+
+def test_a_bar_without_a_hole_is_a_tube_of_inner_radius_zero():
+    check_section("link", {"radius": 1.0, "inner_radius": 0.0})
+    for size in (1e-41, 1e41, math.nan):
+        with pytest.raises(BadInput, match="no size of a section"):
+            check_section("link", {"radius": size})

@@ -1,0 +1,63 @@
+"""Shapes as surfaces and as beams: volumes of prisms, walls, tapers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.beam_surfaces import check_shape, shape_beam, shape_surface
+
+NU = 0.3
+GON = 64 / 2 * math.sin(2 * math.pi / 64)  # area of the 64-gon in a unit circle
+R, S, L = 0.03, 0.02, 0.2
+AREAS = {
+    "round": ({"radius": R}, GON * R**2),
+    "tube": ({"radius": R, "inner_radius": S}, GON * (R**2 - S**2)),
+    # a frustum: mean of both areas and their geometric mean
+    "cone": ({"radius": R, "tip_radius": S}, GON * (R**2 + R * S + S**2) / 3),
+    "rectangle": ({"width": R, "height": S}, R * S),
+    "box": (
+        {"width": R, "height": S, "wall": 0.45 * S},
+        R * S - (R - 0.9 * S) * 0.1 * S,
+    ),
+}
+
+
+@pytest.mark.parametrize("shape", AREAS)
+def test_a_shape_encloses_its_volume_between_its_ends(shape):
+    """Width along x, height along y, the base at z = 0."""
+    lengths, area = AREAS[shape]
+    surface = shape_surface(shape, lengths | {"length": L})
+    assert surface.volume == pytest.approx(area * L, rel=1e-12)
+    assert surface.repairs == ()
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    wide, high_up = lengths.get("width", 2 * R), lengths.get("height", 2 * R)
+    np.testing.assert_allclose(low, [-wide / 2, -high_up / 2, 0], atol=1e-15)
+    np.testing.assert_allclose(high, [wide / 2, high_up / 2, L], atol=1e-15)
+
+
+@pytest.mark.parametrize("shape", AREAS)
+def test_a_shapes_beam_has_its_ends_and_its_area(shape):
+    """Areas of circles where the surface has polygons of 64 corners."""
+    lengths, area = AREAS[shape]
+    (piece,) = shape_beam(shape, lengths | {"length": L}, NU)
+    np.testing.assert_array_equal(piece.place(0.0), [0, 0, 0])
+    np.testing.assert_allclose(piece.place(1.0), [0, 0, L])
+    assert piece.up is not None
+    np.testing.assert_array_equal(piece.up(0.5), [0, 1, 0])
+    round_ones = math.pi / GON if "radius" in lengths else 1.0
+    # Simpson's rule is exact for a cone's area
+    areas = [piece.section(t).area for t in (0.0, 0.5, 1.0)]
+    mean = areas @ np.array([1, 4, 1]) / 6
+    assert mean == pytest.approx(round_ones * area, rel=1e-12)
+    if shape == "cone":
+        expected = [math.pi * R**2, math.pi * S**2]
+        assert [areas[0], areas[2]] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_tube_or_a_box_needs_a_hole():
+    with pytest.raises(BadInput, match="leave a hole"):
+        check_shape("box", {"length": L, "width": R, "height": S, "wall": S / 2})
+    with pytest.raises(BadInput, match="smaller than radius"):
+        check_shape("tube", {"length": L, "radius": R, "inner_radius": R})

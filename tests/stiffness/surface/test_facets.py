@@ -1,0 +1,59 @@
+"""Lifted facets: shares of corners, unit normals, Phong's fourth order, any unit."""
+
+import numpy as np
+import pytest
+
+from stiffness.surface.facets import Facets, _barycentric
+from tests.solids_for_tests import cylinder
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
+def test_shares_of_the_corners_give_the_point_back(unit):
+    rng = np.random.default_rng(1)
+    corners = unit * (rng.normal(size=(20, 3, 3)) + [5.0, -3.0, 2.0])
+    share = rng.dirichlet([1, 1, 1], size=20)
+    points = np.einsum("pc,pci->pi", share, corners)
+    np.testing.assert_allclose(_barycentric(corners, points), share, atol=1e-12)
+
+
+def side(radius, facets):
+    """A round bar's side, without its ends."""
+    points, triangles = cylinder(radius, 0.2 * radius, facets)
+    return Facets(points[:-2], triangles[: 2 * facets])
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
+def test_lifted_facets_leave_the_fourth_power_of_the_angle(radius):
+    """A flat facet of half-angle a leaves a^2 / 2 of the radius, a lifted one a^4."""
+    facets, a = 24, np.pi / 24
+    patch = side(radius, facets)
+    spokes = patch.points[:, :2] / radius
+    np.testing.assert_allclose(patch.normals[:, :2], spokes, atol=1e-12)
+    middle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
+    points = np.column_stack([np.cos(middle), np.sin(middle), 0.08 + 0 * middle])
+    for lift in (0.0, 0.05, -0.05):
+        lifted = radius * points * [1 + lift, 1 + lift, 1]
+        distances, gradients = patch.signed(lifted)
+        np.testing.assert_allclose(distances / radius, lift, atol=a**4)
+        np.testing.assert_allclose(np.linalg.norm(gradients, axis=1), 1, rtol=1e-12)
+        np.testing.assert_allclose(gradients[:, :2], points[:, :2], atol=a**2)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_facets_are_the_same_in_every_unit(unit):
+    """Of unequal triangles, whose corners' angles alone weigh the normals."""
+    rng = np.random.default_rng(2)
+    x, y = (v.ravel() for v in np.meshgrid([0, 0.1, 0.5, 1.2], [0, 0.7, 0.8]))
+    points = np.column_stack([x, y, 0.1 * rng.normal(size=12)])
+    low = np.array([0, 1, 2, 4, 5, 6])
+    triangles = np.concatenate([
+        np.column_stack([low, low + 1, low + 5]),
+        np.column_stack([low, low + 5, low + 4]),
+    ])
+    one, other = Facets(points, triangles), Facets(unit * points, triangles)
+    np.testing.assert_allclose(one.normals, other.normals, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(one.normals, axis=1), 1, rtol=1e-12)
+    somewhere = rng.uniform([0, 0, -0.1], [1.2, 0.8, 0.1], (20, 3))
+    expected, actual = one.signed(somewhere), other.signed(unit * somewhere)
+    np.testing.assert_allclose(actual[0] / unit, expected[0], atol=1e-5)
+    np.testing.assert_allclose(actual[1], expected[1], atol=1e-4)

@@ -1,0 +1,178 @@
+"""Planes, cones, spheres, tori: distances by hand, fits in any unit, their guesses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stiffness.screws import rotation_matrix
+from stiffness.surface import primitives
+from stiffness.surface.primitives import (
+    Cone,
+    Plane,
+    Sphere,
+    Torus,
+    fit_cone,
+    fit_plane,
+    fit_sphere,
+    fit_torus,
+    project,
+)
+
+AXIS = rotation_matrix([0.4, -0.3, 0.2])[:, 2]
+CENTER = np.array([3.0, -2.0, 5.0])
+
+
+def ring_points(radius, along, count=12):
+    """Points about the axis through the centre: (count, 3) for each radius."""
+    u, v = np.linalg.svd(AXIS[None])[2][1:]
+    angle = 2 * np.pi * np.arange(count) / count
+    spokes = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    rings = [CENTER + a * AXIS + r * spokes for r, a in zip(radius, along, strict=True)]
+    return np.concatenate(rings)
+
+
+ANGLES = 2 * np.pi * np.arange(8) / 8
+CASES = {
+    "plane": (Plane(CENTER, AXIS), ring_points([1.0, 2.0], [0.0, 0.0])),
+    "cone": (
+        Cone(CENTER, AXIS, 2.0, 0.5),
+        ring_points([1.5, 2.0, 2.5], [-1.0, 0.0, 1.0]),
+    ),
+    "sphere": (Sphere(CENTER, 2.0), ring_points([1.2, 2.0], [1.6, 0.0])),
+    "torus": (
+        Torus(CENTER, AXIS, 2.0, 0.5),
+        ring_points(2 + 0.5 * np.cos(ANGLES), 0.5 * np.sin(ANGLES)),
+    ),
+}
+FITS = {"plane": fit_plane, "cone": fit_cone, "sphere": fit_sphere, "torus": fit_torus}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_point_lifted_along_the_normal_is_that_far_away(name):
+    """On the shape the distance is zero; 0.1 out it is 0.1, 0.1 in it is -0.1."""
+    shape, points = CASES[name]
+    distances, normals = shape.signed(points)
+    np.testing.assert_allclose(distances, 0, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-14)
+    for lift in (0.1, -0.1):
+        away, same = shape.signed(points + lift * normals)
+        np.testing.assert_allclose(away, lift, rtol=1e-12)
+        np.testing.assert_allclose(same, normals, atol=1e-13)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("name", CASES)
+def test_a_fit_is_the_same_in_every_unit(name, unit):
+    """To 1e-12 of the size; the first guess of a whole ring is nearly the answer."""
+    shape, points = CASES[name]
+    normals = shape.signed(points)[1]
+    fitted = FITS[name](unit * points, normals)
+    off = fitted.signed(unit * points)[0] / unit
+    np.testing.assert_allclose(off, 0, atol=1e-12)
+    for length in ("radius", "tube"):
+        if hasattr(shape, length) and name != "cone":
+            expected = unit * getattr(shape, length)
+            assert getattr(fitted, length) == pytest.approx(expected, rel=1e-10)
+    if name == "cone":  # at another point of the axis
+        assert abs(fitted.slope) == pytest.approx(0.5, rel=1e-10)
+    for unit_vector in ("axis", "normal"):
+        if hasattr(shape, unit_vector):
+            along = getattr(fitted, unit_vector)
+            assert np.linalg.norm(along) == pytest.approx(1, rel=1e-14)
+            assert abs(along @ AXIS) == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_plane_looks_where_its_facets_look(sign):
+    points = CASES["plane"][1]
+    tilted = AXIS + 0.3 * np.linalg.svd(AXIS[None])[2][1]
+    tilted /= np.linalg.norm(tilted)
+    fitted = fit_plane(points, sign * tilted[None])
+    np.testing.assert_allclose(fitted.normal, sign * AXIS, atol=1e-14)
+
+
+def first_guess(monkeypatch, fit, points, normals):
+    """The shape that nonlinear least squares begin with, of each try."""
+    guesses = []
+
+    def spy(shape, start, points, size):
+        guesses.append(shape(start))
+        return guesses[-1]
+
+    monkeypatch.setattr(primitives, "_refined_fit", spy)
+    fit(points, normals)
+    return guesses
+
+
+def test_the_first_guess_of_a_cylinder_is_the_cylinder(monkeypatch):
+    """Half of it suffices: a circle's centre and radius are linear in |x|^2."""
+    cylinder = Cone(CENTER, AXIS, 2.0)
+    points = (
+        ring_points([2.0, 2.0], [-1.0, 1.0]).reshape(2, -1, 3)[:, :7].reshape(-1, 3)
+    )
+    normals = cylinder.signed(points)[1]
+    for unit in (1e-3, 1.0, 1e3):
+        (guess,) = first_guess(monkeypatch, fit_cone, unit * points, normals)
+        assert guess.radius == pytest.approx(2 * unit, rel=1e-12)
+        assert guess.slope == 0
+        np.testing.assert_allclose(guess.signed(unit * points)[0] / unit, 0, atol=1e-12)
+
+
+def test_one_first_guess_of_a_torus_is_near(monkeypatch):
+    """Of a whole one: mean r^2 is R^2 + t^2 / 2; the spread of r is t / sqrt(2)."""
+    torus, points = CASES["torus"]
+    for unit in (1e-3, 1.0, 1e3):
+        normals = torus.signed(points)[1]
+        guesses = first_guess(monkeypatch, fit_torus, unit * points, normals)
+        near = max(guesses, key=lambda guess: abs(guess.axis @ AXIS))
+        assert abs(near.axis @ AXIS) == pytest.approx(1, rel=1e-12)
+        np.testing.assert_allclose(near.point / unit, CENTER, atol=1e-12)
+        assert near.radius == pytest.approx(unit * np.sqrt(4 + 0.125), rel=1e-12)
+        assert 0.35 <= near.tube / unit <= 0.7
+
+
+def test_a_torus_is_found_in_any_direction_it_is_thin_in():
+    """A quarter of one: its thinnest direction is not its axis."""
+    torus = CASES["torus"][0]
+    turn = np.linspace(0, np.pi / 2, 9)
+    u, v = np.linalg.svd(AXIS[None])[2][1:]
+    spokes = np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * v
+    points = np.concatenate([
+        CENTER + (2 + 0.5 * np.cos(a)) * spokes + 0.5 * np.sin(a) * AXIS for a in ANGLES
+    ])
+    fitted = fit_torus(points, torus.signed(points)[1])
+    np.testing.assert_allclose(fitted.signed(points)[0], 0, atol=1e-12)
+    assert fitted.radius == pytest.approx(2, rel=1e-10)
+    assert fitted.tube == pytest.approx(0.5, rel=1e-10)
+
+
+def test_too_few_points_give_the_first_guess():
+    """Least squares need as many points as parameters."""
+    cylinder = Cone(CENTER, AXIS, 2.0)
+    points = ring_points([2.0, 2.0], [-1.0, 1.0], 3)[:5]
+    normals = cylinder.signed(ring_points([2.0], [0.0]))[1]
+    fitted = fit_cone(points, normals)
+    assert fitted.slope == 0
+    np.testing.assert_allclose(fitted.signed(points)[0], 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_projecting_onto_a_plane_takes_one_step_and_one_to_see_it(unit, monkeypatch):
+    """Newton's method ends with the first step that rounding alone makes."""
+    calls = []
+    plain = Plane.signed
+
+    def counted(self, points):
+        calls.append(len(points))
+        return plain(self, points)
+
+    monkeypatch.setattr(Plane, "signed", counted)
+    plane = replace(CASES["plane"][0], point=unit * CENTER)
+    found = project(unit * (CENTER + [[0.1, 0.2, 0.3]]), (plane,))
+    np.testing.assert_allclose((found - unit * CENTER) @ AXIS, 0, atol=1e-13 * unit)
+    assert len(calls) <= 3
+
+
+def test_projecting_nothing_gives_nothing():
+    assert project(np.zeros((0, 3)), (CASES["plane"][0],)).shape == (0, 3)
