@@ -138,12 +138,14 @@ inline Row Energies::least_multipliers(int r, int count) {
 // Deformation of every spring, from that of the groups' six.
 inline void Energies::own_springs(
     const Row &grouped, const Block &block, double *elastic, Whole where) {
+    Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
-        const int count = springs_of(g);
+        const int count = spring_group(g, rows);
+        triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
         Row own(count);
         std::copy(&grouped[6 * g], &grouped[6 * g] + 6, own.begin());
         Real *x = own.data();
-        turn_all(groups[g], 6, count, &x, 1);
+        turn_all(rows, 6, count, &x, 1);
         for (int64_t c = s.groups[g]; c < s.groups[g + 1]; ++c) {
             Real strain = own[c - s.groups[g]];
             if (loaded) strain += tight[c];

@@ -58,11 +58,13 @@ inline Row Loaded::on_patterns(const Row &closing) const {
 // What t is of the groups' six springs.
 inline Row Loaded::bent_groups() {
     Row bent(6 * ng);
+    Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
-        const int count = springs_of(g), first = int(s.groups[g]);
+        const int count = spring_group(g, rows), first = int(s.groups[g]);
+        triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
         Row own(count);
         std::copy(&tight[first], &tight[first] + (s.groups[g + 1] - first), own.begin());
-        turn_back(groups[g], 6, count, own.data());
+        turn_back(rows, 6, count, own.data());
         std::copy(own.begin(), own.begin() + 6, &bent[6 * g]);
     }
     return bent;

@@ -36,14 +36,6 @@ inline Array<int> loose_patterns(const Robot &s) {
     return slot;
 }
 
-// Most springs of a group, at least six.
-inline int widest(const Robot &s) {
-    int most = 6;
-    for (int g = 0; g < s.ng; ++g)
-        most = std::max(most, int(s.groups[g + 1] - s.groups[g]));
-    return most;
-}
-
 // The linear model, reduced.
 class Reduction : public Linearised {
 public:
@@ -56,7 +48,7 @@ protected:
     Table L, parts;          // parts: Z's rows, for a screw of each pattern
     Programme programme;
     Array<Real *> Z;  // rows beside Y's
-    Array<Triangle> groups;  // each group's springs, at least six, as columns
+    int widest;             // most springs of a group, at least six
 
     Whole triangulate_free(Real tolerance);
     void orthogonal_rows(int rank, int count);
@@ -70,7 +62,7 @@ protected:
     Whole hold_free_motions(int rank, const Row &drive, Real still, Row &closing);
     Whole hold_free_motions(int rank, int row, double still, Row &closing);
     void bend_least(int r, Row &bent, Row &closing);
-    int springs_of(int g) const { return std::max(6, int(s.groups[g + 1] - s.groups[g])); }
+    int spring_group(int g, Triangle &rows);
 
 private:
     void grouped_springs();
@@ -82,7 +74,10 @@ inline Reduction::Reduction(const Robot &s, const Points &points)
     : Linearised(s, points), cones(s.starts, int(s.cones)), slot(loose_patterns(s)),
       free(nq, m), springs(m, 6 * ng + m), L(6 * ng, 6),
       parts(m, 6 * (1 + *std::max_element(slot.begin(), slot.end()))),
-      programme(cones, m), Z(m), groups(ng, Triangle(6, widest(s))) {}
+      programme(cones, m), Z(m), widest(6) {
+    for (int g = 0; g < ng; ++g)
+        widest = std::max(widest, int(s.groups[g + 1] - s.groups[g]));
+}
 
 // Free motions brought to a triangle; the rank of each lane, -1 where it is unclear.
 inline Whole Reduction::triangulate_free(Real tolerance) {
@@ -95,14 +90,20 @@ inline Whole Reduction::triangulate_free(Real tolerance) {
     return triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
 }
 
+// (6, springs) columns of a group's springs; returns how many, at least six.
+inline int Reduction::spring_group(int g, Triangle &rows) {
+    const int count = int(s.groups[g + 1] - s.groups[g]);
+    for (int i = 0; i < 6; ++i)
+        for (int c = 0; c < std::max(6, count); ++c)
+            rows.F[i][c] = c < count ? elastic[int(s.groups[g]) + c][i] : Real{};
+    return std::max(6, count);
+}
+
 // Springs that act together, combined into six with the same sum of squares.
 inline void Reduction::grouped_springs() {
+    Triangle rows(6, widest);
     for (int g = 0; g < ng; ++g) {
-        Triangle &rows = groups[g];
-        const int first = int(s.groups[g]), last = int(s.groups[g + 1]), count = springs_of(g);
-        for (int i = 0; i < 6; ++i)
-            for (int c = 0; c < count; ++c)
-                rows.F[i][c] = first + c < last ? elastic[first + c][i] : Real{};
+        const int count = spring_group(g, rows);
         const Whole rank = triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
         for (int i = 0; i < 6; ++i) {
             Real own[6] = {};

@@ -61,10 +61,6 @@ public:
     Table(int rows, int columns) : numbers(size_t(rows) * columns), at(rows) {
         for (int i = 0; i < rows; ++i) at[i] = numbers.data() + size_t(i) * columns;
     }
-    Table(const Table &other) : numbers(other.numbers), at(other.at) {
-        for (Real *&row : at) row = numbers.data() + (row - other.numbers.data());
-    }
-    Table &operator=(const Table &) = delete;
     Real *operator[](int row) const { return at[row]; }
     Real **rows() { return at.data(); }
     Real *const *rows() const { return at.data(); }
