@@ -8,7 +8,6 @@ from assembly.batch.posture_loads import posture_loads
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import (
     closure_signs,
-    cone_starts,
     linearise,
     virtual_joints,
 )
@@ -16,6 +15,7 @@ from assembly.linear.load import loads_with_weight
 from assembly.linear.reduction import complement, reduce_problem
 from assembly.linear.thresholds import RANK
 from assembly.model.clearance import clearance_bounds, component_bounds
+from assembly.solvers.conic import cone_starts
 
 __all__ = ["OnePosture", "prepare_energies"]
 

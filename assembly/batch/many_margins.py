@@ -13,7 +13,6 @@ from scipy.linalg import svd
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import (
     VirtualJoints,
-    cone_starts,
     linearise,
     virtual_joints,
 )
@@ -21,7 +20,7 @@ from assembly.linear.reduction import complement, reduce_problem
 from assembly.linear.thresholds import INFEASIBLE, RANK
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
-from assembly.solvers.conic import SolverFailed
+from assembly.solvers.conic import SolverFailed, cone_starts
 
 _CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
 

@@ -86,7 +86,7 @@ class Form:
 
 def column_indices(name: str) -> list[int]:
     """The whole numbers with which a column's name begins."""
-    return [int(part) for part in name.split(".") if part.removeprefix("-").isdigit()]
+    return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
 def _powers(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:

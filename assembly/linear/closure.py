@@ -122,8 +122,7 @@ def _virtual_joints(
     bounds = np.where(
         np.array(left_out)[:, None] & ~scaled & (bounds > 0), np.inf, bounds
     )
-    none: NDArray = np.zeros(0)
-    links = joints = none
+    links = joints = np.zeros((0, 6, 6))
     if compliant in {"elastic", "hinged"}:
         links, joints = link_compliances(robot), joint_compliances(robot)
     if compliant == "hinged":
@@ -183,18 +182,6 @@ def _free(bounds: NDArray) -> NDArray:
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
     return columns
-
-
-def cone_starts(group: NDArray) -> NDArray:
-    """First column of every cone.
-
-    Args:
-        group: (nu,) cone of each column, in order.
-
-    Returns:
-        (cones + 1,) and nu after the last.
-    """
-    return np.append(0, np.cumsum(np.bincount(group)))
 
 
 def in_reference_lengths(size: float) -> NDArray:

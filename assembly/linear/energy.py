@@ -187,6 +187,13 @@ def _rounding_of(robot: Robot) -> float:
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
+def _any_load(loads: NDArray | None, count: int) -> NDArray:
+    """(k,) bool: which points are under loads."""
+    if loads is None:
+        return np.zeros(count, dtype=bool)
+    return np.any(loads, axis=(1, 2, 3))
+
+
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
     springs: int, loads: NDArray | None,
@@ -213,7 +220,7 @@ def _solve_compiled(
     elif loads is None:
         _fill(given, None)
     else:  # points that no load acts on have the bits of those without
-        loaded = np.any(loads, axis=(1, 2, 3))
+        loaded = _any_load(loads, count)
         for some, acting in ((loaded, loads), (~loaded, None)):
             if some.all():
                 _fill(given, acting)
@@ -349,9 +356,6 @@ def _minimise_all(
     joints, structure = structure_of(robot, compliant)
     out = _solve_compiled(robot, T, errors, off, compliant, 0, loads)
     count = len(T)
-    loaded = np.zeros(count, dtype=bool)
-    if loads is not None:
-        loaded = np.any(loads, axis=(1, 2, 3))
     energies = Assemblies(
         energy=out.energy,
         bound=out.bound,
@@ -364,7 +368,7 @@ def _minimise_all(
         motions=out.motions,
         multipliers=out.multipliers,
         outcome=out.outcome,
-        loaded=loaded,
+        loaded=_any_load(loads, count),
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
         joints=joints,

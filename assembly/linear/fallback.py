@@ -32,6 +32,7 @@ from assembly.model.clearance import (
 from assembly.solvers.conic import (
     LeastEnergy,
     cone_sizes,
+    cone_starts,
     least_factor,
     minimise_energy,
 )
@@ -242,7 +243,6 @@ def _margin_bound(
 ) -> float:
     """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
     sizes = cone_sizes(B.T @ y, joints.group)
-    first = np.searchsorted(joints.group, np.arange(len(sizes)))
-    scaled = joints.scaled[first]
+    scaled = joints.scaled[cone_starts(joints.group)[:-1]]
     work = float(y @ right) - float(sizes[~scaled].sum())
     return max(0.0, work / max(float(sizes[scaled].sum()), 1e-300))

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
 from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, cone_starts, virtual_joints
+from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.fallback import without_own_springs
 from assembly.linear.reduction import complement
 from assembly.linear.thresholds import (
@@ -40,7 +40,12 @@ from assembly.model.clearance import (
     scales_with_margin,
 )
 from assembly.solvers import one_problem
-from assembly.solvers.conic import cone_sizes, into_cones, minimise_energy
+from assembly.solvers.conic import (
+    cone_sizes,
+    cone_starts,
+    into_cones,
+    minimise_energy,
+)
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
 

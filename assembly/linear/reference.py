@@ -61,7 +61,7 @@ def reference_energy(
         constraints.append(screws[hard] == 0)
         roots = [_root_of_stiffness(one) for one in C]
         energy += cp.sum_squares(block_diag(*roots) @ cp.vec(screws, "C")) / 2
-    work = np.asarray(np.zeros(6) if load is None else load, dtype=float) @ x_p * _UNIT
+    work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
     _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 

@@ -11,11 +11,11 @@ from assembly.kinematics.nominal import size_of
 from assembly.linear.closure import (
     VirtualJoints,
     closure_signs,
-    cone_starts,
     virtual_joints,
 )
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.model.robot import Robot
+from assembly.solvers.conic import cone_starts
 from assembly.solvers.layouts import Indices, Matrix, Vector
 
 

@@ -140,7 +140,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
         size_of(robot) if f.joint == "prismatic" else 1.0 for f in robot.frames
     ])
     # the drives move unequally: symmetric steps may stay in a singular set
-    spread = np.cos(np.arange(len(robot.frames)))
+    spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
     goals = np.where(
         driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
     )

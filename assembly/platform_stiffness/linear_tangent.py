@@ -27,6 +27,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
+    in_reference_lengths,
     linearise,
     virtual_joints,
 )
@@ -144,7 +145,7 @@ def _stiffness(
 
 def _sizes(columns: NDArray, length: float) -> NDArray:
     """Size of screws, rotations in rad and translations in reference lengths."""
-    weights = np.tile(np.repeat([1.0, 1.0 / length], 3), len(columns) // 6)
+    weights = np.tile(in_reference_lengths(length), len(columns) // 6)
     return np.linalg.norm(columns * weights[:, None], axis=0)
 
 

@@ -161,7 +161,7 @@ def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
     """The interior-point method of this package; its solution must satisfy H."""
-    starts = _starts(group)
+    starts = cone_starts(group)
     solution = one_problem.interior_point((G, h, d, H, k), starts, _GAP_WITHIN)
     if solution is None:
         from assembly.solvers.cone_solvers import interior_point
@@ -180,9 +180,9 @@ def _writable(*arrays: NDArray) -> tuple[NDArray, ...]:
     return tuple(np.require(array, requirements=["C", "W"]) for array in arrays)
 
 
-def _starts(group: NDArray) -> NDArray:
-    """(cones + 1,) first column of each cone, and nu."""
-    return np.searchsorted(group, np.arange(group[-1] + 2))
+def cone_starts(group: NDArray) -> NDArray:
+    """(cones + 1,) first column of each cone, and nu; of (nu,) cones in order."""
+    return np.append(0, np.cumsum(np.bincount(group)))
 
 
 def _by_clarabel(
@@ -228,7 +228,7 @@ def _certified(
     yield _certify(problem, u, G @ u + h, rigid)
     if np.bincount(group).max() > 2:
         return  # Newton's method knows discs and intervals only
-    u, y, starts = u.copy(), np.concatenate([h, -rigid]), _starts(group)
+    u, y, starts = u.copy(), np.concatenate([h, -rigid]), cone_starts(group)
     relative = _STOP * GAP
     absolute = _STOP * GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     limits = one_problem.Limits(relative, absolute, _FIRST_SIGMA, _STEPS)
@@ -323,7 +323,7 @@ def least_factor(
             P, q, A, b, _Cones(equal=m, group=group, positive=1), regularisation
         )
         if status == "PrimalInfeasible":
-            radius = np.where(scaled, _LARGEST_FACTOR, 1.0)[_starts(group)[:-1]]
+            radius = np.where(scaled, _LARGEST_FACTOR, 1.0)[cone_starts(group)[:-1]]
             n = -z[:m] / rows
             if _proves_no_point(n, B, right / size, group, radius):
                 return None, np.zeros(nu), np.zeros(m)
@@ -347,8 +347,8 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
     at = np.arange(nu) + group + 1
     A = csc_matrix((np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
     b = np.zeros(nu + cones)
-    starts = np.searchsorted(group, np.arange(cones)) + np.arange(cones)
-    b[starts] = radius[np.searchsorted(group, np.arange(cones))]
+    first = cone_starts(group)[:-1]
+    b[first + np.arange(cones)] = radius[first]
     return A, b
 
 

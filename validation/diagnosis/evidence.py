@@ -80,7 +80,7 @@ class Evidence:
         """
         self.terms = tuple(terms)
         self._sure = [term.sure for term in terms]
-        self._penalty = 0.5 * np.log(cells)  # of each size asked for
+        self._penalty = 0.5 * np.log(max(cells, 2))  # of each size asked for
         self._begin = np.cumsum([0, *(len(term) for term in terms)])
         group = [
             np.where(t.group < 0, t.group, 2 * i + t.group) for i, t in enumerate(terms)

@@ -64,7 +64,7 @@ def linear_or_finite(
     odds = math.exp(min(gain / 2, 500.0)) / max(len(probability), 1)
     part = odds / (1 + odds)
     weights = dict(sets)
-    nothing = weights.pop(())
+    nothing = weights.pop((), 0.0)
     moved = {(): nothing * (1 - part), (FINITE,): nothing * part}
     for names, weight in moved.items():
         weights[names] = weights.get(names, 0.0) + weight

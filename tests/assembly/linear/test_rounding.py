@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.linear.closure import cone_starts, in_reference_lengths, virtual_joints
+from assembly.linear.closure import in_reference_lengths, virtual_joints
 from assembly.linear.rounding import (
     closure_rounding,
     differs_from_zero,
@@ -11,6 +11,7 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.model.robot import Clearance
+from assembly.solvers.conic import cone_starts
 from tests.robots_for_tests import coaxial_beams
 
 EPS = 2.0**-52

@@ -18,8 +18,8 @@ from assembly.solvers.conic import (
     _compiled,
     _proved,
     _proves_no_point,
-    _starts,
     cone_sizes,
+    cone_starts,
     least_factor,
     minimise_energy,
 )
@@ -220,7 +220,7 @@ def test_without_loads_any_multiple_of_multipliers_proves_as_much(rng):
 
 
 def test_columns_of_cones_begin_where_their_number_does():
-    assert _starts(GROUP).tolist() == [0, 2, 3, 5]
+    assert cone_starts(GROUP).tolist() == [0, 2, 3, 5]
 
 
 @pytest.mark.parametrize("row", [1e-5, 1.0, 1e4])

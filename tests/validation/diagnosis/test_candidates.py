@@ -21,17 +21,22 @@ from validation.diagnosis.signatures import conditions_of
 LINE = CandidateShape("powers", ("0", "1"))
 
 
-@pytest.fixture
-def sensitivities(tmp_path):
-    """Twelve configurations of the planar arm, the second drive at rest."""
-    table = tmp_path / "commands.csv"
+def arm_sensitivities(folder, bend):
+    """Of the planar arm at twelve configurations, the second drive at bend q^2; q."""
+    table = folder / "commands.csv"
     q = np.linspace(0.2, 1.7, 12).round(6)
-    lines = [f"m{i},{a:.6f},0" for i, a in enumerate(q)]
+    lines = [f"m{i},{a:.6f},{bend * a * a:.6f}" for i, a in enumerate(q)]
     table.write_text("\n".join(["id,q.one,q.two", *lines]) + "\n")
-    (tmp_path / "arm.toml").write_text(ARM)
-    campaign = read_commands(table, read_robot(tmp_path / "arm.toml"))
+    (folder / "arm.toml").write_text(ARM)
+    campaign = read_commands(table, read_robot(folder / "arm.toml"))
     conditions = conditions_of(campaign)
     return Sensitivities(conditions, campaign.robot, responses(conditions)), q
+
+
+@pytest.fixture
+def sensitivities(tmp_path):
+    """The second drive at rest."""
+    return arm_sensitivities(tmp_path, bend=0.0)
 
 
 def one_at(components, shape=LINE):

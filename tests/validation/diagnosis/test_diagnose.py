@@ -8,8 +8,8 @@ import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.measurement.predict import predict, with_second_order
-from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import bar
+from tests.validation.diagnosis.test_finite_errors import ARM
 from validation.diagnosis import diagnose as module
 from validation.diagnosis.background import background
 from validation.diagnosis.diagnose import diagnose
@@ -245,14 +245,6 @@ def test_functions_are_kept_without_finite_errors_if_they_cost_less_there(
         None, straight, "bent", "selection", Taught(functions, "alone"), None
     )
     assert told == (("straight", "other") if goes_back else ("bent", "selection"))
-
-
-TURNING = {"joint": "revolute", "actuated": True}
-ARM = Robot("arm", "tool", (
-    Frame("j1", **TURNING),
-    Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], **TURNING),
-    Frame("tool", "j2", [0.3, 0.05, 0.1]),
-))  # fmt: skip
 
 
 @pytest.fixture(params=[2e-2, 5e-3, 0.0], ids=["far off", "off", "as declared"])

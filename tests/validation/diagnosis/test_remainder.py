@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from assembly.files.robot_file import read_robot
-from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign_file import read_commands
+from tests.validation.diagnosis.test_candidates import arm_sensitivities
 from validation.diagnosis import learning
-from validation.diagnosis.candidates import Candidate, CandidatePart, Sensitivities
+from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.evidence import Prior
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.learning import Learned, learn
 from validation.diagnosis.remainder import Remainder, Unexplained
-from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.small_terms import GEOMETRY, SmallTerm
 
 ROWS = 15
@@ -236,15 +232,8 @@ class _Endless:
 
 @pytest.fixture
 def sensitivities(tmp_path):
-    """Twelve configurations of the planar arm."""
-    table = tmp_path / "commands.csv"
-    q = np.linspace(0.2, 1.7, 12).round(6)
-    lines = [f"m{i},{a:.6f},{1.3 * a * a:.6f}" for i, a in enumerate(q)]
-    table.write_text("\n".join(["id,q.one,q.two", *lines]) + "\n")
-    (tmp_path / "arm.toml").write_text(ARM)
-    campaign = read_commands(table, read_robot(tmp_path / "arm.toml"))
-    conditions = conditions_of(campaign)
-    return Sensitivities(conditions, campaign.robot, responses(conditions)), q
+    """Both drives turn."""
+    return arm_sensitivities(tmp_path, bend=1.3)
 
 
 def test_powers_are_orthonormal_over_the_rows(sensitivities):
