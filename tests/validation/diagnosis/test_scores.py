@@ -339,6 +339,6 @@ def test_a_model_foretells_if_it_is_claimed_or_learned_and_sound(
 
 
 def test_sets_without_a_listed_none_keep_their_weights():
-    """Though the best of very many sets, none at all may be too unlikely to be listed."""
+    """The best of very many sets may itself be too unlikely to be listed."""
     sets = ((("a",), 0.6), (("b",), 0.4))
     assert linear_or_finite(sets, {"a": 0.6, "b": 0.4}, 50.0)[0] == sets
