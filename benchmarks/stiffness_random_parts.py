@@ -8,11 +8,11 @@ cone, stepped rod and an eye with a bore, thin and thick, slender and stubby, nu
 to 0.45, all by the set's seed and the part's number.  Each is solved as
 ``forcefit stiffness fea`` does, at the default accuracy, and judged by K of
 ``stiffness_random_references.py``.  Printed: unknowns, meshes, true error, told error,
-effectivity told / true, all largest entries scaled by sqrt(K_ii K_jj); then their
-distribution.  The reference's own uncertainty is beside the true error; parts are
-counted as covered if told is not below true.  References and answers are kept in
-JSON files, so that a campaign resumes and nothing is computed twice; the answers'
-file is to be deleted when the code has changed.
+effectivity told / true, all largest entries scaled by sqrt(K_ii K_jj), and the true
+error of the mesh's own K; then their distribution and means.  The reference's own
+uncertainty is beside the true error; parts are counted as covered if told is not below
+true.  References and answers are kept in JSON files, so that a campaign resumes and
+nothing is computed twice; the answers' file is to be deleted when the code has changed.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import Surface, check_surface
 
 YOUNG = 60e9  # [Pa]; errors do not depend on it
-SEEDS = {"training": 1, "test": 2}  # of the factors in stiffness/, and of their judges
+SEEDS = {"training": 1, "test": 2, "middle": 1142}  # factors are set on the first
 KINDS = ("plate", "bar", "box", "channel", "bracket", "fork",
          "rod", "tube", "cone", "stepped", "eye")  # fmt: skip
 FACETS = 64
@@ -255,8 +255,10 @@ def answer(part: Part) -> dict:
     """K as ``fea`` gives it, with what it tells of its error."""
     start = time.process_time()
     faces = [parse_interface(text) for text in (part.base, part.tip)]
-    link = solve_link(surface_of(part), *faces, [Material(YOUNG, part.nu)]).link
+    solved = solve_link(surface_of(part), *faces, [Material(YOUNG, part.nu)])
+    link = solved.link
     return {
+        "mesh_stiffness": solved.level.solution.stiffness.tolist(),
         "stiffness": link.stiffness.tolist(),
         "told": np.abs(link.relative_errors).max(),
         "unknowns": link.mesh["unknowns"],
@@ -283,22 +285,28 @@ def reference(part: Part) -> dict:
     return independent_stiffness(part, YOUNG)
 
 
-def judge(name: str, number: int, references: Path, answers: Path) -> float:
-    """One row; told over true."""
+def judge(
+    name: str, number: int, references: Path, answers: Path
+) -> tuple[float, float, float]:
+    """One row: told over true, true error and that of the mesh's own K."""
     part = draw_part(SEEDS[name], number)
     known = kept(references, f"{name}-{number}", lambda: reference(part))
     kept_rows = kept(answers, f"{name}-{number}",
                  lambda: answer(part))  # fmt: skip
     truth = np.array(known["stiffness"])
-    true = np.abs(scaled(np.array(kept_rows["stiffness"]) - truth, truth)).max()
+    true, own = (
+        np.abs(scaled(np.array(kept_rows[name]) - truth, truth)).max()
+        for name in ("stiffness", "mesh_stiffness")
+    )
     ratio = kept_rows["told"] / true
     print(
         f"{number:3d} {part.kind:8} {part.nu:5.2f} {kept_rows['unknowns']:8d} "
         f"{kept_rows['meshes']:2d} {100 * true:9.4f} +- {100 * known['unsure']:.4f} % "
-        f"{100 * kept_rows['told']:9.4f} % {ratio:6.2f} {kept_rows['seconds']:6.1f} s",
+        f"{100 * kept_rows['told']:9.4f} % {ratio:6.2f} {100 * own:9.4f} % "
+        f"{kept_rows['seconds']:6.1f} s",
         flush=True,
     )
-    return float(ratio)
+    return float(ratio), float(true), float(own)
 
 
 if __name__ == "__main__":
@@ -308,12 +316,13 @@ if __name__ == "__main__":
     parser.add_argument("--references", type=Path, default=REFERENCES)
     parser.add_argument("--answers", type=Path, default=Path("random_parts.json"))
     asked = parser.parse_args()
-    print("    part        nu unknowns meshes  true error            told   told/true")
+    print("    part        nu unknowns meshes  true error           told  ratio  mesh")
     numbers = range(*(int(n) for n in asked.parts.split(":")))
-    ratios = np.array([
+    ratios, true, own = np.transpose([
         judge(asked.set, n, asked.references, asked.answers) for n in numbers
     ])
     low, five, half, most, high = np.quantile(ratios, [0, 0.05, 0.5, 0.95, 1])
     print(f"told / true: least {low:.2f}, 5 % {five:.2f}, median {half:.2f}, 95 % "
           f"{most:.2f}, largest {high:.2f}; covered {(ratios >= 1).sum()} of "
-          f"{len(ratios)}")  # fmt: skip
+          f"{len(ratios)}; mean true error {100 * true.mean():.3f} %, of the meshes' "
+          f"own K {100 * own.mean():.3f} %")  # fmt: skip

@@ -27,8 +27,8 @@ class LinkStiffness:
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
         tip: (3,) [m] the point where screws and wrenches are read.
         base: (3,) [m] the centre of the held interface.
-        stiffness_error: (6, 6) [N m/rad .. N/m] estimate of ``stiffness`` minus the
-            exact one, symmetric; zero for a closed form.
+        stiffness_error: (6, 6) [N m/rad .. N/m] estimated size of the difference of
+            ``stiffness`` and the exact one, symmetric; zero for a closed form.
         mesh: counts, volume and quality of the mesh behind it; empty without one.
         mass: [kg] of the link, 0 when no density was given.
         center_of_mass: (3,) [m].

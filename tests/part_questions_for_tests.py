@@ -26,7 +26,12 @@ from stiffness.beam.sections import (
     rectangular_section,
     round_section,
 )
-from stiffness.fem.adaptive_step import estimated_error, refine_level, solve_level
+from stiffness.fem.adaptive_step import (
+    estimated_error,
+    middle_stiffness,
+    refine_level,
+    solve_level,
+)
 from stiffness.fem.material import Material
 from stiffness.fem.quality import dihedral_angles, mesh_report
 from stiffness.mesh.curved_elements import curved_elements
@@ -208,7 +213,7 @@ def meshes(nudge: float) -> Any:
 
 
 def levels(interface: str, nudge: float) -> Any:
-    """Two levels of a short bar in two materials: stiffness and estimated errors."""
+    """A level of a short bar and a finer one: stiffness, estimated errors, middle."""
     solid = bar_solid(1, 2, 0.03 * (1 + nudge), 0.06)
     if interface != "rigid":
         solid = skewed(solid, nudge)
@@ -216,12 +221,14 @@ def levels(interface: str, nudge: float) -> Any:
     centers = np.array([[0.0, 0, 0], [0.001, 0, 0.06]])
     level = solve_level(solid, materials, centers, interface)
     finer = refine_level(level, 2.0)
-    history = [level.totals()]
+    totals = level.totals()
+    error, index = estimated_error([totals])
     return {
         "level": level,
         "report": mesh_report(level.solid, level.mesh),
         "finer": finer,
-        "error": estimated_error(history),
+        "error": (error, index),
+        "middle": middle_stiffness(totals[0], error, totals[2]),
     }
 
 

@@ -3,6 +3,10 @@
 The error indicator (:mod:`stiffness.fem.error_indicator`) is multiplied by an
 effectivity index: the change of the stiffness in the last refinement over that of the
 indicator.
+
+K_h is an upper bound of the exact stiffness and the error estimate E bounds how far
+above it may be, so that K lies between K_h - E and K_h.  The middle of this interval is
+returned: its error is half as large at most, on the same mesh.
 """
 
 from collections.abc import Sequence
@@ -10,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from stiffness.fem.condensation import Condensed, condense
 from stiffness.fem.elements import ORDER, Elements, isoparametric
@@ -19,6 +24,7 @@ from stiffness.fem.error_indicator import (
     traction_errors,
 )
 from stiffness.fem.material import Material, material_of_elements
+from stiffness.link import scaled
 from stiffness.mesh.curved_elements import refine_inverted
 from stiffness.mesh.edge_grading import (
     ENDS,
@@ -114,17 +120,17 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Error of the last stiffness: the indicator times an effectivity index.
+    """Error of the last mesh's stiffness: the indicator times an effectivity index.
 
     Args:
         history: of each mesh, finest last, the totals of its :class:`Level`.
 
     Returns:
-        (6, 6) estimate of the exact stiffness minus the last one, and the effectivity
-        index used, of the worst motion: the change of the stiffness in the last
-        refinement over that of the indicated error, times a safety factor.
+        (6, 6) estimate of K_h minus the exact stiffness but for the geometry, and the
+        effectivity index used, of the worst motion: the change of the stiffness in the
+        last refinement over that of the indicated error, times a safety factor.
     """
-    K, indicated, geometry = history[-1]
+    K, indicated, _ = history[-1]
     factors = np.full(6, DEFAULT_EFFECTIVITY)
     if len(history) > 1:
         coarse, indicated_before, _ = history[-2]
@@ -136,8 +142,27 @@ def estimated_error(
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
     worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
+    return estimate, float(factors[worst])
+
+
+def middle_stiffness(
+    K_h: NDArray, E: NDArray, geometry: NDArray
+) -> tuple[NDArray, NDArray]:
+    """The middle of the interval in which the exact stiffness lies.
+
+    Args:
+        K_h: (6, 6) of a mesh, an upper bound but for the geometry.
+        E: (6, 6) estimate of its error, positive semidefinite.
+        geometry: (6, 6) indicated error of the geometry, of either sign.
+
+    Returns:
+        (6, 6) K_h - E / 2, or less of E taken off where the result would not keep at
+        least half of K_h in every motion, and (6, 6) the size of its error.
+    """
+    largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
+    part = 0.5 / max(1.0, largest)
     # geometry errors of either sign may cancel in K, not in the estimate
-    return -estimate - np.abs(geometry), float(factors[worst])
+    return K_h - part * E, (1 - part) * E + np.abs(geometry)
 
 
 def refine_level(level: Level, growth: float) -> Solid:

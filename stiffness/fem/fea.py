@@ -21,6 +21,7 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.fem.adaptive_step import (
     Level,
     estimated_error,
+    middle_stiffness,
     refine_level,
     solve_level,
 )
@@ -91,7 +92,7 @@ class MeshedLink:
 
     Attributes:
         link: the stiffness, with error, mesh report, mass.
-        level: the finest mesh, its fields and materials.
+        level: the finest mesh, its own stiffness, fields and materials.
         centers: (2, 3) [m] of the base and the tip interface.
     """
 
@@ -168,13 +169,13 @@ def solve_link(
         for side, name in ((base, "base"), (tip, "tip"))
     ])
     first = first_mesh(surface, base, tip, options.budget, options.cache)
-    level, error, report = _refined(first, materials, centers, options, start)
+    level, K, error, report = _refined(first, materials, centers, options, start)
     report |= {
         "surface_volume": surface.volume,
         "surface_area": surface.area,
         "repairs": list(surface.repairs),
     }
-    return _meshed(level, centers, error, report, options, point_masses)
+    return _meshed(level, centers, K, error, report, options, point_masses)
 
 
 def solve_bar(
@@ -194,8 +195,8 @@ def solve_bar(
     """
     centers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     first, start = straight_bar(section), time.monotonic()
-    level, error, report = _refined(first, (material,), centers, options, start)
-    return _meshed(level, centers, error, report, options, ())
+    level, K, error, report = _refined(first, (material,), centers, options, start)
+    return _meshed(level, centers, K, error, report, options, ())
 
 
 def _refined(
@@ -204,7 +205,7 @@ def _refined(
     centers: NDArray,
     options: FemOptions,
     start: float,
-) -> tuple[Level, NDArray, dict[str, Any]]:
+) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
     """Solve on ever finer meshes until the error is small enough, or the budget used.
 
     Args:
@@ -215,14 +216,15 @@ def _refined(
         start: [s] since when the budget's seconds count.
 
     Returns:
-        The finest mesh, the (6, 6) estimate of its stiffness's error, and what it took.
+        The finest mesh, the (6, 6) stiffness, the size of its error, what it took.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
     level = solve_level(first, materials, centers, interface)
     history, sizes = [level.totals()], [len(level.solid.cells)]
     while True:
-        error, factor = estimated_error(history)
-        worst = float(np.abs(scaled(error, level.solution.stiffness)).max())
+        E, factor = estimated_error(history)
+        K, error = middle_stiffness(history[-1][0], E, history[-1][2])
+        worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
@@ -242,7 +244,7 @@ def _refined(
         "reached": worst <= accuracy,
         "estimate_over_indicator": factor,
     }
-    return level, error, report
+    return level, K, error, report
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
@@ -357,6 +359,7 @@ def _affordable_mesh(
 def _meshed(
     level: Level,
     centers: NDArray,
+    K: NDArray,
     error: NDArray,
     report: Mapping[str, Any],
     options: FemOptions,
@@ -367,7 +370,7 @@ def _meshed(
     mass, center, inertia = mass_properties(level.mesh, density, point_masses)
     link = LinkStiffness(
         method=f"finite elements, {options.interface} interfaces",
-        compliance=inverted(level.solution.stiffness),
+        compliance=inverted(K),
         tip=centers[1],
         base=centers[0],
         stiffness_error=error,

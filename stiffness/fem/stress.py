@@ -22,6 +22,7 @@ from stiffness.fem.adaptive_step import Level
 from stiffness.fem.elements import Elements, node_gradients, triangle_areas
 from stiffness.fem.error_indicator import VOIGT
 from stiffness.fem.fea import MeshedLink
+from stiffness.link import inverted
 from stiffness.mesh.edge_grading import singular_edges
 
 
@@ -204,7 +205,9 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
             f"interfaces; the furthest node is {gap.max():.4g} m"
         )
     per_screw = _nodal_stresses(level)[far]
-    influence = np.einsum("pks,kw->pws", per_screw, solved.link.compliance)
+    # the fields' own: they balance the wrench exactly
+    C_h = inverted(level.solution.stiffness)
+    influence = np.einsum("pks,kw->pws", per_screw, C_h)
     reentrant = np.unique(singular_edges(level.solid, ()))
     return StressInfluence(
         mesh.nodes[far], influence, float(distance), bool(far[reentrant].any())

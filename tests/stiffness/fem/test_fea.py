@@ -19,6 +19,7 @@ from stiffness.fem.fea import (
 )
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
+from stiffness.link import scaled
 from stiffness.mesh.mesh import MeshFailed
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
@@ -44,7 +45,8 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 def test_the_papers_bar_from_its_surface(cache):
     """Converged references: bending 1 032 277 N m/rad, torsion G J / L.
 
-    Asked 0.5 %; the estimate must cover the true error and be within five times it.
+    Asked 0.5 %; the estimate must cover the true error.  The mesh's own stiffness is
+    above the true one, by no more than twice the estimate.
     """
     solution = solve_link(
         bar_surface(),
@@ -54,10 +56,11 @@ def test_the_papers_bar_from_its_surface(cache):
         options=FemOptions(cache=cache),
     )
     link = solution.link
-    true = link.stiffness[0, 0] / 1032277 - 1
     assert link.mesh["reached"]
-    assert 0 < true < link.relative_error_estimate <= 0.005
-    assert link.relative_error_estimate < 5 * true
+    true = abs(link.stiffness[0, 0] / 1032277 - 1)
+    assert true < link.relative_error_estimate <= 0.005
+    own = solution.level.solution.stiffness[0, 0] / 1032277 - 1
+    assert 0 < own < 2 * link.relative_error_estimate < 10 * own
     assert link.stiffness[2, 2] == pytest.approx(205304.8977, rel=1e-6)
     np.testing.assert_allclose(link.tip, [0, 0, 0.452], atol=1e-12)
     # mass of the true cylinder, not of the polygon (0.3 % less), and a kilogram: what
@@ -130,10 +133,10 @@ def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
     assert first.mesh["unknowns"] < finer.mesh["unknowns"] <= budget.unknowns
     assert finer.mesh["meshes"] > 1
     assert not finer.mesh["reached"]
-    # stiffer on the coarser mesh, by no more than it said
-    too_stiff = np.diag(first.stiffness) / np.diag(finer.stiffness) - 1
-    assert (too_stiff > 0).all()
-    assert too_stiff.max() <= first.relative_error_estimate
+    # the coarser mesh's answer differs by no more than both said
+    gap = np.abs(scaled(first.stiffness - finer.stiffness, finer.stiffness)).max()
+    both = first.relative_error_estimate + finer.relative_error_estimate
+    assert 0 < gap <= 1.01 * both
 
 
 @pytest.mark.parametrize(

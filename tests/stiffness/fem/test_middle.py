@@ -1,0 +1,108 @@
+"""The middle of the interval in which a stiffness lies: closed forms and laws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stiffness.fem.adaptive_step import middle_stiffness
+from stiffness.fem.fea import Budget, FemOptions, solve_bar
+from stiffness.fem.material import Material
+from stiffness.fem.stress import stress_influence
+from stiffness.fem.two_ends import two_ends
+from stiffness.link import scaled
+
+NONE = np.zeros((6, 6))
+
+
+def random_definite(seed, size=1.0):
+    """(6, 6) with units of rotations and translations, definite."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(6, 9)) * np.repeat([30.0, 4000.0], 3)[:, None]
+    return size * root @ root.T
+
+
+def largest_share(E, K):
+    """Largest ratio of the two energies of one motion."""
+    return np.linalg.eigvals(np.linalg.solve(K, E)).real.max()
+
+
+def test_half_of_a_small_error_is_taken_off_and_the_other_half_told():
+    K = np.diag([1e3, 2e3, 3e3, 4e5, 5e5, 6e5])
+    middle, told = middle_stiffness(K, 0.02 * K, NONE)
+    np.testing.assert_allclose(middle, 0.99 * K, rtol=1e-14)
+    np.testing.assert_allclose(told, 0.01 * K, rtol=1e-14)
+
+
+@given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
+def test_every_stiffness_of_the_interval_is_within_what_is_told(seed, size):
+    """K_h less any share of E, also where E is larger than K_h."""
+    K_h, E = random_definite(seed), random_definite(seed + 1, size)
+    middle, told = middle_stiffness(K_h, E, NONE)
+    for share in (0.0, 0.3, 1.0):
+        gap = np.abs(K_h - share * E - middle)
+        assert (gap <= np.abs(told) * (1 + 1e-9) + 1e-12 * np.abs(K_h).max()).all()
+
+
+@given(st.integers(0, 10**6), st.floats(1e-6, 1e4))
+def test_at_least_half_of_every_motions_stiffness_is_left(seed, size):
+    """The middle stays a stiffness however large the error of a coarse mesh is; where
+    E nowhere exceeds K_h it is the middle exactly."""
+    K_h, E = random_definite(seed), random_definite(seed + 1, size)
+    middle, _ = middle_stiffness(K_h, E, NONE)
+    least = np.linalg.eigvals(np.linalg.solve(K_h, middle)).real.min()
+    share = largest_share(E, K_h)
+    expected = 1 - share / 2 if share <= 1 else 0.5
+    assert least == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_geometrys_error_moves_nothing_and_is_told_whatever_its_sign():
+    K, E = random_definite(3), random_definite(4, 1e-3)
+    geometry = 1e-4 * random_definite(5) * np.where(np.eye(6), -1, 1)
+    middle, told = middle_stiffness(K, E, geometry)
+    plain, half = middle_stiffness(K, E, NONE)
+    np.testing.assert_array_equal(middle, plain)
+    np.testing.assert_allclose(told - half, np.abs(geometry), rtol=1e-9)
+
+
+def test_the_middle_does_not_depend_on_units():
+    """Millimetres in place of metres, also where the guard takes less off."""
+    units = np.outer(np.repeat([1.0, 1e3], 3), np.repeat([1.0, 1e3], 3))
+    for size in (1e-3, 10.0):
+        K, E, g = random_definite(6), random_definite(7, size), random_definite(8, 0.1)
+        for one, other in zip(
+            middle_stiffness(K, E, g),
+            middle_stiffness(units * K, units * E, units * g),
+            strict=True,
+        ):
+            np.testing.assert_allclose(units * one, other, rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """A square bar on its first mesh alone."""
+    options = FemOptions(1e-3, budget=Budget(levels=1))
+    return solve_bar({"width": 0.25, "height": 0.25}, Material(2.0, 0.3), options)
+
+
+def test_a_link_is_softer_than_its_mesh_by_what_it_tells(bar):
+    """Both are ends of one interval: K_h above, the link in the middle."""
+    K_h, K = bar.level.solution.stiffness, bar.link.stiffness
+    above = np.diag(scaled(K_h - K, K))
+    assert (above > 0).all()
+    told = np.diag(bar.link.relative_errors)
+    # told has the geometry's besides, which a bar of plane sides has not
+    np.testing.assert_allclose(above, told, rtol=1e-6)
+
+
+def test_fields_stresses_and_condensed_ends_stay_the_meshs_own(bar):
+    """They balance the wrench of the mesh's own stiffness, whatever is told of K."""
+    held = two_ends(bar).stiffness[6:, 6:]
+    np.testing.assert_allclose(held, bar.level.solution.stiffness, rtol=1e-9)
+    softer = replace(bar, link=replace(bar.link, compliance=2 * bar.link.compliance))
+    one, other = (stress_influence(b).influence for b in (bar, softer))
+    np.testing.assert_array_equal(one, other)
+    # stretched: the wrench over the section but for the nodes' own scatter
+    assert one[:, 5, 2].mean() * 0.25**2 == pytest.approx(1.0, abs=5e-3)
