@@ -35,6 +35,7 @@ from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
+    differs_from_zero,
     drop_zeros,
     stiffness_spread,
 )
@@ -156,17 +157,17 @@ def _compiled_assembly(
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
         return None
-    residual = out.residual + rounding
-    loaded = frame_loads is not None
-    drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
-    multipliers = out.multipliers[0]
+    multipliers, loaded = out.multipliers[0], frame_loads is not None
+    gap, residual = out.energy - out.bound, out.residual + rounding
+    if not differs_from_zero(out.energy[0], gap[0], multipliers, residual[0]):
+        drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
     # without loads no wrenches mean no deformation but rounding
     bent = len(out.elastic) > 0 and (loaded or np.count_nonzero(multipliers) > 0)
     assembly = Assembly(
         linearisation=linearise(posture),
         joints=joints,
         load=np.zeros(6) if load is None else np.array(load, dtype=float),
-        frame_loads=frame_loads or FrameLoads(*np.zeros((2, robot.errors.size))),
+        frame_loads=frame_loads or _no_loads(robot.errors.size),
         elastic=out.elastic[0] if bent else np.zeros(len(joints.links)),
         clearances=out.clearances[0],
         motions=out.motions[0],
@@ -178,6 +179,14 @@ def _compiled_assembly(
         energy=float(out.energy[0]), platform_screw=out.platform_screw[0]
     )
     return assembly
+
+
+@lru_cache(maxsize=32)
+def _no_loads(size: int) -> FrameLoads:
+    """Of a robot with so many small screws' components; nobody may write them."""
+    none = np.zeros((2, size))
+    none.setflags(write=False)
+    return FrameLoads(*none)
 
 
 @lru_cache(maxsize=32)  # of one robot at many postures
