@@ -1,10 +1,7 @@
 """Problems side by side in C++ against numba's kernels, and against each other."""
 
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -314,57 +311,6 @@ def test_without_a_compiler_numba_answers(grid, tmp_path, monkeypatch):
     assert np.array_equal(batch.energy, numba.energy)
 
 
-def test_a_compiler_that_fails_is_asked_once(tmp_path, monkeypatch):
-    asked = []
-
-    def fail(command, **options):
-        asked.append(next(word for word in command if word.endswith(".cpp")))
-        raise subprocess.CalledProcessError(1, command)
-
-    monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
-    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
-    monkeypatch.setattr(libraries.subprocess, "run", fail)
-    for _ in range(2):
-        libraries._library.cache_clear()
-        assert load_library(SOURCE) is None
-    libraries._library.cache_clear()
-    assert str(libraries._ROOT / SOURCE) in asked
-    assert len(set(asked)) == len(asked)
-    assert {note.suffix for note in tmp_path.iterdir()} == {".failed"}
-
-
-def test_a_compiler_that_is_stopped_is_asked_again(tmp_path, monkeypatch):
-    """Ctrl-C while it works says nothing of the compiler."""
-
-    def stop(command, **options):
-        raise subprocess.CalledProcessError(-2, command)
-
-    monkeypatch.setattr(shutil, "which", lambda name: sys.executable)
-    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
-    monkeypatch.setattr(libraries.subprocess, "run", stop)
-    libraries._library.cache_clear()
-    try:
-        assert load_library(SOURCE) is None
-    finally:
-        libraries._library.cache_clear()
-    assert list(tmp_path.iterdir()) == []
-
-
-@needs_compiler
-def test_a_library_of_another_source_is_not_used(tmp_path, monkeypatch):
-    """A file of the right name that says it was made from something else."""
-    made = Path(load_library(SOURCE)._name)
-    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.setattr(libraries, "digest_of", lambda source: "0" * 16)
-    shutil.copy(made, tmp_path / f"lanes.{'0' * 16}.so")
-    libraries._library.cache_clear()
-    try:
-        assert load_library(SOURCE) is None
-    finally:
-        libraries._library.cache_clear()
-
-
 @needs_compiler
 @pytest.mark.parametrize("kappa", [0.1, 0.5, 1.0])
 def test_two_lanes_have_the_bits_of_many(grid, kappa, monkeypatch):
@@ -391,14 +337,3 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa, monkeypatch):
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
     assert set(asked) == {FEW_LANES}
-
-
-def test_no_command_waits_for_what_is_not_needed(monkeypatch):
-    """Two lanes are compiled by whoever asks for it, and never on the way."""
-    monkeypatch.setattr(libraries, "_compile", None)
-    libraries._at_hand.cache_clear()
-    monkeypatch.setattr(libraries, "_kept_at", lambda source: ("0", Path("nowhere")))
-    assert libraries.library_at_hand(FEW_LANES) is None
-    libraries._at_hand.cache_clear()
-    with by_numba():
-        assert libraries.library_at_hand(FEW_LANES) is None
