@@ -11,6 +11,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
 from assembly.statistics import verification
+from assembly.statistics.requirement import Plan
 from assembly.statistics.tolerance_file import read_plan
 from assembly.statistics.tolerances import (
     grid_postures,
@@ -211,3 +212,8 @@ def test_what_a_tolerance_file_leaves_out_is_as_documented(write_file):
     np.testing.assert_array_equal(plan.most, [0.1, 0.01])
     assert plan.names == ("leg1.link_a.RX", "leg1.link_a.TX")
     assert (plan.limits, plan.asked_yield) == ({"margin_free": 1.0}, 1.0)
+    assert (plan.draws, plan.seed, plan.cost) == (1000, 1, "reciprocal")
+    given = ("sources", "group", "names", "costs", "least", "most", "limits")
+    without = Plan(*(getattr(plan, name) for name in given))
+    assert (without.draws, without.seed, without.cost) == (1000, 1, "reciprocal")
+    assert without.asked_yield == 1.0
