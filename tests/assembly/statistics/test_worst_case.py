@@ -77,22 +77,22 @@ def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
 
 
 def test_the_bound_of_a_margin_shares_errors_among_several_plays():
-    """A pin (disc) and a slot along z in a row: each takes what is along it.
+    """Two pins in a row, of 1 and 3 plays: an error x takes x / 4 of either.
 
-    Two discs in a row of 1 and 3 plays share an error x: x / 4 of either.
+    Across their axis and along it, which are cones of their own.
     """
     frames = (
         Frame("one", translation=[0.5, 0, 0]),
         Frame("two", "base", [0.5, 0, 0]),
-        Frame("a", "one", clearance=Clearance(radial=PLAY)),
-        Frame("b", "a", clearance=Clearance(radial=3 * PLAY, axial=2 * PLAY)),
+        Frame("a", "one", clearance=Clearance(radial=PLAY, axial=PLAY)),
+        Frame("b", "a", clearance=Clearance(radial=3 * PLAY, axial=3 * PLAY)),
     )
     robot = Robot("pins", "b", frames, (("b", "two"),))
     zone = prepare_margins(home_posture(robot), "rigid")
     for places, t, expected in (
         ([("one", 3)], [2.0], 0.5),
-        ([("one", 5)], [3.0], 1.5),
-        ([("one", 3), ("two", 5)], [2.0, 3.0], 1.5),
+        ([("one", 5)], [3.0], 0.75),
+        ([("one", 3), ("two", 5)], [2.0, 3.0], 0.75),
         ([("one", 3), ("two", 4), ("two", 3)], [2.0, 4.0, 1.0], 7 / 4),
     ):
         sources = plan_for(robot, places, [1] * len(places), {}).sources
@@ -115,6 +115,49 @@ def test_an_error_that_nothing_takes_up_has_no_bound():
         t = np.array([2 * PLAY, along_z])
         assert np.isfinite(bound_margin(zone, sources, t)) == finite
     assert bound_energy(prepare_energies(posture), sources, t) == np.inf
+
+
+def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
+    """k t^2 / 2; rigid across it, where 1e-14 m are rounding and 1e-9 m are none."""
+    spring = np.diag([np.inf] * 6)
+    spring[3, 3] = K
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], joint_stiffness=spring),
+        Frame("two", "base", [0.5, 0, 0]),
+    )
+    robot = Robot("spring", "one", frames, (("one", "two"),))
+    prepared = prepare_energies(home_posture(robot))
+    for component in (4, 5):
+        places = [("two", 3), ("two", component)]
+        sources = plan_for(robot, places, [1, 1], {}).sources
+        for across, bound in (
+            (0.0, K * 4e-8 / 2),
+            (1e-14, K * 4e-8 / 2),
+            (1e-9, np.inf),
+        ):
+            found = bound_energy(prepared, sources, np.array([2e-4, across]))
+            assert found == pytest.approx(bound, rel=1e-6)
+
+
+def test_play_of_one_pair_is_not_spent_on_another():
+    """Two pairs of bars side by side: gaps of 1.5 and 10 plays leave 0.5 and 9.
+
+    Each takes its own play; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
+    """
+    frames, closures = [], []
+    for i in (0, 1):
+        link = MatrixLink(np.eye(6) * K)
+        frames += [
+            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"two{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"joint{i}", f"one{i}", clearance=Clearance(radial=PLAY)),
+        ]
+        closures.append((f"joint{i}", f"two{i}"))
+    robot = Robot("pairs", "joint0", tuple(frames), tuple(closures))
+    prepared = prepare_energies(home_posture(robot))
+    sources = plan_for(robot, [("one0", 3), ("one1", 3)], [1, 1], {}).sources
+    found = bound_energy(prepared, sources, np.array([1.5, 10.0]) * PLAY)
+    assert found == pytest.approx(K * (9.5 * PLAY) ** 2 / 4, rel=1e-4)
 
 
 def test_a_chain_that_always_closes_has_no_margin_to_bound():
