@@ -116,13 +116,13 @@ def test_a_corner_beyond_a_limit_gives_the_plane_of_its_slopes():
 def test_the_plane_of_a_yield_is_that_of_the_mean_of_the_worst_draws():
     """Of 12 draws a yield of 0.75 leaves 3: those of the largest response anywhere.
 
-    The first posture's is 10 at draws 0 and 3, the second's 7 at draw 4; the slopes
-    are 100 and -200, of the draw's one class, times its error.
+    The first posture's is 10 at draw 0 and 9.5 at draw 3, the second's 7 at draw 4; the
+    slopes are 100 and -200, of the draw's one class, times its error.
     """
 
     def first(values):
         size = np.zeros(12)
-        size[[0, 3]] = 10.0
+        size[[0, 3]] = 10.0, 9.5
         return size, np.full((12, 3), 100.0)
 
     def second(values):
@@ -136,7 +136,7 @@ def test_the_plane_of_a_yield_is_that_of_the_mean_of_the_worst_draws():
     (plane,) = cutting_planes._violated(found, T)
     assert found.asked == [(0, 12, 1, TRAINING)]
     # draws 0 and 3 are of the first class, by 100; draw 4 of the second, by -200 x -1
-    mean, slopes = (10 + 10 + 7) / 3, np.array([200.0, 200.0, 0.0]) / 3
+    mean, slopes = (10 + 9.5 + 7) / 3, np.array([200.0, 200.0, 0.0]) / 3
     np.testing.assert_allclose(plane, slopes / (5 - mean + slopes @ T), rtol=1e-12)
     loose = Found({"energy": 9.0}, 2, responses=responses, asked_yield=0.75, draws=12)
     assert list(cutting_planes._violated(loose, T)) == []

@@ -68,6 +68,49 @@ def test_two_limits_that_cross_cost_least_where_both_are_met():
     np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)
 
 
+class Signed(Sums):
+    """A limit on the sum itself, in which errors of opposite signs cancel."""
+
+    def utilisations(self, values):
+        sums = np.abs(self.weights @ values.T)
+        return 0 * sums, sums
+
+    def utilisation_slopes(self, case, values):
+        sums = values @ self.weights[case]
+        return np.sign(sums)[:, None] * self.weights[case]
+
+
+def test_a_worse_corner_that_is_found_on_the_way_is_met_too():
+    """At the first samples 3 t2 is taken from the sum; the worst corner adds it."""
+    requirement = Signed([[2.0, 3.0, 5.0]])
+    t, samples = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
+    assert 2 * t[0] + 8 * t[1] == pytest.approx(1.0, rel=2e-3)
+    assert len(samples.values) == 3
+
+
+class Norm(Sums):
+    """A limit on the root of the sum of the squares of the weighted errors."""
+
+    def utilisations(self, values):
+        size = np.sqrt(self.weights**2 @ (values.T**2))
+        return 0 * size, size
+
+    def utilisation_slopes(self, case, values):
+        size = np.sqrt(values**2 @ self.weights[case] ** 2)
+        return values * self.weights[case] ** 2 / size[:, None]
+
+
+@pytest.mark.parametrize("weights", [[1.0, 1.0, 1.0], [20.0, 1.0, 0.5]])
+def test_squares_that_add_up_cost_least_by_cube_roots(weights):
+    """Minimise sum c/t with sum (a t)^2 = 1: t ~ (c / a^2)^(1/3), over a bent limit."""
+    squares = np.array([weights[0] ** 2, weights[1] ** 2 + weights[2] ** 2])
+    best = (COSTS / squares) ** (1 / 3)
+    best /= np.sqrt(squares @ best**2)
+    t, _ = least_cost(Norm([weights]), CORNERS, np.array([1.0, 1.0]), silent)
+    assert np.sqrt(squares @ t**2) == pytest.approx(1.0, rel=1.1e-3)
+    assert (COSTS / t).sum() == pytest.approx((COSTS / best).sum(), rel=3e-3)
+
+
 def test_logarithms_share_a_sum_by_the_costs_themselves():
     requirement = Sums([[2.0, 3.0, 5.0]], cost="logarithm")
     t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)

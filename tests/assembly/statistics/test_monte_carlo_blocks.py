@@ -1,6 +1,7 @@
 """Blocks of a run, what identifies it, its data set: an arm that follows its errors."""
 
 import time
+from contextlib import ExitStack
 from dataclasses import replace
 from threading import Barrier
 
@@ -14,6 +15,7 @@ from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import provenance, run_draws
+from assembly.sweeps.sweep import journal_path
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -77,6 +79,17 @@ def arm():
     return Experiment(
         place_robot(robot), sources, clearance_model="least", margins=False
     )
+
+
+@pytest.mark.parametrize("held", [None, ExitStack()])
+def test_a_journal_that_is_held_stays_until_it_is_let_go(arm, tmp_path, held):
+    path = tmp_path / "draws.nc"
+    run_draws(arm, 3, path, held=held)
+    assert path.exists()
+    assert journal_path(path).exists() == (held is not None)
+    if held is not None:
+        held.close()
+        assert not journal_path(path).exists()
 
 
 def test_importance_of_a_run_is_that_of_a_run_cut_at_other_places(arm, monkeypatch):
