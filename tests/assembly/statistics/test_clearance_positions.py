@@ -265,10 +265,13 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
     assert reach.min() > -1e-9
 
 
-def test_an_unknown_way_is_refused(drawn):
+@pytest.mark.parametrize("play", ["most", "worst"])
+def test_an_unknown_way_is_refused(drawn, play):
+    """The worst is no one place, but many."""
     one, found = drawn
-    with pytest.raises(ValueError, match="play is 'most'"):
-        position_clearances(one, found, "most", generators(DRAWN))
+    with pytest.raises(ValueError, match=f"play is '{play}'") as error:
+        position_clearances(one, found, play, generators(DRAWN))
+    assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
 
 
 def test_draws_that_alternate_are_worth_no_more_than_the_cap(rng):

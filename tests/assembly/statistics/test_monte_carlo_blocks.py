@@ -16,24 +16,25 @@ from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import provenance, run_draws
 from assembly.sweeps.sweep import journal_path
+from forcefit.inputs.table import BadInput
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_blocks_of_a_run_are_solved_once_and_counted(arm, monkeypatch, workers):
-    """Of 21 draws in blocks of 4, and 20 rows of a design: six blocks and five."""
+    """Of 21 draws in blocks of 4, and 15 rows of a design: six blocks and four."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 4)
     whole = run_draws(arm, 21)
     monkeypatch.setattr(Experiment, "solve", counted(Experiment.solve, spans := []))
     seen = []
     data = run_draws(
-        arm, 21, workers=workers, importance=ImportanceOptions(4, "kind"),
+        arm, 21, workers=workers, importance=ImportanceOptions(3, "kind"),
         progress=lambda done, total: seen.append((done, total)),
     )  # fmt: skip
     assert sorted(spans) == [(0, 4), (4, 4), (8, 4), (12, 4), (16, 4), (20, 1)]
-    assert seen[0] == (0, 41)
-    assert seen[-1] == (41, 41)
+    assert seen[0] == (0, 36)
+    assert seen[-1] == (36, 36)
     steps = np.diff([done for done, _ in seen])
-    assert sorted(steps) == [1] + [4] * 10
+    assert sorted(steps) == [1, 3] + [4] * 8
     for name in ("translation", "platform_screw", "energy"):
         np.testing.assert_array_equal(data[name], whole[name])
     np.testing.assert_array_equal(data["draw"], np.arange(21))
@@ -90,6 +91,26 @@ def test_a_journal_that_is_held_stays_until_it_is_let_go(arm, tmp_path, held):
     if held is not None:
         held.close()
         assert not journal_path(path).exists()
+
+
+def test_a_killed_run_goes_on_at_another_confidence_of_its_importance(arm, tmp_path):
+    """The same rows are solved; with more of them it is another run."""
+
+    def kill(done, total):
+        if done:
+            raise RuntimeError
+
+    path = tmp_path / "draws.nc"
+    with pytest.raises(RuntimeError):
+        run_draws(arm, 3, path, progress=kill, importance=ImportanceOptions(4))
+    with pytest.raises(BadInput, match="importance"):
+        run_draws(arm, 3, path, importance=ImportanceOptions(5))
+    seen = []
+    run_draws(
+        arm, 3, path, importance=ImportanceOptions(4, level=0.5),
+        progress=lambda done, total: seen.append((done, total)),
+    )  # fmt: skip
+    assert seen == [(3, 23), (23, 23)]
 
 
 def test_importance_of_a_run_is_that_of_a_run_cut_at_other_places(arm, monkeypatch):
