@@ -41,6 +41,17 @@ def test_in_a_box_every_side_is_a_folded_straight_line(seed, size):
     np.testing.assert_allclose(u, folded, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_on_a_segment_a_line_folds_unless_it_is_reflected_too_often(seed):
+    """Beyond forty times the point stays where it was."""
+    u, _, rng = walked([0, 1], [[3.0]], [0.25], seed=seed)
+    way = 3.0 * rng.standard_normal() * FLIGHT * rng.standard_exponential()
+    assert u[0] == pytest.approx(np.abs((0.25 + way - 1) % 4 - 2) - 1, abs=1e-9)
+    assert u[0] != 0.25
+    still, _, _ = walked([0, 1], [[3e4]], [0.25], seed=seed)
+    assert still[0] == 0.25
+
+
 def reflected(starts, M, u, speed, left):
     """The same in coordinates y of u = M y, where reflections are those of mirrors."""
     for _ in range(1000):
