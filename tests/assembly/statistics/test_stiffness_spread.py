@@ -126,7 +126,7 @@ def test_what_resists_a_little_is_not_free():
 @pytest.mark.parametrize(("held", "described"), [(0, False), (1, False), (2, True)])
 def test_two_draws_that_resist_have_a_mean(held, described):
     stiffnesses = np.zeros((4, 6))
-    stiffnesses[:held] = [[2.0] * 6, [4.0] * 6][:held]
+    stiffnesses[:held] = np.array([[2.0], [4.0]])[:held]
     said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)
     one = said["axes"]["fx"]
     assert one["free"]["probability"] == (4 - held) / 4
