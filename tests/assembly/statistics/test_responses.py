@@ -60,7 +60,7 @@ def test_slopes_without_clearances_are_quotients_of_differences(stiff, key):
 
 
 def test_a_peak_stress_is_its_slopes_times_the_wrench(rng):
-    """Euler again, for each wrench by itself; its size does not matter to the slopes."""
+    """Euler again, for each wrench by itself; its size is no matter to the slopes."""
     links = stressed_links(load_robot("irsbot2"))
     wrenches = rng.normal(size=(8, 6)) * [1, 2, 3, 40, 50, 60]
     for link in (links[0], links[-1]):
