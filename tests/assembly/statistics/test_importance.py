@@ -55,7 +55,9 @@ def additive(scale=1.0, shift=0.0):
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0)])
+@pytest.mark.parametrize(
+    ("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0), (3e7, 1e14)]
+)
 def test_indices_know_no_units(scale, shift):
     first, other = sobol_indices(*additive()), sobol_indices(*additive(scale, shift))
     for name in ("first", "total"):
@@ -143,6 +145,42 @@ def test_a_few_draws_that_fail_are_left_out_and_counted():
     # A and B fail apart; mixing the third number takes it from B, which is one of them
     np.testing.assert_allclose(found.failed[0], 1 - 0.99**2, atol=0.006)
     assert np.isfinite(found.variance).all()
+
+
+def test_where_a_few_draws_fail_the_indices_are_those_of_all_others():
+    """Of A two draws fail: they are left out of all sums, about the mean of what is."""
+    A, B = three(0, 100), three(1, 100)
+    design = SaltelliDesign(A, B, THREE)
+    f = np.exp(design.rows(0, len(design)) @ [1.0, 0.5, 0.2])
+    f[[3, 7]] = np.nan
+    found = sobol_indices(design, f[:, None])
+    assert found.failed[0] == pytest.approx([0.02] * 3)
+    mean = np.nanmean(f[:200])
+    kept = np.delete(np.arange(100), [3, 7])
+    a, b, *mixed = f.reshape(5, 100)[:, kept]
+    size = np.r_[a, b].var()
+    for k, one in enumerate(mixed):
+        first = ((b - mean) * (one - a)).mean() / size
+        total = ((one - a) ** 2).mean() / (2 * size)
+        assert found.first[0, k, 0] == pytest.approx(first, rel=1e-9)
+        assert found.total[0, k, 0] == pytest.approx(total, rel=1e-9)
+
+
+def test_indices_of_a_function_are_those_of_its_design():
+    """Streams 2 and 3 are its draws; every row is evaluated once, in order."""
+    seen = []
+
+    def evaluate(x):
+        seen.append(x)
+        return np.exp(x @ [1.0, 0.5, 0.2])[:, None]
+
+    found = sobol_importance(evaluate, three, THREE, 50, 0.5)
+    design = SaltelliDesign(three(2, 50), three(3, 50), THREE)
+    (rows,) = seen
+    np.testing.assert_array_equal(rows, design.rows(0, 250))
+    expected = sobol_indices(design, evaluate(rows), 0.5)
+    np.testing.assert_allclose(found.first, expected.first, rtol=1e-12)
+    np.testing.assert_allclose(found.total, expected.total, rtol=1e-12)
 
 
 def test_where_many_draws_fail_there_are_no_indices_and_a_reason():
