@@ -174,3 +174,53 @@ def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_sha
     assert list(data["estimate"].values) == ["value", "lower", "upper"]
     assert data["failed_share"].shape == (5, 3)
     assert data.attrs["importance_draws"] == 8
+
+
+def told(units, left_out=0.0):
+    """The table's lines for a group of each unit, the first of the largest part."""
+    count = len(units)
+    platform = {
+        f"group{k}": {
+            "error_unit": unit, "translation_part": 1e-6 * (count - k),
+            "rotation_part": 2e-3 * (k + 1), "translation_gain": 0.5 + k,
+            "rotation_gain": 0.1,
+        }
+        for k, unit in enumerate(units)
+    }  # fmt: skip
+    index = {group: np.array([0.25, 0.2, 0.3]) for group in platform}
+    one = {"total_index": index, "first_index": index, "largest_share_left_out": 0.0}
+    return importance_text({
+        "base_draws": 64, "play": "least", "platform": platform,
+        "quantities": {
+            "translation": one, "energy": one | {"largest_share_left_out": left_out},
+            "stress": one | {"reason": "it does not vary"},
+        },
+    }).splitlines()  # fmt: skip
+
+
+def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
+    head, stress, columns, length, angle, both = told(["m", "rad", "rad, m"])
+    assert "64 base draws" in head
+    assert stress == "stress: it does not vary"
+    begin = [columns.index(word) for word in ("for each um", "for each mrad", "[mrad]")]
+    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300)".split()
+    assert begin[0] <= length.index(" 0.5 ") < begin[1]
+    # 1.5 m for each rad are 1500 um for each mrad
+    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300)".split()
+    assert begin[1] <= angle.index(" 1500 ") < begin[2]
+    # rad and m together have no gain
+    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300)".split()
+    ends = [len(line) for line in (length, angle, both)]
+    assert len(set(ends)) == 1
+
+
+def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
+    lines = told(["m"] * 18, left_out=0.015)
+    assert "energy: up to 1.5% of the draws have no answer and are left out" in lines
+    assert lines[-1] == "and 3 more, see --json"
+    assert [line.split()[0] for line in lines[-4:-1]] == [
+        "group12",
+        "group13",
+        "group14",
+    ]
+    assert "more" not in told(["m"] * 15)[-1]
