@@ -149,6 +149,25 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
     assert np.isnan(slopes).all()
 
 
+@pytest.mark.parametrize("component", [3, 4])
+def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
+    """Rigid parts: the pin's play takes up what the errors of its own side do."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0]),
+        Frame("two", "base", [0.5, 0, 0]),
+        Frame("end", "one", clearance=Clearance(radial=PLAY)),
+    )
+    robot = Robot("pin", "end", frames, (("end", "two"),))
+    widths = np.zeros(6)
+    widths[component] = PLAY
+    sources = tolerance_sources(robot, widths, ("one", "two"))
+    values = np.array([[0.3, 0.6], [-0.2, -0.5]]) * PLAY
+    prepared = prepare_energies(home_posture(robot))
+    size, slopes = respond(prepared, sources, values, "translation", "least")
+    np.testing.assert_allclose(size, np.abs(values[:, 1]), rtol=1e-6)
+    np.testing.assert_allclose(slopes, [[0, 1], [0, -1]], atol=1e-6)
+
+
 def test_a_margin_is_homogeneous_of_degree_one():
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)

@@ -87,6 +87,19 @@ def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), size, rtol=1e-4)
 
 
+def test_a_solution_beyond_the_bounds_is_within_them():
+    """Solutions of (22) differ by their gaps: that at hand counts, part by part."""
+    prepared = prepare_energies(home_posture(chain(RADIAL, TILT)))
+    errors = np.zeros((2, 2, 6))
+    draws = prepared.solve(errors)
+    far = np.array([3.0, -4.0, 12.0, 8.0, 9.0, -12.0]) * 1e-3  # of 13 mrad and 17 mm
+    draws.platform_screw[1] = far
+    bounds, screws = bound_worst_errors(prepared, draws, errors)
+    np.testing.assert_allclose(bounds[1], [[13e-3] * 2, [17e-3] * 2], rtol=1e-9)
+    np.testing.assert_array_equal(screws[1], [far, far])
+    assert bounds[0].max() < 3e-3
+
+
 @pytest.mark.parametrize("part", [0, 1])
 def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
     """Its bounds enclose the truth, however far apart they are."""
