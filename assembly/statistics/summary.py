@@ -100,7 +100,8 @@ def summarise(
         }  # fmt: skip
     if strength is not None:
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
-        report["safety"] = strength / np.maximum(largest, 1e-300)
+        with np.errstate(divide="ignore"):  # endless without any stress
+            report["safety"] = strength / largest
     if "stiffness" in data:
         report["stiffness"] = stiffness_report(
             data["stiffness"].values[solved],

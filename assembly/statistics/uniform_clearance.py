@@ -131,7 +131,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
         x: (chains, 2 k) values along each chain; the halves count as chains.
 
     Returns:
-        Both; R-hat tends to 1 as the chains become independent of their starts.
+        Both; R-hat tends to 1 as the chains become independent of their starts, and is
+        infinite where every chain stands still.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)
@@ -139,6 +140,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
     means = halves.mean(axis=1)
     halves = halves - means[:, None]
     within = float((halves**2).sum()) / (m * (k - 1))
+    if within == 0.0:
+        return np.inf, 0.0
     whole = within * (k - 1) / k + float(means.var()) * m / (m - 1)
     r_hat = np.sqrt(whole / within)
     # Geyer's initial monotone sequence: sums of pairs of autocorrelations, while

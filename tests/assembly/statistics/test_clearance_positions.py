@@ -169,20 +169,22 @@ def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
     assert stats.kstest((z + 0.5) / 2, "uniform").pvalue > 1e-3
 
 
-def test_pushed_from_anywhere_a_pin_rests_anywhere_on_the_narrower_rim():
-    """Two pins on one axis, of 2 and 1 mm: the contacts are a circle of 1 mm."""
+@pytest.mark.parametrize(("kind", "first"), [("radial", 3), ("tilt", 0)])
+def test_pushed_from_anywhere_a_pin_rests_anywhere_on_the_narrower_rim(kind, first):
+    """Two pins on one axis, of 2 and 1 mm or mrad: the contacts are a circle of 1."""
     steel = MatrixLink(np.eye(6) * 1e6)
     frames = (
-        Frame("one", link=steel, clearance=Clearance(radial=2e-3)),
-        Frame("two", link=steel, clearance=Clearance(radial=1e-3)),
+        Frame("one", link=steel, clearance=Clearance(**{kind: 2e-3})),
+        Frame("two", link=steel, clearance=Clearance(**{kind: 1e-3})),
     )
     robot = Robot("two pins", "one", frames, (("one", "two"),))
     prepared = prepare_energies(home_posture(robot))
     draws = prepared.solve(np.zeros((300, 2, 6)))
     screws, mixed = position_clearances(prepared, draws, "contact", generators(300))
     assert mixed.all()
-    np.testing.assert_allclose(np.hypot(screws[:, 3], screws[:, 4]), 1e-3, rtol=1e-6)
-    angle = np.arctan2(screws[:, 4], screws[:, 3]) / (2 * np.pi) + 0.5
+    x, y = screws[:, first], screws[:, first + 1]
+    np.testing.assert_allclose(np.hypot(x, y), 1e-3, rtol=1e-6)
+    angle = np.arctan2(y, x) / (2 * np.pi) + 0.5
     assert stats.kstest(angle, "uniform").pvalue > 1e-3
     # twice an angle: nor does it prefer an axis
     assert stats.kstest(angle * 2 % 1, "uniform").pvalue > 1e-3
@@ -265,10 +267,21 @@ def test_contact_goes_at_least_as_far_along_its_push_as_uniform_play(drawn):
     assert reach.min() > -1e-9
 
 
-def test_an_unknown_way_is_refused(drawn):
+def test_the_least_clearances_are_those_of_the_solution(drawn):
     one, found = drawn
-    with pytest.raises(ValueError, match="play is 'most'"):
-        position_clearances(one, found, "most", generators(DRAWN))
+    screws, mixed = position_clearances(one, found, "least", [])
+    np.testing.assert_array_equal(screws, found.platform_screw)
+    assert mixed.shape == (DRAWN,)
+    assert mixed.all()
+
+
+@pytest.mark.parametrize("play", ["most", "worst"])
+def test_an_unknown_way_is_refused(drawn, play):
+    """The worst is no one place, but many."""
+    one, found = drawn
+    with pytest.raises(ValueError, match=f"play is '{play}'") as error:
+        position_clearances(one, found, play, generators(DRAWN))
+    assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
 
 
 def test_draws_that_alternate_are_worth_no_more_than_the_cap(rng):

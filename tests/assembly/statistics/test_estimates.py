@@ -1,11 +1,14 @@
 """Confidence intervals and modes against closed forms and their own promise."""
 
+from math import comb
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from assembly.statistics.estimates import (
     _modes,
+    bracketed,
     mean,
     most_probable,
     proportion,
@@ -116,3 +119,84 @@ def test_the_interval_of_a_quantile_begins_at_a_number_of_the_sample():
     found = quantile(np.arange(6.0), 0.5, 0.95)  # 2^-6 = 0.016: the first, the last
     assert (found["lower"], found["upper"]) == (0.0, 5.0)
     assert quantile(np.arange(5.0), 0.5, 0.95)["lower"] == -np.inf
+
+
+@pytest.mark.parametrize("level", [0.9, 0.95])
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_the_ends_of_a_quantile_s_interval_follow_from_binomial_sums(share, level):
+    """The numbers next to it such that so few samples leave it out on either side."""
+    x, count = np.arange(40.0) ** 2, 40
+    pmf = [comb(count, k) * share**k * (1 - share) ** (count - k) for k in range(41)]
+    at_most = np.cumsum(pmf)
+    low = int(np.argmax(at_most >= (1 - level) / 2))
+    high = int(np.argmax(at_most >= (1 + level) / 2))
+    found = quantile(x[::-1], share, level)
+    assert (found["lower"], found["upper"]) == (x[low - 1], x[high])
+    assert found["value"] == pytest.approx(np.quantile(x, share))
+
+
+def test_a_quantile_among_infinite_values_is_one_of_the_sample():
+    """Between 3 and infinity there is no middle: the higher one."""
+    x = [1.0, 2.0, 3.0, np.inf, np.inf, np.inf]
+    assert quantile(x, 0.5)["value"] == np.inf
+    assert quantile(x, 0.3)["value"] == 3.0
+    assert quantile(x[:4], 0.5)["value"] == 3.0
+    assert quantile([1.0, 2.0, 3.0, 4.0], 0.5)["value"] == 2.5
+
+
+def test_trials_that_are_undecided_may_all_have_succeeded_or_failed():
+    """Of 20: 12 held, 5 failed; the interval reaches from 12 of 20 to 15 of 20."""
+    found = bracketed(12, 5, 20, 0.9)
+    assert (found["probability"], found["undecided"]) == (0.6, 3)
+    assert found["lower"] == pytest.approx(proportion(12, 20, 0.9)["lower"])
+    assert found["upper"] == pytest.approx(proportion(15, 20, 0.9)["upper"])
+    assert found["upper"] - proportion(12, 20, 0.9)["upper"] > 0.05
+
+
+def densest(x, positive):
+    """The most probable value by the sum of its kernels, on a fine grid.
+
+    Of Silverman's width 0.9 min(s, IQR / 1.349) n^(-1/5), reflected at zero if asked.
+    """
+    low, high = np.quantile(x, [0.25, 0.75])
+    width = 0.9 * min(x.std(), (high - low) / 1.349) * len(x) ** -0.2
+    grid = np.linspace(0.0 if positive else x.min(), x.max(), 20_001)
+    mirrored = np.concatenate([x, -x]) if positive else x
+    density = sum(np.exp(-(((grid - one) / width) ** 2) / 2) for one in mirrored)
+    return grid[np.argmax(density)], width
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("positive", [False, True])
+def test_the_most_probable_value_is_that_of_silverman_s_kernels(positive, seed):
+    """Of 150 numbers of two lumps: where the maximum is depends on the width."""
+    rng = np.random.default_rng(seed)
+    x = np.concatenate([rng.gamma(2.0, 1.0, 90), rng.normal(3.0, 0.7, 60)])
+    x = np.abs(x) if positive else x
+    mode, width = densest(x, positive)
+    assert most_probable(x, positive=positive)["value"] == pytest.approx(
+        mode, abs=0.06 * width
+    )
+
+
+def test_the_interval_of_a_mode_grows_with_its_confidence(rng):
+    """Of the same resampled modes: half of them, or 19 of 20; a seed repeats them."""
+    x = rng.gamma(3.0, size=300)
+    half, most = (most_probable(x, level) for level in (0.5, 0.95))
+    assert most["lower"] < half["lower"] < half["upper"] < most["upper"]
+    assert half["value"] == most["value"]
+    assert most_probable(x, 0.5) == half
+    other = most_probable(x, 0.5, seed=2)
+    assert other["value"] == half["value"]
+    assert other["lower"] != half["lower"]
+    # resamples of 300 of a gamma law of deviation sqrt(3)
+    assert 0.05 < most["upper"] - most["lower"] < 2.0
+
+
+def test_the_interval_of_a_mean_widens_with_its_confidence():
+    """Student's t of two degrees: 4.302653 at 95 %, 0.816497 at one half."""
+    for level, t in ((0.95, 4.302653), (0.5, 0.816497)):
+        found = mean([1.0, 2.0, 4.0], level)
+        assert found["upper"] - found["value"] == pytest.approx(
+            t * (7 / 9) ** 0.5, 1e-6
+        )

@@ -19,7 +19,7 @@ from assembly.statistics.importance import (
     sobol_indices,
     source_groups,
 )
-from assembly.statistics.importance_table import ImportanceOptions, importance_text
+from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise, summary_text
 
@@ -55,7 +55,9 @@ def additive(scale=1.0, shift=0.0):
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-@pytest.mark.parametrize(("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0)])
+@pytest.mark.parametrize(
+    ("scale", "shift"), [(1e-9, 0.0), (-1e7, 0.0), (1.0, 100.0), (3e7, 1e14)]
+)
 def test_indices_know_no_units(scale, shift):
     first, other = sobol_indices(*additive()), sobol_indices(*additive(scale, shift))
     for name in ("first", "total"):
@@ -143,6 +145,58 @@ def test_a_few_draws_that_fail_are_left_out_and_counted():
     # A and B fail apart; mixing the third number takes it from B, which is one of them
     np.testing.assert_allclose(found.failed[0], 1 - 0.99**2, atol=0.006)
     assert np.isfinite(found.variance).all()
+
+
+def test_intervals_are_as_wide_as_their_confidence(rng):
+    """Nearly normal: half of all are within 0.674 deviations, 95 % within 1.960."""
+    design, _ = additive()
+    x = design.rows(0, len(design))
+    results = x @ rng.uniform(1.0, 2.0, size=(3, 12))
+    (half, most) = (sobol_indices(design, results, level) for level in (0.5, 0.95))
+    for name in ("first", "total"):
+        widths = []
+        for found in (half, most):
+            value, low, high = np.moveaxis(getattr(found, name), 2, 0)
+            assert (low < high).all()
+            widths.append((high - low).mean())
+            assert ((value - low) / (high - low)).mean() == pytest.approx(0.5, abs=0.07)
+        assert widths[1] / widths[0] == pytest.approx(1.960 / 0.674, rel=0.1)
+
+
+def test_where_a_few_draws_fail_the_indices_are_those_of_all_others():
+    """Of A two draws fail: they are left out of all sums, about the mean of what is."""
+    A, B = three(0, 100), three(1, 100)
+    design = SaltelliDesign(A, B, THREE)
+    f = np.exp(design.rows(0, len(design)) @ [1.0, 0.5, 0.2])
+    f[[3, 7]] = np.nan
+    found = sobol_indices(design, f[:, None])
+    assert found.failed[0] == pytest.approx([0.02] * 3)
+    mean = np.nanmean(f[:200])
+    kept = np.delete(np.arange(100), [3, 7])
+    a, b, *mixed = f.reshape(5, 100)[:, kept]
+    size = np.r_[a, b].var()
+    for k, one in enumerate(mixed):
+        first = ((b - mean) * (one - a)).mean() / size
+        total = ((one - a) ** 2).mean() / (2 * size)
+        assert found.first[0, k, 0] == pytest.approx(first, rel=1e-9)
+        assert found.total[0, k, 0] == pytest.approx(total, rel=1e-9)
+
+
+def test_indices_of_a_function_are_those_of_its_design():
+    """Streams 2 and 3 are its draws; every row is evaluated once, in order."""
+    seen = []
+
+    def evaluate(x):
+        seen.append(x)
+        return np.exp(x @ [1.0, 0.5, 0.2])[:, None]
+
+    found = sobol_importance(evaluate, three, THREE, 50, 0.5)
+    design = SaltelliDesign(three(2, 50), three(3, 50), THREE)
+    (rows,) = seen
+    np.testing.assert_array_equal(rows, design.rows(0, 250))
+    expected = sobol_indices(design, evaluate(rows), 0.5)
+    np.testing.assert_allclose(found.first, expected.first, rtol=1e-12)
+    np.testing.assert_allclose(found.total, expected.total, rtol=1e-12)
 
 
 def test_where_many_draws_fail_there_are_no_indices_and_a_reason():
@@ -267,56 +321,6 @@ def test_indices_are_those_of_all_draws_within_their_intervals():
     assert (wider[:, 2] > found.total[0, :, 2]).all()
     assert (found.total[0, :, 1] < total).all()
     assert (found.total[0, :, 2] > total).all()
-
-
-def told(units, left_out=0.0):
-    """The table's lines for a group of each unit, the first of the largest part."""
-    count = len(units)
-    platform = {
-        f"group{k}": {
-            "error_unit": unit, "translation_part": 1e-6 * (count - k),
-            "rotation_part": 2e-3 * (k + 1), "translation_gain": 0.5 + k,
-            "rotation_gain": 0.1,
-        }
-        for k, unit in enumerate(units)
-    }  # fmt: skip
-    index = {group: np.array([0.25, 0.2, 0.3]) for group in platform}
-    one = {"total_index": index, "first_index": index, "largest_share_left_out": 0.0}
-    return importance_text({
-        "base_draws": 64, "play": "least", "platform": platform,
-        "quantities": {
-            "translation": one, "energy": one | {"largest_share_left_out": left_out},
-            "stress": one | {"reason": "it does not vary"},
-        },
-    }).splitlines()  # fmt: skip
-
-
-def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
-    head, stress, columns, length, angle, both = told(["m", "rad", "rad, m"])
-    assert "64 base draws" in head
-    assert stress == "stress: it does not vary"
-    begin = [columns.index(word) for word in ("for each um", "for each mrad", "[mrad]")]
-    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300)".split()
-    assert begin[0] <= length.index(" 0.5 ") < begin[1]
-    # 1.5 m for each rad are 1500 um for each mrad
-    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300)".split()
-    assert begin[1] <= angle.index(" 1500 ") < begin[2]
-    # rad and m together have no gain
-    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300)".split()
-    ends = [len(line) for line in (length, angle, both)]
-    assert len(set(ends)) == 1
-
-
-def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
-    lines = told(["m"] * 18, left_out=0.015)
-    assert "energy: up to 1.5% of the draws have no answer and are left out" in lines
-    assert lines[-1] == "and 3 more, see --json"
-    assert [line.split()[0] for line in lines[-4:-1]] == [
-        "group12",
-        "group13",
-        "group14",
-    ]
-    assert "more" not in told(["m"] * 15)[-1]
 
 
 def test_intervals_are_of_95_per_cent_unless_asked_otherwise(stiff):

@@ -20,6 +20,7 @@ def run(path, values, computed, stop=None, whose="mine"):
 
     with journalled(path, {"whose": whose}) as replay:
         found = [replay.recall(lambda x=x: both(x), x, "square") for x in values]
+        assert replay.asked == (0 if path is None else len(values))
         if stop:
             raise stop
     return found

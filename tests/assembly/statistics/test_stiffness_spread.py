@@ -121,3 +121,33 @@ def test_what_resists_a_little_is_not_free():
     assert about_z["free"]["probability"] == pytest.approx(0.4)
     assert about_z["mean"]["value"] == pytest.approx(0.02)
     assert about_z["quantiles"]["0.5"]["value"] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("held", "described"), [(0, False), (1, False), (2, True)])
+def test_two_draws_that_resist_have_a_mean(held, described):
+    stiffnesses = np.zeros((4, 6))
+    stiffnesses[:held] = np.array([[2.0], [4.0]])[:held]
+    said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)
+    one = said["axes"]["fx"]
+    assert one["free"]["probability"] == (4 - held) / 4
+    assert ("mean" in one) == ("quantiles" in one) == described
+    if described:
+        assert one["mean"]["value"] == pytest.approx(3.0)
+    text = stiffness_spread_text(said).splitlines()[4]
+    assert text.startswith("  fx: median 3 N/m, 90 %" if described else "  fx: nothing")
+    assert text.endswith(f"; free in {(4 - held) / 4:g}")
+    assert said["axes"]["my"]["unit"] == "N m/rad"
+
+
+def test_free_motions_alike_to_two_decimals_are_one_whatever_the_sign_of_zero():
+    """Of the five of most draws the first is named first."""
+    motions = np.full((9, 6, 6), np.nan)
+    motions[:, 0] = np.eye(6)[5]
+    motions[:4, 0, :2] = [[-1e-3, 0], [1e-3, -2e-3], [-0.0, 0], [0, 4e-3]]
+    motions[4:7, 0, 0] = 0.5
+    motions[0, 1:6] = [np.arange(6) + k for k in range(5)]
+    free = stiffness_report(np.zeros((9, 6)), motions, "contact", 0.95)["free_motions"]
+    assert [one["draws"] for one in free] == [6, 3, 1, 1, 1]
+    np.testing.assert_array_equal(free[0]["screw"], np.eye(6)[5])
+    assert not np.signbit(free[0]["screw"]).any()
+    np.testing.assert_array_equal(free[1]["screw"], [0.5, 0, 0, 0, 0, 1])

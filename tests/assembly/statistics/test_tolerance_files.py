@@ -11,6 +11,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
 from assembly.statistics import verification
+from assembly.statistics.requirement import Plan
 from assembly.statistics.tolerance_file import read_plan
 from assembly.statistics.tolerances import (
     grid_postures,
@@ -211,3 +212,114 @@ def test_what_a_tolerance_file_leaves_out_is_as_documented(write_file):
     np.testing.assert_array_equal(plan.most, [0.1, 0.01])
     assert plan.names == ("leg1.link_a.RX", "leg1.link_a.TX")
     assert (plan.limits, plan.asked_yield) == ({"margin_free": 1.0}, 1.0)
+    assert (plan.draws, plan.seed, plan.cost) == (1000, 1, "reciprocal")
+    given = ("sources", "group", "names", "costs", "least", "most", "limits")
+    without = Plan(*(getattr(plan, name) for name in given))
+    assert (without.draws, without.seed, without.cost) == (1000, 1, "reciprocal")
+    assert without.asked_yield == 1.0
+
+
+ONE = '[[tolerance]]\nframes = ["link_a"]\ncomponents = ["TX"]\n'
+
+
+@pytest.mark.parametrize(
+    ("key", "accepted", "refused"),
+    [
+        ("yield", ["1e-3", "1.0"], ["0.0", "1.001"]),
+        ("deviations", ["0.5"], ["0.0", "-1.0"]),
+        ("draws", ["1", "10000000"], ["0", "10000001"]),
+        ("seed", ["0", "1000000000000000"], ["-1", "1000000000000002"]),
+    ],
+)
+def test_numbers_of_a_plan_are_accepted_up_to_their_bounds(
+    key, accepted, refused, write_file
+):
+    robot, name = load_robot("irsbot2"), "asked_yield" if key == "yield" else key
+    for text in accepted:
+        plan = read_plan(write_file(f"{key} = {text}\n{ONE}"), robot)
+        found = plan.sources.limit[0] if key == "deviations" else getattr(plan, name)
+        assert found == float(text)
+    for text in refused:
+        with pytest.raises(BadInput, match=f"{key}: found "):
+            read_plan(write_file(f"{key} = {text}\n{ONE}"), robot)
+
+
+@pytest.mark.parametrize(
+    ("line", "refused"),
+    [
+        ("cost = 1e-9", None), ("cost = 0.0", "cost: found 0"),
+        ("most = 1e-9", None), ("most = 0.0", "most: found 0"),
+        ("least = 0.0", None), ("least = 9.9e-3", None),
+        ("least = -1e-9", "least: found"), ("least = 0.01", "least: found"),
+        ("most = 1e-3\nleast = 1e-3", "least: found"),
+    ],
+)  # fmt: skip
+def test_numbers_of_a_tolerance_are_accepted_up_to_their_bounds(
+    line, refused, write_file
+):
+    path, robot = write_file(f"{ONE}{line}\n"), load_robot("irsbot2")
+    if refused is None:
+        plan = read_plan(path, robot)
+        key, _, text = line.partition(" = ")
+        values = {"cost": plan.costs, "most": plan.most, "least": plan.least}[key]
+        assert values[0] == float(text)
+        return
+    with pytest.raises(BadInput, match=refused):
+        read_plan(path, robot)
+
+
+def test_normal_errors_are_cut_at_three_deviations_unless_it_is_said(write_file):
+    plan = read_plan(
+        write_file(f'distribution = "truncated"\n{ONE}'), load_robot("irsbot2")
+    )
+    np.testing.assert_allclose(plan.sources.scale, 1 / 3)
+    np.testing.assert_array_equal(plan.sources.limit, 3.0)
+    np.testing.assert_array_equal(plan.sources.centre, 0.0)
+    np.testing.assert_array_equal(plan.sources.least, 0.0)
+    assert plan.sources.signed.all()
+
+
+def test_an_error_that_stands_in_two_tables_is_named_with_the_first(write_file):
+    both = ONE.replace("link_a", "leg2.link_b")
+    named = ONE + 'name = "long"\n'
+    for first, where in ((named, '"long"'), (ONE, '"leg1.link_a.TX"')):
+        with pytest.raises(BadInput) as error:
+            read_plan(
+                write_file(first + both + ONE.replace("link_a", "leg2.link_a")),
+                load_robot("irsbot2"),
+            )
+        assert f'found "leg2.link_a.TX" again, first in {where}' in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('frames = []\ncomponents = ["TX"]', "expected at least one"),
+        (
+            'frames = ["link_a"]\ncomponents = []',
+            "angles only or lengths only, not none",
+        ),
+        ('frames = "link_a"\ncomponents = ["TX"]', "frames: expected a list of names"),
+        (
+            'frames = ["link_a"]\ncomponents = [3]',
+            "components: expected a list of names",
+        ),
+        ('frames = ["link_a"]\ncomponents = ["RZ", "TX"]', "not none"),
+    ],
+)
+def test_a_table_names_frames_and_components_of_one_kind(table, message, write_file):
+    with pytest.raises(BadInput, match=message):
+        read_plan(write_file(f"[[tolerance]]\n{table}\n"), load_robot("irsbot2"))
+
+
+def test_angles_end_with_rz_and_lengths_begin_with_tx(write_file):
+    """Each with the unit of its loosest tolerance."""
+    for part, most in (("RZ", 0.1), ("TX", 0.01)):
+        plan = read_plan(write_file(ONE.replace("TX", part)), load_robot("irsbot2"))
+        assert plan.most[0] == most
+        assert plan.names == (f"leg1.link_a.{part}",)
+
+
+def test_a_plan_without_tables_is_refused(write_file):
+    with pytest.raises(BadInput, match=r"missing; expected tables \[\[tolerance\]\]"):
+        read_plan(write_file("yield = 0.9\n"), load_robot("irsbot2"))

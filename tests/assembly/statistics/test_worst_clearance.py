@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
@@ -14,6 +15,7 @@ from assembly.statistics.experiment import Experiment, precision_for
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.responses import respond
 from assembly.statistics.summary import summarise, summary_text
+from assembly.statistics.worst_clearance import bound_worst_errors
 
 ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
 POSE = {"tx": 0.1, "tz": -0.5}
@@ -61,6 +63,60 @@ def test_tilt_swings_the_tip_on_its_arm():
     rows = experiment.evaluate(np.zeros((1, 0)), range(1))
     assert rows["rotation"][0] == pytest.approx(TILT, abs=1e-6)
     assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
+
+
+def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
+    """A disc p of play and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
+
+    Beside errors e along x; a draw without an answer has no bounds.
+    """
+    posture = home_posture(chain(RADIAL, TILT))
+    prepared = prepare_energies(posture)
+    errors = np.zeros((3, 2, 6))
+    errors[:, 1, 3] = 0.0, 2e-4, 0.0
+    draws = prepared.solve(errors)
+    draws.energy[2] = np.nan
+    bounds, screws = bound_worst_errors(prepared, draws, errors, (1e-8, 1e-8))
+    size = np.hypot(errors[:2, 1, 3] + RADIAL, ARM * TILT)
+    np.testing.assert_allclose(bounds[:2, 0], TILT, atol=1e-8)
+    np.testing.assert_allclose(bounds[:2, 1, 0], size, atol=1e-8)
+    np.testing.assert_allclose(bounds[:2, 1, 1], size, atol=1e-8)
+    assert np.isnan(bounds[2]).all()
+    turned, moved = screws[:2, 0, :3], screws[:2, 1, 3:]
+    np.testing.assert_allclose(np.linalg.norm(turned, axis=1), TILT, rtol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), size, rtol=1e-4)
+
+
+def test_a_solution_beyond_the_bounds_is_within_them():
+    """Solutions of (22) differ by their gaps: that at hand counts, part by part."""
+    prepared = prepare_energies(home_posture(chain(RADIAL, TILT)))
+    errors = np.zeros((2, 2, 6))
+    draws = prepared.solve(errors)
+    far = np.array([3.0, -4.0, 12.0, 8.0, 9.0, -12.0]) * 1e-3  # of 13 mrad and 17 mm
+    draws.platform_screw[1] = far
+    bounds, screws = bound_worst_errors(prepared, draws, errors)
+    np.testing.assert_allclose(bounds[1], [[13e-3] * 2, [17e-3] * 2], rtol=1e-9)
+    np.testing.assert_array_equal(screws[1], [far, far])
+    assert bounds[0].max() < 3e-3
+
+
+@pytest.mark.parametrize("part", [0, 1])
+def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
+    """Its bounds enclose the truth, however far apart they are."""
+    posture = home_posture(chain(RADIAL, TILT))
+    prepared, errors = prepare_energies(posture), np.zeros((4, 2, 6))
+    errors[:, 1] = np.linspace(1e-4, 4e-4, 4)[:, None] * [1, 0, 0, 1, 0, 0]
+    draws = prepared.solve(errors)
+    precision = [1e-8, 1e-8]
+    precision[part] = np.inf
+    bounds, _ = bound_worst_errors(prepared, draws, errors, tuple(precision))
+    both, _ = bound_worst_errors(prepared, draws, errors, (1e-8, 1e-8))
+    np.testing.assert_allclose(bounds[:, 1 - part], both[:, 1 - part], atol=2e-8)
+    screws = draws.platform_screw[:, 3 * part : 3 * part + 3]
+    least = np.linalg.norm(screws, axis=1)
+    assert (bounds[:, part, 0] >= least * (1 - 1e-12)).all()
+    assert (bounds[:, part, 0] <= both[:, part, 1]).all()
+    assert (bounds[:, part, 1] >= both[:, part, 0]).all()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,133 @@
+"""An allocation's numbers in plain values, lines and a data set."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.statistics.allocated_tolerances import (
+    Allocation,
+    allocation_of,
+    allocation_text,
+)
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import plan_for
+
+NAN = float("nan")
+CHECK = {
+    "draws": 500, "verdict": "shown", "look": 2, "most_looks": 4, "confidence": 0.95,
+    "confidence_of_a_look": 0.9875,
+    "yield": {"probability": 0.99, "lower": 0.976, "upper": 0.9967, "undecided": 0},
+}  # fmt: skip
+
+
+def allocation(**values):
+    """Two classes: angles of the second bar, and its length with that of the first."""
+    plan = plan_for(
+        coaxial_beams(np.zeros(6)), [("two", 1), ("one", 3), ("two", 3)], [1] * 3,
+        {"energy": 2.0}, asked_yield=0.9,
+    )  # fmt: skip
+    plan = replace(
+        plan, group=np.array([1, 0, 0]), names=("length", "angle"),
+        costs=np.array([3.0, 5.0]), most=np.array([1e-2, 0.1]),
+    )  # fmt: skip
+    options = {name: values.pop(name) for name in list(values) if hasattr(plan, name)}
+    found = Allocation(
+        plan=replace(plan, **options), tolerances=np.array([1.25e-3, 0.0999]),
+        price=20.0, uniformly_scaled=np.array([1e-3, 0.08]),
+        price_uniformly_scaled=25.0, price_bound=NAN, cuts=7,
+    )  # fmt: skip
+    return replace(found, **values)
+
+
+def test_a_class_has_the_unit_of_its_first_error():
+    first, second = allocation_of(allocation())["tolerances"]
+    assert first == {
+        "name": "length", "tolerance": 1.25e-3, "unit": "m", "scaled_alike": 1e-3,
+        "cost": 3.0, "loosest_allowed": 1e-2, "at_loosest": False,
+    }  # fmt: skip
+    assert (second["name"], second["unit"], second["cost"]) == ("angle", "rad", 5.0)
+    for tolerance, loosest in ((0.0999 + 1e-6, True), (0.0999 - 1e-6, False)):
+        some = allocation(tolerances=np.array([1e-3, tolerance]))
+        assert allocation_of(some)["tolerances"][1]["at_loosest"] == loosest
+
+
+def test_the_lines_of_an_allocation():
+    """Lengths in mm, angles in mrad; what is not proven or not checked is not told."""
+    plain = allocation_of(allocation())
+    assert allocation_text(plain).splitlines() == [
+        "  length: +-1.25 mm",
+        "  angle: +-99.9 mrad (the loosest allowed)",
+        "price 20, 25 with those of the convex programme scaled alike: 20.0% less",
+    ]
+    whole = allocation(
+        price_bound=19.5, worst={"energy": (1.5, 1.75)}, proven_scale=0.75,
+        verification=CHECK, tolerances=np.array([1e-3, 2e-2]),
+    )  # fmt: skip
+    assert allocation_text(allocation_of(whole)).splitlines() == [
+        "  length: +-1 mm",
+        "  angle: +-20 mrad",
+        "price 20, no tolerances cost less than 19.5",
+        "worst energy: 1.5 found, at most 1.75 proven, limit 2",
+        "proven when scaled by 0.7500",
+        "500 fresh draws at all postures: yield 0.9900 (0.9760 to 0.9967), asked 0.9: "
+        "shown (look 2 of at most 4, each at 98.75%: 95% for all)",
+    ]
+
+
+def test_a_wrench_s_worst_is_found_and_not_proven():
+    found = allocation(limits={"force": 40.0}, worst={"force": (39.0, NAN)})
+    text = allocation_text(allocation_of(found))
+    assert "worst force: 39 found, nothing proven, limit 40" in text.splitlines()
+
+
+def test_draws_that_are_undecided_are_told_with_the_looks():
+    undecided = {"yield": CHECK["yield"] | {"undecided": 3}}
+    text = allocation_text(allocation_of(allocation(verification=CHECK | undecided)))
+    assert text.endswith("95% for all, 3 draws undecided)")
+
+
+def test_the_play_is_told_where_a_pose_error_is_limited():
+    for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
+        plain = allocation_of(allocation(limits=limits))
+        assert plain["play"] == play
+        said = f"pose errors: play worst: {CLEARANCE_MODELS['worst']}"
+        assert (said in allocation_text(plain).splitlines()) == (play is not None)
+        attributes = allocation(limits=limits).to_xarray().attrs
+        assert attributes["play"] == (play or "")
+
+
+@pytest.mark.parametrize(
+    ("cost", "alike", "said"),
+    [
+        ("reciprocal", 25.0, ", 25 with those of the convex programme scaled alike: "
+                             "20.0% less"),
+        ("logarithm", 25.0, ", 25 with those of the convex programme scaled alike"),
+        ("reciprocal", 20.0, ""),
+        ("reciprocal", 19.0, ""),
+    ],
+)  # fmt: skip
+def test_a_price_is_compared_with_that_of_proportions_scaled_alike(cost, alike, said):
+    """A logarithm's zero is anywhere: no share of it is saved."""
+    found = allocation_of(allocation(cost=cost, price_uniformly_scaled=alike))
+    assert allocation_text(found).splitlines()[-1] == f"price 20{said}"
+
+
+def test_the_data_set_holds_tolerances_and_where_they_came_from():
+    found = allocation(verification=CHECK, seed=7)
+    data = found.to_xarray()
+    assert list(data["class"].values) == ["length", "angle"]
+    assert list(data["unit"].values) == ["m", "rad"]
+    np.testing.assert_array_equal(data["tolerance"], found.tolerances)
+    np.testing.assert_array_equal(data["scaled_alike"], found.uniformly_scaled)
+    np.testing.assert_array_equal(data["loosest_allowed"], [1e-2, 0.1])
+    np.testing.assert_array_equal(data["cost"], [3.0, 5.0])
+    attributes = data.attrs
+    assert (attributes["seed"], attributes["yield"]) == (7, 0.9)
+    assert (attributes["price"], attributes["price_alike"]) == (20.0, 25.0)
+    assert attributes["limit.energy"] == 2.0
+    assert attributes["verified_yield"] == 0.99
+    assert attributes["said"].startswith("price 20, 25 with those of the convex")
+    assert attributes["said"].count("; ") == 1
+    assert np.isnan(allocation().to_xarray().attrs["verified_yield"])

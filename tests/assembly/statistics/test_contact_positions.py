@@ -1,0 +1,57 @@
+"""Farthest positions in discs and sides, where they are known."""
+
+import numpy as np
+import pytest
+
+from assembly.statistics.contact_positions import move_to_contact
+
+
+def moved(directions, starts, rows=(), free=None, positions=None):
+    """The farthest positions along some directions, from the middle by default."""
+    directions, starts = np.array(directions, dtype=float), np.array(starts)
+    nu = starts[-1]
+    free = np.ones(nu, dtype=bool) if free is None else np.array(free)
+    positions = np.zeros(directions.shape) if positions is None else positions
+    ends = np.full(directions.shape, 7.0)
+    rows = np.array(rows, dtype=float).reshape(-1, nu)
+    move_to_contact(rows, starts, free, np.array(positions), directions, ends)
+    return ends
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_in_discs_and_sides_each_goes_its_own_way(size, rng):
+    """A linear function is largest at d / |d| of a disc, at the sign of a side."""
+    directions = rng.normal(size=(6, 3)) + 0.1
+    expected = np.column_stack([
+        directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1)[:, None],
+        np.sign(directions[:, 2]),
+    ])
+    found = moved(size * directions, [0, 2, 3])
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_equations_are_kept_with_what_they_were():
+    """u0 - u1 stays 0.5: along both the first ends at 1, the second at a half."""
+    row = np.array([[1.0, -1.0, 0.0]]) / np.sqrt(2)
+    start = np.array([[0.25, -0.25, 0.3], [0.25, -0.25, 0.3]])
+    found = moved([[1, 1, 0.5], [-1, -2, -0.5]], [0, 1, 2, 3], row, positions=start)
+    np.testing.assert_allclose(found, [[1, 0.5, 1], [-0.5, -1, -1]], atol=1e-5)
+
+
+def test_what_is_loaded_stays_where_it_is():
+    """Its direction does not count, nor does it enter the equations."""
+    start = np.array([[0.6, 0.8, 0.1, -0.2]])
+    row = np.array([[0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)
+    found = moved(
+        [[5.0, -5.0, 1.0, 0.0]], [0, 2, 3, 4], row, [False, False, True, True], start
+    )
+    np.testing.assert_allclose(found, [[0.6, 0.8, 0.9, -1.0]], atol=1e-5)
+
+
+def test_without_a_direction_nothing_moves():
+    start = np.array([[0.3, -0.4], [0.3, -0.4]])
+    found = moved([[0.0, 0.0], [0.0, 2.0]], [0, 1, 2], positions=start)
+    np.testing.assert_array_equal(found[0], [0.3, -0.4])
+    np.testing.assert_allclose(found[1, 1], 1.0, atol=1e-5)
+    still = moved([[0.0, 2.0]], [0, 1, 2], free=[True, False], positions=start[:1])
+    np.testing.assert_array_equal(still, start[:1])

@@ -1,0 +1,198 @@
+"""Records of draws: two springs in a row, and an arm with play at its pin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.link_stress import peak_stresses
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment, precision_for
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import coaxial_beams
+
+STIFFNESS, PLAY = 1e6, 1e-4  # [N/m], [m]
+
+
+def springs(clearance=PLAY, **options):
+    """Two bars of 0.5 m that meet on the x axis, with play between them."""
+    play = Clearance(radial=clearance)
+    robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
+    sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
+    return Experiment(home_posture(robot), sources, **options)
+
+
+def arm(**options):
+    """An arm of 0.4 m whose pin has play; its tip has errors."""
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=PLAY)),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, [1e-3, 0, 0, 3e-4, 3e-4, 3e-4], ("tip",))
+    return Experiment(home_posture(robot), sources, **options)
+
+
+def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
+    """Beyond the play p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half a metre of it.
+
+    Margins are d/p in both readings, as no joint is compliant; nothing is short of
+    the least energy by more than rounding.
+    """
+    experiment = springs()
+    values = experiment.sources.draw(0, 40, seed=1)
+    rows = experiment.evaluate(values, range(40))
+    x, y = values[:, 0] - values[:, 2], values[:, 1] - values[:, 3]
+    d = np.hypot(x, y)
+    pressed = np.maximum(d - PLAY, 0.0)
+    np.testing.assert_allclose(rows["margin"], d / PLAY, rtol=1e-6)
+    np.testing.assert_allclose(rows["margin_free"], d / PLAY, rtol=1e-6)
+    energy = STIFFNESS * pressed**2 / 4
+    np.testing.assert_allclose(rows["energy"], energy, rtol=1e-6, atol=1e-10)
+    force = STIFFNESS * pressed / 2
+    np.testing.assert_allclose(rows["force"], force, rtol=1e-5, atol=1e-3)
+    across = np.divide(np.abs(y), d) * force
+    np.testing.assert_allclose(rows["moment"], 0.5 * across, rtol=1e-5, atol=1e-3)
+    assert (rows["status"] == 0).all()
+    gap = rows["duality_gap"]
+    assert (gap >= 0.0).all()
+    assert (gap <= 1e-7 * rows["energy"] + 1e-12).all()
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
+    """Springs k of both ends, turned by d about an axis on their line: k d / 2."""
+    experiment = springs(margins=False, clearance_model="least")
+    widths = np.zeros(6)
+    widths[axis] = 1e-3
+    robot = experiment.posture.robot
+    sources = tolerance_sources(robot, widths, ("one", "two"))
+    rows = replace(experiment, sources=sources).evaluate(
+        np.array([[1e-3, 0.0], [0.5e-3, -1.5e-3]]), range(2)
+    )
+    d = np.array([1e-3, 2e-3])
+    np.testing.assert_allclose(rows["energy"], STIFFNESS * d**2 / 4, rtol=1e-6)
+    np.testing.assert_allclose(rows["moment"], STIFFNESS * d / 2, rtol=1e-6)
+    np.testing.assert_allclose(rows["force"], 0.0, atol=1e-3)
+
+
+def test_what_does_not_close_has_a_status_and_no_numbers():
+    """Rigid parts without play fit where both errors are equal."""
+    frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))
+    robot = Robot("rigid", "one", frames, (("one", "two"),))
+    sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
+    rows = Experiment(home_posture(robot), sources, margins=False).evaluate(
+        np.array([[1e-4, 1e-4], [1e-4, 2e-4]]), range(2)
+    )
+    assert rows["status"].tolist() == [0, 1]
+    for name in ("energy", "translation", "translation_lower", "force"):
+        assert np.isnan(rows[name]).tolist() == [False, True]
+    assert "margin" not in rows.dtype.names
+
+
+def test_later_draws_are_those_of_a_longer_run():
+    experiment = springs(clearance_model="contact", seed=4)
+    whole, later = experiment.solve(0, 9), experiment.solve(5, 4)
+    assert len(later) == 4
+    for name in ("energy", "force", "translation", "platform_screw"):
+        np.testing.assert_allclose(later[name], whole[name][5:], rtol=1e-9, atol=1e-15)
+    assert np.ptp(whole["translation"]) > 1e-6
+
+
+@pytest.mark.parametrize("model", ["least", "uniform", "contact"])
+def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
+    rows = arm(clearance_model=model).solve(0, 6)
+    screws = rows["platform_screw"]
+    for part, name in ((slice(0, 3), "rotation"), (slice(3, 6), "translation")):
+        size = np.sqrt((screws[:, part] ** 2).sum(axis=1))
+        np.testing.assert_allclose(rows[name], size, rtol=1e-12)
+        assert size.min() > 0.0
+    assert ("play_mixed" in rows.dtype.names) == (model == "uniform")
+    if model == "uniform":
+        assert rows["play_mixed"].all()
+    assert "translation_lower" not in rows.dtype.names
+
+
+def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
+    """An error e about x and play: rotation |e|, and hypot(e_xy + p, e_z)."""
+    experiment = arm(precision=(1e-8, 1e-7))
+    values = experiment.sources.draw(0, 30, seed=2)
+    rows = experiment.evaluate(values, range(30))
+    truth = {
+        "rotation": np.abs(values[:, 0]),
+        "translation": np.hypot(np.hypot(*values[:, 1:3].T) + PLAY, values[:, 3]),
+    }
+    for (name, size), width in zip(truth.items(), (1e-8, 1e-7), strict=True):
+        lower, upper = rows[f"{name}_lower"], rows[name]
+        assert (lower <= size * (1 + 1e-12)).all()
+        assert (size <= upper * (1 + 1e-12)).all()
+        assert (upper - lower).max() <= 1.001 * width
+    # beside them the screw is that of the solution, which leaves the play alone
+    np.testing.assert_allclose(rows["platform_screw"][:, 3:], values[:, 1:], atol=1e-12)
+
+
+def test_stress_is_that_of_the_links_alone_and_of_none_where_it_is_left_out(rng):
+    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
+    robot = posture.robot
+    sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])
+    experiment = Experiment(posture, sources, margins=False, clearance_model="least")
+    values = rng.uniform(-2e-3, 2e-3, size=(2, len(sources)))
+    rows = experiment.evaluate(values, range(2))
+    assert experiment.links == tuple(
+        f"leg{leg}.link_{link}" for leg in (1, 2) for link in "ab"
+    )
+    for errors, found in zip(sources.errors(values), rows["stress"], strict=True):
+        answer = solve_assembly(replace(posture, robot=robot.with_errors(errors)))
+        expected = peak_stresses(robot, answer.wrenches)
+        np.testing.assert_allclose(found, expected, rtol=1e-2)
+    assert replace(experiment, stress=False).links == ()
+    assert replace(experiment, stress=False).solve(0, 1)["stress"].shape == (1, 0)
+
+
+def test_limits_on_what_is_not_computed_are_refused():
+    posture = place_robot(load_robot("irsbot2"))
+    sources = tolerance_sources(posture.robot, [1e-3] * 6)
+    whole = Experiment(posture, sources)
+    whole.check_limits(["margin", "margin_free", "stress", "energy"])
+    bare = replace(whole, margins=False, stress=False)
+    bare.check_limits(["energy", "force"])
+    for limit, message in (
+        ("margin", "limit margin: the margins were left out"),
+        ("margin_free", "limit margin_free: the margins were left out"),
+        ("stress", "limit stress: no link of irsbot2 has a shape from which its stress "
+                   "follows"),
+    ):  # fmt: skip
+        with pytest.raises(BadInput) as error:
+            bare.check_limits(["energy", limit])
+        assert str(error.value) == message
+
+
+def test_a_load_that_nothing_resists_is_refused_by_the_robot_s_name():
+    frames = (Frame("slide", joint="prismatic"), Frame("tip", "slide", [0.1, 0, 0]))
+    robot = Robot("sledge", "tip", frames)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
+    experiment = Experiment(
+        home_posture(robot), sources, load=(0.0, 0.0, 0.0, 0.0, 0.0, 5.0)
+    )
+    with pytest.raises(BadInput, match="^sledge: "):
+        experiment.solve(0, 1)
+
+
+@pytest.mark.parametrize(
+    ("limits", "precision"),
+    [
+        ({}, (1e-6, 1e-6)),
+        ({"translation": 1e-4}, (1e-6, 1e-7)),
+        ({"rotation": 2e-5, "energy": 1e-9}, (2e-8, 1e-6)),
+        ({"rotation": 5.0, "translation": 5.0}, (1e-6, 1e-6)),
+    ],
+)
+def test_a_tight_limit_asks_for_a_thousandth_of_it(limits, precision):
+    assert precision_for(limits) == pytest.approx(precision)
+    if "translation" in limits:
+        half = precision_for(limits, 5e-4)
+        assert half[1] == pytest.approx(min(1e-6, limits["translation"] * 5e-4))

@@ -1,0 +1,226 @@
+"""Parts, gains and reasons of a linear platform whose indices are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance import STREAMS
+from assembly.statistics.importance_table import (
+    ImportanceOptions,
+    importance_clearance_model,
+    importance_dataset,
+    importance_design,
+    importance_report,
+    importance_rows,
+    importance_text,
+)
+
+PLAY, WIDTHS = 1e-4, np.array([2e-3, 0, 0, 3e-4, 4e-4, 0.0])
+NAMES = ["tip.RX", "tip.TX", "tip.TY"]
+
+
+def arm(play=None, **options):
+    """A driven arm; its tip follows its errors, of an angle and of two lengths."""
+    clearance = None if play is None else Clearance(radial=play)
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=clearance),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, WIDTHS, ("tip",))
+    return Experiment(home_posture(robot), sources, margins=False, **options)
+
+
+def solved(by="source", draws=400, **options):
+    """The data set of an arm without play, and its plain values."""
+    experiment = arm(clearance_model="least", **options)
+    design = importance_design(experiment, ImportanceOptions(draws, by))
+    rows = importance_rows(experiment, design, 0, len(design))
+    data = importance_dataset(experiment, design, rows)
+    return data, importance_report(data)
+
+
+def test_a_platform_that_follows_each_error_has_gains_of_one():
+    """An even law of half width w deviates by w / sqrt(3), and so does the platform.
+
+    400 draws know a deviation to 4 %; parts and gains of one draw go together.
+    """
+    data, report = solved()
+    assert list(data["group"].values) == NAMES
+    deviation = WIDTHS[WIDTHS > 0] / np.sqrt(3)
+    for name, size, unit in zip(NAMES, deviation, ("rad", "m", "m"), strict=True):
+        one = report["platform"][name]
+        moved, still = ("rotation", "translation")[:: 1 if unit == "rad" else -1]
+        assert one["error_unit"] == unit
+        assert one[f"{moved}_part"] == pytest.approx(size, rel=0.15)
+        assert one[f"{moved}_gain"] == pytest.approx(1.0, rel=0.15)
+        gain = one[f"{moved}_part"] / size
+        assert one[f"{moved}_gain"] == pytest.approx(gain, rel=1e-9)
+        assert one[f"{still}_part"] == pytest.approx(0.0, abs=1e-3 * size)
+        assert one[f"{still}_gain"] == pytest.approx(0.0, abs=1e-3)
+    assert (report["base_draws"], report["play"]) == (400, "least")
+    quantities = report["quantities"]
+    assert set(quantities) == {"energy", "rotation", "translation", "force"}
+    # an open chain is never pressed
+    assert quantities["energy"]["reason"] == "it does not vary"
+    assert "reason" not in quantities["translation"]
+    total = quantities["rotation"]["total_index"]
+    assert [total[name][0] for name in NAMES] == pytest.approx([1, 0, 0], abs=0.15)
+
+
+def test_angles_and_lengths_together_have_parts_and_no_gain():
+    """The tip's own part is the root of the sum of the squares of its errors' parts."""
+    data, report = solved("frame")
+    (one,) = report["platform"].values()
+    assert one["error_unit"] == "rad, m"
+    assert np.isnan(one["translation_gain"])
+    assert np.isnan(one["rotation_gain"])
+    lengths = np.linalg.norm(WIDTHS[3:]) / np.sqrt(3)
+    assert one["translation_part"] == pytest.approx(lengths, rel=0.1)
+    assert data["part"].sel(component="rotation").item() == one["rotation_part"]
+
+
+def test_a_group_of_like_errors_gains_by_their_common_spread():
+    """x moves the platform by 3e-4, y by 4e-4: one group of 5e-4 / sqrt(3) by both."""
+    experiment = arm(clearance_model="least")
+    design = importance_design(experiment, ImportanceOptions(400, "source"))
+    design = replace(design, groups=[("turn", np.array([0])), ("xy", np.array([1, 2]))])
+    rows = importance_rows(experiment, design, 0, len(design))
+    data = importance_dataset(experiment, design, rows)
+    assert list(data["error_unit"].values) == ["rad", "m"]
+    part, gain = (data[k].sel(component="translation").values for k in ("part", "gain"))
+    assert part[1] == pytest.approx(5e-4 / np.sqrt(3), rel=0.1)
+    assert gain[1] == pytest.approx(part[1] * np.sqrt(3) / 5e-4, rel=1e-9)
+
+
+def test_the_design_draws_from_streams_of_its_own():
+    experiment = arm(seed=8)
+    design = importance_design(experiment, ImportanceOptions(20, "source"))
+    for part, stream in zip((design.A, design.B), STREAMS, strict=True):
+        expected = experiment.sources.draw(0, 20, 8, stream)
+        np.testing.assert_array_equal(part, expected)
+    assert len(design) == 20 * 5
+    draws = experiment.sources.draw(0, 20, 8)
+    assert not np.isclose(design.A, draws).any()
+    assert not np.isclose(design.B, draws).any()
+
+
+def test_rows_of_a_design_are_those_of_its_errors_without_random_play():
+    """Where play is random its least position counts, or else all of it."""
+    for model, taken in (
+        ("uniform", "least"),
+        ("contact", "least"),
+        ("worst", "worst"),
+    ):
+        experiment = arm(PLAY, clearance_model=model)
+        design = importance_design(experiment, ImportanceOptions(4, "source"))
+        rows = importance_rows(experiment, design, 3, 9)
+        assert importance_clearance_model(experiment) == taken
+        assert rows.dtype == experiment.record_type
+        alone = replace(experiment, clearance_model=taken)
+        expected = alone.evaluate(design.rows(3, 9), range(9))
+        for name in ("translation", "rotation", "platform_screw"):
+            np.testing.assert_allclose(
+                rows[name], expected[name], rtol=1e-9, atol=1e-12
+            )
+
+
+def test_draws_without_an_answer_are_told_with_their_reason():
+    """Less than a twentieth may be left out: beyond, the others are not independent."""
+    experiment = arm(clearance_model="least")
+    design = importance_design(experiment, ImportanceOptions(100, "source"))
+    rows = importance_rows(experiment, design, 0, len(design))
+    for lost, reason in ((4, None), (6, "6.0%")):
+        some = rows.copy()
+        for name in ("translation", "platform_screw"):
+            some[name][:lost] = np.nan
+        report = importance_report(importance_dataset(experiment, design, some))
+        one = report["quantities"]["translation"]
+        assert one["largest_share_left_out"] == pytest.approx(lost / 100)
+        lines = importance_text(report).splitlines()
+        if reason is None:
+            assert "reason" not in one
+            assert (
+                "translation: up to 4.0% of the draws have no answer and are left out"
+                in lines
+            )
+            assert report["platform"]["tip.TX"]["translation_gain"] > 0.5
+            continue
+        assert one["reason"] == (
+            "no indices where more than 5% of the draws have no answer: up to 6.0% "
+            "were left out, and the errors of the others are not independent"
+        )
+        assert f"translation: {one['reason']}" in lines
+        assert all(np.isnan(v).all() for v in one["total_index"].values())
+        # no part of a platform that is not known
+        parts = [v["translation_part"] for v in report["platform"].values()]
+        assert np.isnan(parts).all()
+
+
+def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_shape():
+    with_margins = replace(arm(clearance_model="least"), margins=True)
+    design = importance_design(with_margins, ImportanceOptions(8, "source"))
+    rows = importance_rows(with_margins, design, 0, len(design))
+    data = importance_dataset(with_margins, design, rows, 0.5)
+    assert list(data["quantity"].values) == [
+        "energy", "margin_free", "rotation", "translation", "force",
+    ]  # fmt: skip
+    assert data["first_index"].dims == ("quantity", "group", "estimate")
+    assert list(data["estimate"].values) == ["value", "lower", "upper"]
+    assert data["failed_share"].shape == (5, 3)
+    assert data.attrs["importance_draws"] == 8
+
+
+def told(units, left_out=0.0):
+    """The table's lines for a group of each unit, the first of the largest part."""
+    count = len(units)
+    platform = {
+        f"group{k}": {
+            "error_unit": unit, "translation_part": 1e-6 * (count - k),
+            "rotation_part": 2e-3 * (k + 1), "translation_gain": 0.5 + k,
+            "rotation_gain": 0.1,
+        }
+        for k, unit in enumerate(units)
+    }  # fmt: skip
+    index = {group: np.array([0.25, 0.2, 0.3]) for group in platform}
+    one = {"total_index": index, "first_index": index, "largest_share_left_out": 0.0}
+    return importance_text({
+        "base_draws": 64, "play": "least", "platform": platform,
+        "quantities": {
+            "translation": one, "energy": one | {"largest_share_left_out": left_out},
+            "stress": one | {"reason": "it does not vary"},
+        },
+    }).splitlines()  # fmt: skip
+
+
+def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
+    head, stress, columns, length, angle, both = told(["m", "rad", "rad, m"])
+    assert "64 base draws" in head
+    assert stress == "stress: it does not vary"
+    begin = [columns.index(word) for word in ("for each um", "for each mrad", "[mrad]")]
+    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300)".split()
+    assert begin[0] <= length.index(" 0.5 ") < begin[1]
+    # 1.5 m for each rad are 1500 um for each mrad
+    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300)".split()
+    assert begin[1] <= angle.index(" 1500 ") < begin[2]
+    # rad and m together have no gain
+    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300)".split()
+    ends = [len(line) for line in (length, angle, both)]
+    assert len(set(ends)) == 1
+
+
+def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
+    lines = told(["m"] * 18, left_out=0.015)
+    assert "energy: up to 1.5% of the draws have no answer and are left out" in lines
+    assert lines[-1] == "and 3 more, see --json"
+    assert [line.split()[0] for line in lines[-4:-1]] == [
+        "group12",
+        "group13",
+        "group14",
+    ]
+    assert "more" not in told(["m"] * 15)[-1]

@@ -1,0 +1,193 @@
+"""Steps towards the least cost, for sums of errors whose least cost is known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from assembly.statistics import least_cost as module
+from assembly.statistics.least_cost import least_cost
+from assembly.statistics.requirement import Plan
+from assembly.statistics.scaling import Samples
+
+COSTS = np.array([1.0, 4.0])
+GROUP = np.array([0, 1, 1])
+
+
+class Sums:
+    """Limits on sums of sizes of three errors, of two classes."""
+
+    def __init__(self, weights, asked_yield=1.0, cost="reciprocal", power=1.0):
+        self.weights, self.power = np.array(weights), power
+        sources = SimpleNamespace(draw=None)
+        self.plan = Plan(sources, GROUP, ("a", "b"), COSTS, np.zeros(2),
+                         np.full(2, 1e3), {}, cost, asked_yield)  # fmt: skip
+        self.cases = [(k, 0) for k in range(len(weights))]
+
+    def utilisations(self, values):
+        sums = self.weights @ np.abs(values.T)
+        return 0 * sums, sums**self.power
+
+    def utilisation_slopes(self, case, values):
+        inner = self.power * (np.abs(values) @ self.weights[case]) ** (self.power - 1)
+        return np.sign(values) * self.weights[case] * inner[:, None]
+
+    def worst_corner(self, key, i, t, corners):
+        return SimpleNamespace(signs=np.ones(3))
+
+
+def silent(*_):
+    """No progress is shown."""
+
+
+CORNERS = Samples(np.array([[1.0, -1, 1], [-1, -1, 1]]), 0)
+
+
+@pytest.mark.parametrize("start", [[1.0, 1.0], [1.0, 0.03]])
+def test_a_sum_of_errors_costs_least_by_lagranges_multipliers(start):
+    """2 t1 + (3 + 5) t2 <= 1: t ~ sqrt(c / a), from any start."""
+    a, seen = np.array([2.0, 8.0]), []
+    best = np.sqrt(COSTS / a) / np.sqrt(COSTS * a).sum()
+    t, samples = least_cost(
+        Sums([[2.0, 3.0, 5.0]]), CORNERS, np.array(start),
+        lambda *step: seen.append(step),
+    )  # fmt: skip
+    np.testing.assert_allclose(t, best, rtol=0.03)
+    assert (COSTS / t).sum() == pytest.approx((COSTS / best).sum(), rel=2e-3)
+    assert seen[0] == ("least cost", 0, 60)
+    assert seen[-1] == ("least cost", 60, 60)
+    # the worst corner, which was not among the samples, is kept
+    np.testing.assert_array_equal(samples.values[-1], np.ones(3))
+    assert len(samples.values) == 3
+
+
+def test_two_limits_that_cross_cost_least_where_both_are_met():
+    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 cross at (1/7, 3/7); c/t is least there."""
+    requirement = Sums([[4.0, 0.5, 0.5], [1.0, 1.0, 1.0]])
+    t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
+    np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)
+
+
+class Signed(Sums):
+    """A limit on the sum itself, in which errors of opposite signs cancel."""
+
+    def utilisations(self, values):
+        sums = np.abs(self.weights @ values.T)
+        return 0 * sums, sums
+
+    def utilisation_slopes(self, case, values):
+        sums = values @ self.weights[case]
+        return np.sign(sums)[:, None] * self.weights[case]
+
+
+def test_a_worse_corner_that_is_found_on_the_way_is_met_too():
+    """At the first samples 3 t2 is taken from the sum; the worst corner adds it."""
+    requirement = Signed([[2.0, 3.0, 5.0]])
+    t, samples = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
+    assert 2 * t[0] + 8 * t[1] == pytest.approx(1.0, rel=2e-3)
+    assert len(samples.values) == 3
+
+
+class Norm(Sums):
+    """A limit on the root of the sum of the squares of the weighted errors."""
+
+    def utilisations(self, values):
+        size = np.sqrt(self.weights**2 @ (values.T**2))
+        return 0 * size, size
+
+    def utilisation_slopes(self, case, values):
+        size = np.sqrt(values**2 @ self.weights[case] ** 2)
+        return values * self.weights[case] ** 2 / size[:, None]
+
+
+@pytest.mark.parametrize("weights", [[1.0, 1.0, 1.0], [20.0, 1.0, 0.5]])
+def test_squares_that_add_up_cost_least_by_cube_roots(weights):
+    """Minimise sum c/t with sum (a t)^2 = 1: t ~ (c / a^2)^(1/3), over a bent limit."""
+    squares = np.array([weights[0] ** 2, weights[1] ** 2 + weights[2] ** 2])
+    best = (COSTS / squares) ** (1 / 3)
+    best /= np.sqrt(squares @ best**2)
+    t, _ = least_cost(Norm([weights]), CORNERS, np.array([1.0, 1.0]), silent)
+    assert np.sqrt(squares @ t**2) == pytest.approx(1.0, rel=1.1e-3)
+    assert (COSTS / t).sum() == pytest.approx((COSTS / best).sum(), rel=3e-3)
+
+
+def test_logarithms_share_a_sum_by_the_costs_themselves():
+    requirement = Sums([[2.0, 3.0, 5.0]], cost="logarithm")
+    t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
+    np.testing.assert_allclose(t, COSTS / 5 / [2.0, 8.0], rtol=0.03)
+
+
+def test_a_saving_is_a_share_of_the_price_and_of_a_logarithms_costs():
+    before, after = np.array([1.0, 2.0]), np.array([2.0, 4.0])
+    reciprocal, logarithm = (Sums([[1.0] * 3], cost=c).plan for c in
+                             ("reciprocal", "logarithm"))  # fmt: skip
+    assert module._saving(reciprocal, before, after) == pytest.approx(0.5)
+    assert module._saving(logarithm, before, after) == pytest.approx(np.log(2))
+    assert module._saving(reciprocal, after, before) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_the_planes_of_samples_touch_their_limit_where_they_meet_it(power):
+    """u = (w.|s| t)^n: plane 1 + n (w.t' / w.t - 1) at u = 1, and the same slope else.
+
+    Samples of less than 0.8 of a limit have none, the worst of all always has one.
+    """
+    requirement = Sums([[2.0, 3.0, 5.0], [1.0, 1.0, 1.0]], power=power)
+    t = np.array([0.1, 0.1])
+    samples = Samples(np.array([[1.0, 1, 1], [1, 0.5, 0.9], [0.1, 0.1, 0.1]]), 0)
+    planes = module._planes(requirement, samples, t)
+    sums = requirement.weights @ np.abs(samples.values * t[GROUP]).T  # 1 and 0.3, ..
+    used = sums**power
+    # sums of 1, 0.8, 0.1 and 0.3, 0.24, 0.03: the first alone, or with the second
+    np.testing.assert_allclose(used[0], np.array([1.0, 0.8, 0.1]) ** power)
+    expected = []
+    for draw in [0, 1][: 2 if used[0, 1] > 0.8 else 1]:
+        parts = requirement.weights[0] * samples.values[draw]
+        w = np.array([parts[0], parts[1] + parts[2]])
+        slope = power * (w @ t) ** (power - 1) * w
+        expected.append(slope / (1 - used[0, draw] + slope @ t))
+    np.testing.assert_allclose(planes, expected, rtol=1e-9)
+    for plane in planes[:1]:
+        assert plane @ t == pytest.approx(1.0)
+    small = module._planes(requirement, samples, 0.01 * t)
+    assert len(small) == 1
+
+
+def test_no_more_than_two_hundred_samples_have_planes(rng):
+    samples = Samples(rng.uniform(0.9, 1.0, size=(300, 3)), 0)
+    t = np.array([0.1, 0.1])
+    requirement = Sums([[2.0, 3.0, 5.0]])
+    planes = np.array(module._planes(requirement, samples, t))
+    assert planes.shape == (200, 2)
+    # those of the largest sums
+    sums = samples.values @ [2.0, 3.0, 5.0]
+    worst = samples.values[np.argsort(sums)[::-1][:200]]
+    np.testing.assert_allclose(planes[:, 0], 2.0 * worst[:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("draws", "near"), [(100, 16), (600, 30), (4000, 64)])
+def test_the_plane_of_a_yield_is_the_mean_of_those_nearest_to_a_limit(draws, near, rng):
+    """Relative slopes of the draws whose worst use of a limit is nearest to 1."""
+    weights = np.array([[2.0, 3.0, 5.0], [6.0, 1.0, 1.0]])
+    requirement = Sums(weights, asked_yield=0.9)
+    t, values = np.array([0.12, 0.15]), rng.uniform(-1, 1, size=(draws, 3))
+    values[0] = 0.0  # uses nothing, and has no slope
+    (plane,) = module._planes(requirement, Samples(values, 10), t)
+    parts = weights[:, None] * np.abs(values * t[GROUP])  # (cases, draws, errors)
+    used = parts.sum(axis=2)
+    worst = used.max(axis=0)
+    with np.errstate(divide="ignore"):
+        order = np.argsort(np.abs(np.log(worst)))[:near]
+    relative = np.array([parts[used[:, d].argmax(), d] / worst[d] for d in order])
+    mean = np.array([relative[:, 0].mean(), relative[:, 1:].sum(axis=1).mean()]) / t
+    np.testing.assert_allclose(plane, mean, rtol=1e-9)
+    assert plane @ t == pytest.approx(1.0)
+
+
+def test_draws_that_use_nothing_leave_the_mean_to_the_others():
+    """Sixteen are nearest, of which four use anything: a quarter of their mean."""
+    values = np.zeros((16, 3))
+    values[:4, 0] = 1.0
+    requirement = Sums([[2.0, 3.0, 5.0]], asked_yield=0.9)
+    (plane,) = module._planes(requirement, Samples(values, 1), np.array([0.5, 0.5]))
+    np.testing.assert_allclose(plane, [2.0, 0.0])

@@ -1,0 +1,185 @@
+"""Blocks of a run, what identifies it, its data set: an arm that follows its errors."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Frame, Robot
+from assembly.statistics import monte_carlo
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance_table import ImportanceOptions
+from assembly.statistics.monte_carlo import provenance, run_draws
+from assembly.sweeps.sweep import journal_path
+from forcefit.inputs.table import BadInput
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_blocks_of_a_run_are_solved_once_and_counted(arm, monkeypatch, workers):
+    """Of 21 draws in blocks of 4, and 15 rows of a design: six blocks and four."""
+    monkeypatch.setattr(monte_carlo, "BLOCK", 4)
+    whole = run_draws(arm, 21)
+    monkeypatch.setattr(Experiment, "solve", counted(Experiment.solve, spans := []))
+    seen = []
+    data = run_draws(
+        arm, 21, workers=workers, importance=ImportanceOptions(3, "kind"),
+        progress=lambda done, total: seen.append((done, total)),
+    )  # fmt: skip
+    assert sorted(spans) == [(0, 4), (4, 4), (8, 4), (12, 4), (16, 4), (20, 1)]
+    assert seen[0] == (0, 36)
+    assert seen[-1] == (36, 36)
+    steps = np.diff([done for done, _ in seen])
+    assert sorted(steps) == [1, 3] + [4] * 8
+    for name in ("translation", "platform_screw", "energy"):
+        np.testing.assert_array_equal(data[name], whole[name])
+    np.testing.assert_array_equal(data["draw"], np.arange(21))
+
+
+def counted(method, spans):
+    """The method, with first row and number of rows noted down."""
+
+    def noting(self, first, count):
+        spans.append((first, count))
+        return method(self, first, count)
+
+    return noting
+
+
+def test_every_thread_has_a_block_and_few_wait():
+    """Four meet in the middle of their blocks; begun are four for each, no more."""
+    meeting, begun = Barrier(4, timeout=20), []
+
+    def solve(block):
+        begun.append(block)
+        if 1 <= block <= 8:
+            meeting.wait()
+        return np.array([block])
+
+    blocks = monte_carlo._solved(solve, list(range(100)), 4)
+    first = [next(blocks)[0] for _ in range(2)]
+    assert first[0] == 0
+    time.sleep(0.05)
+    assert len(begun) <= 1 + 16
+    assert sorted([*first, *(block for block, _ in blocks)]) == list(range(100))
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """A driven arm whose tip has errors in three directions."""
+    frames = (
+        Frame("pin", joint="revolute", actuated=True),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, [0, 0, 1e-3, 1e-4, 1e-4, 0], ("tip",))
+    return Experiment(
+        place_robot(robot), sources, clearance_model="least", margins=False
+    )
+
+
+@pytest.mark.parametrize("held", [None, ExitStack()])
+def test_a_journal_that_is_held_stays_until_it_is_let_go(arm, tmp_path, held):
+    path = tmp_path / "draws.nc"
+    run_draws(arm, 3, path, held=held)
+    assert path.exists()
+    assert journal_path(path).exists() == (held is not None)
+    if held is not None:
+        held.close()
+        assert not journal_path(path).exists()
+
+
+def test_a_killed_run_goes_on_at_another_confidence_of_its_importance(arm, tmp_path):
+    """The same rows are solved; with more of them it is another run."""
+
+    def kill(done, total):
+        if done:
+            raise RuntimeError
+
+    path = tmp_path / "draws.nc"
+    with pytest.raises(RuntimeError):
+        run_draws(arm, 3, path, progress=kill, importance=ImportanceOptions(4))
+    with pytest.raises(BadInput, match="importance"):
+        run_draws(arm, 3, path, importance=ImportanceOptions(5))
+    seen = []
+    run_draws(
+        arm, 3, path, importance=ImportanceOptions(4, level=0.5),
+        progress=lambda done, total: seen.append((done, total)),
+    )  # fmt: skip
+    assert seen == [(3, 23), (23, 23)]
+
+
+def test_importance_of_a_run_is_that_of_a_run_cut_at_other_places(arm, monkeypatch):
+    asked, found = ImportanceOptions(6, "source", 0.5), []
+    for block in (1024, 5):
+        monkeypatch.setattr(monte_carlo, "BLOCK", block)
+        found.append(run_draws(arm, 7, importance=asked))
+    for name in ("total_index", "part", "gain"):
+        np.testing.assert_allclose(found[1][name], found[0][name], rtol=1e-9, atol=1e-9)
+    assert found[0].attrs["importance_draws"] == 6
+
+
+def test_a_data_set_of_draws_says_what_was_solved(arm):
+    """Units, meanings by clearance model, and everything that its numbers depend on."""
+    asked = replace(
+        arm, clearance_model="worst", margins=True, seed=9, precision=(1e-6, np.inf)
+    )
+    data = run_draws(asked, 3)
+    units = {name: data[name].attrs["units"] for name in data.data_vars}
+    assert units["energy"] == "J"
+    assert units["translation_lower"] == "m"
+    assert units["status"] == units["margin"] == "1"
+    meaning = data["translation"].attrs["long_name"]
+    assert meaning.startswith("upper bound of the size of the platform's translation")
+    assert meaning.endswith("the largest pose errors count, eq. (27)")
+    screw = data["platform_screw"]
+    assert screw.dims == ("draw", "screw")
+    assert list(screw["screw"].values) == ["RX", "RY", "RZ", "TX", "TY", "TZ"]
+    assert "one possible place of many" in screw.attrs["long_name"]
+    attributes = data.attrs
+    assert (attributes["robot"], attributes["seed"]) == ("arm", 9)
+    assert (attributes["margins"], attributes["stress"]) == (1, 1)
+    assert attributes["precision"] == "1e-06 inf"
+    assert attributes["load"] == attributes["gravity"] == ""
+    assert attributes["pose.tx"] == pytest.approx(0.4)
+    assert "stiffness" not in attributes
+    least = run_draws(arm, 3)["translation"].attrs["long_name"]
+    assert least.startswith(
+        "size of the platform's translation error; clearances where"
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 2}, {"margins": True}, {"stress": False}, {"load": (0.0,) * 6},
+        {"gravity": (0.0, 0.0, -9.81)}, {"clearance_model": "worst"},
+        {"precision": (1e-6, 1e-5)}, {"stiffness": "contact"},
+    ],
+)  # fmt: skip
+def test_runs_that_give_other_numbers_share_no_journal(arm, change):
+    """What differs is found in what identifies a run; the same run is the same."""
+    before, after = provenance(arm), provenance(replace(arm, **change))
+    assert before == provenance(replace(arm))
+    (name,) = change
+    named = "play" if name == "clearance_model" else name
+    assert {
+        k for k in before.keys() | after.keys() if before.get(k) != after.get(k)
+    } == {named}
+
+
+def test_runs_of_other_distributions_or_postures_share_no_journal(arm):
+    sources = arm.sources
+    turned = place_robot(arm.posture.robot, {"rz": 0.1})
+    others = [replace(arm, posture=turned)]
+    for name in ("component", "kind", "centre", "scale", "least", "limit"):
+        value = getattr(sources, name) + 1
+        others.append(
+            replace(arm, sources=replace(sources, **{name: np.minimum(value, 5)}))
+        )
+    digests = {provenance(one)["sources_and_posture_sha256"] for one in [arm, *others]}
+    assert len(digests) == len(others) + 1

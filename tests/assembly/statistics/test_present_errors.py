@@ -1,0 +1,139 @@
+"""The errors that a robot has, at several postures: bars in a row with play."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import load_robot
+from assembly.statistics.tolerances import (
+    grid_postures,
+    identity_of,
+    present_errors,
+    present_text,
+)
+from forcefit.inputs.table import BadInput
+from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import plan_for
+
+K, PLAY = 1e6, 1e-4  # [N/m], [m]
+
+
+def bars(play, errors):
+    """Two bars that meet with play, whose ends are off by some lengths along x."""
+    robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(radial=play))
+    delta = np.zeros((len(robot.frames), 6))
+    for name, length in errors.items():
+        delta[robot.index(name), 3] = length
+    return home_posture(robot.with_errors(delta))
+
+
+ERRORS = {"one": 3 * PLAY, "two": -1 * PLAY, "mount": 0.5 * PLAY}
+
+
+def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_play():
+    """A gap of 3 + 1 - 0.5 plays; at the other posture the play is four times wider.
+
+    The errors that open the gap have 3 / 3.5 and 1 / 3.5 of it, the other less than
+    none; the springs are pressed by 2.5 plays.
+    """
+    seen = []
+    postures = [bars(4 * PLAY, ERRORS), bars(PLAY, ERRORS), bars(2 * PLAY, {})]
+    found = present_errors(postures, "rigid", lambda *step: seen.append(step))
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    assert (found["postures"], found["compliant"]) == (3, "rigid")
+    np.testing.assert_allclose(found["margins"], [3.5 / 4, 3.5, 0.0], atol=1e-6)
+    assert found["largest_margin"] == pytest.approx(3.5)
+    assert found["factor_on_errors"] == pytest.approx(1 / 3.5)
+    assert found["assemblable_share"] == pytest.approx(2 / 3)
+    assert found["energy_there"] == pytest.approx(K * (2.5 * PLAY) ** 2 / 4, rel=1e-6)
+    slopes = found["slopes"]
+    assert [one["error"] for one in slopes] == ["one.TX", "two.TX", "mount.TX"]
+    assert [one["value"] for one in slopes] == list(ERRORS.values())
+    shares = [one["share_of_margin"] for one in slopes]
+    np.testing.assert_allclose(shares, np.array([3, 1, -0.5]) / 3.5, rtol=1e-6)
+    signs = np.array([1.0, -1.0, -1.0])
+    margin_slopes = [one["margin_slope"] for one in slopes]
+    np.testing.assert_allclose(margin_slopes, signs / PLAY, rtol=1e-6)
+    energy_slopes = [one["energy_slope"] for one in slopes]
+    np.testing.assert_allclose(energy_slopes, signs * K * 2.5 * PLAY / 2, rtol=1e-6)
+
+
+def test_the_lines_tell_the_five_largest_errors_and_where():
+    slopes = [
+        {"error": f"e{k}", "value": 1e-4 * (k + 1), "share_of_margin": 0.5 / (k + 1)}
+        for k in range(7)
+    ]
+    results = {
+        "postures": 8, "assemblable_share": 0.375, "largest_margin": 1.23456,
+        "factor_on_errors": 0.81, "slopes": slopes,
+        "at": {"tx": 0.25, "tz": -0.5, "ry": 1e-12, "rz": 2e-9},
+    }  # fmt: skip
+    lines = present_text(results).splitlines()
+    assert lines[:3] == [
+        "8 postures, 37.5% go together; largest margin 1.235 at tx = 0.25, tz = -0.5, "
+        "rz = 2e-09",
+        "everywhere with all errors times 0.81",
+        "  e0 = 0.0001 makes 50.0% of that margin",
+    ]
+    assert [line.split()[0] for line in lines[2:]] == ["e0", "e1", "e2", "e3", "e4"]
+    home = present_text(results | {"at": {"tx": 0.0, "ty": -1e-10}}).splitlines()[0]
+    assert home.endswith("largest margin 1.235 at the origin")
+
+
+def test_what_fits_by_clearance_alone_stores_no_energy_and_none_is_told_if_rigid():
+    """Rigid parts too far apart have a margin and no energy."""
+    within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
+    assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
+    assert within["assemblable_share"] == 1.0
+    # a margin of 1 but for rounding goes together
+    for gap, share in ((1 + 5e-7, 1.0), (1 + 2e-6, 0.0)):
+        assert (
+            present_errors([bars(PLAY, {"one": gap * PLAY})], "rigid")[
+                "assemblable_share"
+            ]
+            == share
+        )
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], geometric_error=[0, 0, 0, 3e-4, 0, 0]),
+        Frame("two", "base", [0.5, 0, 0]),
+        Frame("end", "one", clearance=Clearance(radial=PLAY)),
+    )
+    rigid = Robot("pin", "end", frames, (("end", "two"),))
+    found = present_errors([home_posture(rigid)], "rigid")
+    assert found["largest_margin"] == pytest.approx(3.0)
+    assert np.isnan(found["energy_there"])
+    assert np.isnan(found["slopes"][0]["energy_slope"])
+
+
+def test_a_grid_has_the_postures_that_are_reached():
+    robot = load_robot("irsbot2")
+    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
+    places = [(p.pose()["tx"], p.pose()["tz"]) for p in postures]
+    np.testing.assert_allclose(places, [(x, -0.5) for x in (-0.1, 0.0, 0.1)], atol=1e-9)
+    with pytest.raises(BadInput, match="^grid: no posture is reached; the first: "):
+        grid_postures(robot, "tx=0,tz=-9")
+
+
+def test_allocations_share_results_only_where_everything_is_the_same():
+    robot = load_robot("irsbot2")
+    postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.1)]
+    links = [("leg1.link_a", 3), ("leg2.link_a", 3)]
+    plan = plan_for(robot, links, [1, 2], {"energy": 1.0})
+    own = identity_of(postures, plan, 50)
+    assert own == identity_of(list(postures), replace(plan), 50)
+    others = [
+        identity_of(postures[:1], plan, 50), identity_of(postures[::-1], plan, 50),
+        identity_of(postures, plan, 51),
+        *(identity_of(postures, replace(plan, **change), 50) for change in (
+            {"costs": plan.costs + 1}, {"most": plan.most / 2}, {"seed": 2},
+            {"least": plan.least + 1e-9}, {"limits": {"energy": 2.0}}, {"draws": 7},
+            {"cost": "logarithm"}, {"asked_yield": 0.5}, {"clearance_model": "least"},
+            {"group": plan.group[::-1]},
+            {"sources": plan_for(robot, links[::-1], [1, 2], {}).sources},
+        )),
+    ]  # fmt: skip
+    told = {str(sorted(one.items())) for one in [own, *others]}
+    assert len(told) == len(others) + 1

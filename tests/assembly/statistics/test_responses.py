@@ -1,0 +1,178 @@
+"""Quantities and their slopes: Euler's theorem, and an arm with play at its pin."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.link_stress import stressed_links
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.responses import _stress_slopes, respond
+
+PLAY, STIFFNESS = 1e-4, 1e6  # [m], [N/m]
+QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """The paper's robot without clearances, and some errors of its links."""
+    robot = load_robot("irsbot2")
+    frames = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=frames)
+    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
+    prepared = prepare_energies(place_robot(robot, {"tx": 0.1, "tz": -0.5}))
+    return prepared, sources, sources.draw(0, 5, seed=3)
+
+
+@pytest.mark.parametrize("key", QUANTITIES)
+@pytest.mark.parametrize("play", ["least", "worst"])
+def test_without_clearances_errors_times_slopes_are_the_quantity(stiff, key, play):
+    """Euler: all are homogeneous, the energy of degree two, and all others of one."""
+    prepared, sources, values = stiff
+    size, slopes = respond(prepared, sources, values, key, play)
+    assert (size > 0).all()
+    degree = 2 if key == "energy" else 1
+    np.testing.assert_allclose((values * slopes).sum(axis=1), degree * size, rtol=1e-5)
+    twice, same = respond(prepared, sources, -2 * values, key, play)
+    np.testing.assert_allclose(twice, 2**degree * size, rtol=1e-6)
+    scale = np.abs(slopes).max()
+    np.testing.assert_allclose(same, -degree * slopes, atol=1e-5 * scale)
+
+
+@pytest.mark.parametrize("key", QUANTITIES)
+def test_slopes_without_clearances_are_quotients_of_differences(stiff, key):
+    """Along a random direction, a thousandth of the errors."""
+    prepared, sources, values = stiff
+    step = 1e-3 * sources.draw(9, 1, seed=3)
+    slopes = respond(prepared, sources, values, key)[1]
+    above, below = (
+        respond(prepared, sources, values + s, key)[0] for s in (step, -step)
+    )
+    along = (slopes * step).sum(axis=1)
+    scale = np.linalg.norm(slopes * step, axis=1)
+    np.testing.assert_allclose((above - below) / 2, along, atol=1e-3 * scale.max())
+
+
+def test_a_peak_stress_is_its_slopes_times_the_wrench(rng):
+    """Euler again, for each wrench by itself; its size is no matter to the slopes."""
+    links = stressed_links(load_robot("irsbot2"))
+    wrenches = rng.normal(size=(8, 6)) * [1, 2, 3, 40, 50, 60]
+    for link in (links[0], links[-1]):
+        slopes, peak = _stress_slopes(link, wrenches), link.peak(wrenches)
+        np.testing.assert_allclose((slopes * wrenches).sum(axis=1), peak, rtol=1e-6)
+        scale = np.abs(slopes).max()
+        for size in (2.0, 1e-6):
+            same = _stress_slopes(link, size * wrenches)
+            np.testing.assert_allclose(same, slopes, atol=1e-5 * scale)
+
+
+def arm(play=PLAY):
+    """An arm of 0.4 m whose pin has play, and errors of its tip."""
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=play)),
+        Frame("tip", "pin", [0.4, 0, 0]),
+    )
+    robot = Robot("arm", "tip", frames)
+    return home_posture(robot), tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3,
+                                                  ("tip",))  # fmt: skip
+
+
+def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
+    """R = hypot(e_xy + p, e_z): dR/dx = (e_xy + p) x / (e_xy R), dR/dz = z / R."""
+    posture, sources = arm()
+    values = sources.draw(0, 20, seed=1)
+    size, slopes = respond(
+        prepare_energies(posture), sources, values, "translation", "worst"
+    )
+    x, y, z = values[:, 3:].T
+    across = np.hypot(x, y)
+    R = np.hypot(across + PLAY, z)
+    np.testing.assert_allclose(size, R, atol=2e-9)
+    expected = [(across + PLAY) * x / across, (across + PLAY) * y / across, z] / R
+    # known to 1e-9 of 1e-4 m the size leaves directions 5e-3 apart
+    np.testing.assert_allclose(slopes[:, 3:], expected.T, atol=1.5e-2)
+    np.testing.assert_allclose(slopes[:, :3], 0.0, atol=1e-9)
+    turn = values[:, :3]
+    size, slopes = respond(
+        prepare_energies(posture), sources, values, "rotation", "worst"
+    )
+    angle = np.linalg.norm(turn, axis=1)
+    np.testing.assert_allclose(size, angle, rtol=1e-9)
+    np.testing.assert_allclose(slopes[:, :3], turn / angle[:, None], atol=1e-9)
+    np.testing.assert_allclose(slopes[:, 3:], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("play", ["least", "contact", "uniform"])
+@pytest.mark.parametrize("key", ["rotation", "translation"])
+def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
+    """Draw by draw; the slopes are the direction of the platform's error."""
+    posture, sources = arm()
+    values = sources.draw(0, 12, seed=1)
+    rows = Experiment(
+        posture, sources, seed=1, clearance_model=play, margins=False
+    ).evaluate(values, range(12))
+    size, slopes = respond(prepare_energies(posture), sources, values, key, play)
+    np.testing.assert_allclose(size, rows[key], rtol=1e-9)
+    expected = rows["platform_screw"] / size[:, None]
+    kept = slice(0, 3) if key == "rotation" else slice(3, 6)
+    np.testing.assert_allclose(slopes[:, kept], expected[:, kept], atol=1e-9)
+    assert not np.delete(slopes, np.r_[kept], axis=1).any()
+
+
+def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
+    """Two rigid parts, which fit where their errors are equal."""
+    link = MatrixLink(np.eye(6) * STIFFNESS)
+    frames = (
+        Frame("one", translation=[0.5, 0, 0]),
+        Frame("two", "base", [0.5, 0, 0]),
+        Frame("tip", "two", [0.1, 0, 0], link=link),
+    )
+    robot = Robot("rigid", "tip", frames, (("one", "two"),))
+    posture = home_posture(robot)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("one", "two", "tip"))
+    values = np.array([[1e-4, 2e-4, 1e-4], [1e-4, 1e-4, 2e-4], [1e-4, 2e-4, 0.0]])
+    prepared = prepare_energies(posture)
+    for key in ("force", "translation"):
+        for play in ("least", "worst"):
+            size, slopes = respond(prepared, sources, values, key, play)
+            assert np.isnan(size).tolist() == [True, False, True]
+            assert np.isnan(slopes).all(axis=1).tolist() == [True, False, True]
+    assert size[1] == pytest.approx(3e-4)  # of the second part and of the tip
+    none, slopes = respond(prepared, sources, values[:1], "force")
+    assert np.isnan(none).all()
+    assert np.isnan(slopes).all()
+
+
+@pytest.mark.parametrize("component", [3, 4])
+def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
+    """Rigid parts: the pin's play takes up what the errors of its own side do."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0]),
+        Frame("two", "base", [0.5, 0, 0]),
+        Frame("end", "one", clearance=Clearance(radial=PLAY)),
+    )
+    robot = Robot("pin", "end", frames, (("end", "two"),))
+    widths = np.zeros(6)
+    widths[component] = PLAY
+    sources = tolerance_sources(robot, widths, ("one", "two"))
+    values = np.array([[0.3, 0.6], [-0.2, -0.5]]) * PLAY
+    prepared = prepare_energies(home_posture(robot))
+    size, slopes = respond(prepared, sources, values, "translation", "least")
+    np.testing.assert_allclose(size, np.abs(values[:, 1]), rtol=1e-6)
+    np.testing.assert_allclose(slopes, [[0, 1], [0, -1]], atol=1e-6)
+
+
+def test_a_margin_is_homogeneous_of_degree_one():
+    robot = load_robot("irsbot2")
+    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
+    zone = prepare_margins(place_robot(robot, {"tx": 0.1, "tz": -0.5}), "free")
+    values = sources.draw(0, 4, seed=3)
+    margin, slopes = respond(zone, sources, values)
+    assert (margin > 0).all()
+    np.testing.assert_allclose((values * slopes).sum(axis=1), margin, rtol=1e-6)

@@ -1,0 +1,187 @@
+"""Uniform scaling against utilisations of which the answer is known."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from assembly.statistics import scaling
+from assembly.statistics.scaling import (
+    Samples,
+    draw_samples,
+    scale_uniformly,
+    with_worst_corners,
+)
+from assembly.statistics.worst_case import CORNERS, random_corners
+from forcefit.inputs.table import BadInput
+
+
+class Known:
+    """A requirement whose utilisation is a given function of every error's size."""
+
+    def __init__(self, utilisation, least=0.0, most=1e9, tolerances=1):
+        self.utilisation, self.tried = utilisation, []
+        self.plan = SimpleNamespace(
+            least=np.full(tolerances, least), most=np.full(tolerances, most),
+            spread=lambda t: t,
+        )  # fmt: skip
+
+    def utilisations(self, values):
+        """Beside a limit of which half as much is used; the lower bounds are zero."""
+        upper = self.utilisation(np.abs(values).max(axis=1))
+        self.tried.append(upper)
+        return np.zeros((2, len(values))), np.stack([upper, upper / 2])
+
+
+ONE = Samples(np.ones((1, 1)), 0)
+
+
+@pytest.mark.parametrize("power", [0.4, 1.0, 2.0, 8.0])
+@pytest.mark.parametrize("start", [0.2, 1.0, 5.0])
+def test_a_power_law_is_met_in_four_trials(power, start):
+    """(t / 3)^power is 1 at 3; two trials tell the power, the next one is exact."""
+    known = Known(lambda size: (size / 3.0) ** power)
+    (found,) = scale_uniformly(known, ONE, np.array([start]))
+    assert 1 - 1e-4 <= (found / 3.0) ** power <= 1 + 1e-9
+    assert len(known.tried) <= 4
+
+
+@pytest.mark.parametrize("size", [3.0, 3.0 * (1 - 5e-5)])
+def test_tolerances_that_just_fit_are_left_as_they_are(size):
+    known = Known(lambda size: size / 3.0)
+    assert scale_uniformly(known, ONE, np.array([size])) == size
+    assert len(known.tried) == 1
+
+
+@pytest.mark.parametrize("start", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("within", [0.0, 0.5])
+@pytest.mark.parametrize("beyond", [2.0, np.inf])
+def test_a_jump_is_bracketed_from_within(start, within, beyond):
+    """Nothing is between: the largest factor that fits, to the precision asked for."""
+    known = Known(lambda size: np.where(size <= 3.0, within, beyond))
+    for precision in (1e-2, 1e-4):
+        (found,) = scale_uniformly(known, ONE, np.array([start]), precision)
+        assert 3.0 * (1 - precision) <= found <= 3.0
+    assert len(known.tried) < 80
+
+
+def test_a_steep_law_with_an_end_is_met():
+    """Energy beyond a play of 1: (t - 1)^2 = 4 at 3, nothing at all below 1."""
+    for start in (1e-3, 0.5, 1.5, 40.0):
+        known = Known(lambda size: np.maximum(size - 1.0, 0.0) ** 2 / 4)
+        (found,) = scale_uniformly(known, ONE, np.array([start]))
+        assert found == pytest.approx(3.0, rel=1e-4)
+
+
+def test_proportions_are_kept_between_the_bounds_of_the_plan():
+    """Samples (1, 1) of tolerances 1 to 4: those at their loosest stay there."""
+    known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
+    found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))
+    np.testing.assert_allclose(found, [1.5, 3.0, 6.0], rtol=1e-4)
+    found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([0.1, 2, 4]))
+    np.testing.assert_allclose(found, [0.5, 3.0, 6.0], rtol=1e-4)
+    loose = Known(lambda size: size / 20.0, most=8.0, tolerances=2)
+    found = scale_uniformly(loose, Samples(np.ones((1, 2)), 0), np.array([1.0, 1e-3]))
+    np.testing.assert_array_equal(found, [8.0, 8.0])
+
+
+@pytest.mark.parametrize("allowed", [0, 1, 300])
+def test_all_samples_fit_but_those_that_may_fail(allowed):
+    """Sizes 1 to 1000 of a limit 6: the largest that must fit is 1000 less those."""
+    values = np.random.default_rng(1).permutation(np.arange(1.0, 1001.0))[:, None]
+    known = Known(lambda size: size / 6.0)
+    (found,) = scale_uniformly(known, Samples(values, allowed), np.ones(1))
+    assert found == pytest.approx(6.0 / (1000 - allowed), rel=1e-4)
+
+
+@pytest.mark.parametrize("least", [0.0, 0.7])
+def test_what_fits_at_no_scale_is_refused(least):
+    """Perfect parts that use twice a limit; or those as tight as they may be."""
+    constant = Known(lambda size: 2.0 + 0 * size, least)
+    beyond = Known(lambda size: 2.0 + size, least)
+    for known in (constant, beyond):
+        with pytest.raises(BadInput, match="^tolerances: even perfect parts violate a"):
+            scale_uniformly(known, ONE, np.ones(1))
+
+
+@pytest.mark.parametrize(("draws", "allowed"), [(59, 0), (92, 0), (93, 1), (124, 2)])
+def test_failures_that_still_show_a_yield_are_wilks_numbers(draws, allowed):
+    """Wilks (1942): 59, 93, 124 draws show 95 % at 95 % with 0, 1, 2 failures."""
+    plan = SimpleNamespace(
+        asked_yield=0.95, draws=draws, draws_of=lambda stream, count: (stream, count)
+    )
+    samples = draw_samples(SimpleNamespace(plan=plan), 7)
+    assert samples.allowed == allowed
+    assert samples.values == (7, draws)
+
+
+def test_draws_too_few_to_show_a_yield_are_refused():
+    plan = SimpleNamespace(asked_yield=0.95, draws=29, draws_of=lambda *_: np.zeros(1))
+    requirement = SimpleNamespace(plan=plan)
+    with pytest.raises(BadInput) as error:
+        draw_samples(requirement, 7, 2)
+    assert str(error.value) == (
+        "tolerances: 58 draws cannot show a yield of 0.95 even if none fails; ask for "
+        "more draws"
+    )
+    assert draw_samples(requirement, 7, 3).allowed == 0
+
+
+def test_what_must_always_hold_is_sampled_at_corners():
+    plan = SimpleNamespace(asked_yield=1.0, draws=40, sources=range(6), seed=3)
+    requirement = SimpleNamespace(plan=plan)
+    samples = draw_samples(requirement, 5, 4)
+    assert samples.allowed == 0
+    np.testing.assert_array_equal(samples.values, random_corners(40, 6, 8))
+    assert set(np.unique(samples.values)) == {-1.0, 1.0}
+
+
+def test_worst_corners_join_the_samples_once():
+    """The search starts from the first twelve and the last twelve samples."""
+    values = random_corners(60, 7, 2)
+    worst = {
+        ("a", 0): values[30], ("a", 1): np.ones(7), ("b", 0): np.ones(7),
+        ("b", 1): -np.ones(7),
+    }  # fmt: skip
+    asked = []
+
+    def worst_corner(key, i, t, corners):
+        asked.append((t, corners))
+        return SimpleNamespace(signs=worst[key, i])
+
+    requirement = SimpleNamespace(cases=list(worst), worst_corner=worst_corner)
+    values = values[~(np.abs(values.sum(axis=1)) == 7)]
+    found = with_worst_corners(requirement, Samples(values, 2), np.array([1.0, 2.0]))
+    assert CORNERS == 24
+    for t, corners in asked:
+        np.testing.assert_array_equal(t, [1.0, 2.0])
+        np.testing.assert_array_equal(corners, np.vstack([values[:12], values[-12:]]))
+    np.testing.assert_array_equal(found.values[: len(values)], values)
+    added = found.values[len(values) :]
+    np.testing.assert_array_equal(added, [-np.ones(7), np.ones(7)])
+    assert found.allowed == 2
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "utilisation", "expected"),
+    [
+        (0.0, 8.0, np.inf, 4.0),
+        (0.0, 8.0, 0.0, 4.0),
+        (3.0, np.inf, 0.0, 6.0),
+        (2.0, 8.0, np.inf, 4.0),
+        # a guess outside of the interval is none
+        (2.0, 8.0, 1e-3, 4.0),
+        (2.0, 8.0, 1e3, 4.0),
+        # quadratic: half as far for a quarter
+        (0.0, 8.0, 4.0, 2.0 * (1 - 5e-5) ** 0.5),
+        (2.0, 32.0, 0.25, 8.0 * (1 - 5e-5) ** 0.5),
+        # no more than fifty times either way at once
+        (0.0, 8.0, 1e4, 4.0 * 0.02),
+        (4.0, np.inf, 1e-4, 4.0 * 50),
+    ],
+)
+def test_the_next_factor_is_a_power_law_s_or_the_middle(
+    low, high, utilisation, expected
+):
+    found = scaling._next_factor(low, high, 4.0, utilisation, 2.0, 1e-4)
+    assert found == pytest.approx(expected, rel=1e-12)

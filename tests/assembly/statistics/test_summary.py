@@ -1,0 +1,239 @@
+"""The summary of draws whose results are given, counted by hand."""
+
+import numpy as np
+import pytest
+import xarray
+from scipy import stats
+
+from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.summary import summarise, summary_text
+from forcefit.inputs.table import BadInput
+
+NAN = float("nan")
+
+
+def draws(play="least", status=None, screws=None, **values):
+    """A data set of draws: results by quantity, of links where they have two sizes."""
+    count = len(next(iter(values.values())))
+    status = np.zeros(count) if status is None else np.array(status)
+    screws = np.zeros((count, 6)) if screws is None else screws
+    dims = {1: ("draw",), 2: ("draw", "link")}
+    variables = {k: (dims[np.ndim(v)], np.array(v)) for k, v in values.items()}
+    variables.setdefault("duality_gap", (("draw",), np.zeros(count)))
+    variables |= {
+        "status": (("draw",), status), "platform_screw": (("draw", "screw"), screws),
+    }  # fmt: skip
+    return xarray.Dataset(variables, attrs={"play": play})
+
+
+def test_draws_without_an_answer_count_in_every_probability():
+    """Of eight, two do not assemble and three go together by clearances alone.
+
+    A margin above 1 by rounding is one; the largest gap is that of an answer.
+    """
+    data = draws(
+        energy=[0.0, 0, 0, 1, 2, 3, NAN, NAN], status=[0, 0, 0, 0, 0, 0, 1, 1],
+        margin=[0.2, 0.9, 1 + 5e-7, 1 + 5e-6, 2, 3, 9, np.inf],
+        duality_gap=[0, 1e-9, 0, 3e-9, 0, 0, NAN, NAN],
+    )  # fmt: skip
+    said = summarise(data)
+    assert (said["draws"], said["assembled"]) == (8, 6)
+    assert said["assembles"]["forced"]["probability"] == 6 / 8
+    assert said["assembles"]["rigid"]["probability"] == 3 / 8
+    assert "rigid_compliant_free" not in said["assembles"]
+    assert said["duality_gap"] == 3e-9
+    assert said["confidence"] == 0.95
+    assert said["play_means"] == CLEARANCE_MODELS["least"]
+    none = draws(energy=[NAN] * 3, status=[1] * 3, duality_gap=[-1.0, NAN, NAN])
+    assert summarise(none)["duality_gap"] == 0.0
+
+
+def test_walks_that_are_not_mixed_are_counted_among_the_draws_that_assemble():
+    data = draws("uniform", status=[0, 0, 0, 1], energy=[1.0, 1, 1, NAN],
+                 play_mixed=[0, 1, 0, 0])  # fmt: skip
+    said = summarise(data)
+    assert said["play_not_mixed"] == 2
+    text = summary_text(said)
+    assert "warning: in 2 draws uniform clearances are not mixed when their" in text
+    mixed = summarise(data.assign(play_mixed=("draw", [1, 1, 1, 0])))
+    assert mixed["play_not_mixed"] == 0
+    assert "warning" not in summary_text(mixed)
+    assert "play_not_mixed" not in summarise(draws(energy=[1.0]))
+
+
+def test_a_limit_is_met_up_to_itself_and_by_no_draw_without_an_answer():
+    """Energies 1 to 4 and no answer within 2; forces of which one is too large."""
+    data = draws(energy=[1.0, 2, 3, 4, NAN], force=[9.0, 5, 5, 9, NAN],
+                 status=[0, 0, 0, 0, 1])  # fmt: skip
+    said = summarise(data, {"energy": 2.0, "force": 8.0}, level=0.9)
+    over = said["exceeds"]
+    assert (over["energy"]["probability"], over["energy"]["undecided"]) == (3 / 5, 0)
+    assert (over["energy"]["limit"], over["energy"]["unit"]) == (2.0, "J")
+    assert over["force"]["probability"] == 3 / 5
+    assert said["within_limits"]["probability"] == 1 / 5
+    assert said["within_limits"]["undecided"] == 0
+    low, high = stats.binomtest(1, 5).proportion_ci(0.9)
+    assert said["within_limits"]["lower"] == pytest.approx(low)
+    assert said["within_limits"]["upper"] == pytest.approx(high)
+    assert "play" not in said["within_limits"] | over["energy"]
+    assert "within_limits" not in summarise(data)
+
+
+def test_a_draw_whose_bounds_enclose_a_limit_is_undecided():
+    """Of the largest translation within 2: bounds 0 to 2, 1 to 3, 2 to 3 and 3 to 4."""
+    data = draws("worst", translation=[2.0, 3, 3, 4, NAN], status=[0, 0, 0, 0, 1],
+                 translation_lower=[0.0, 1, 2, 3, NAN])  # fmt: skip
+    said = summarise(data, {"translation": 2.0})
+    over, within = said["exceeds"]["translation"], said["within_limits"]
+    assert (over["probability"], over["undecided"]) == (2 / 5, 2)
+    assert (within["probability"], within["undecided"]) == (1 / 5, 2)
+    assert within["play"] == over["play"] == "worst"
+    assert within["upper"] == pytest.approx(stats.binomtest(3, 5).proportion_ci()[1])
+    lines = summary_text(said).splitlines()
+    assert any(
+        line.startswith("translation [play worst] above 2 m: 0.4 (")
+        and line.endswith(", 2 draws undecided")
+        for line in lines
+    )
+
+
+def test_the_strength_limits_the_most_stressed_link_unless_a_limit_is_given():
+    """Safety is the strength over each link's largest stress; endless without any."""
+    data = draws(stress=[[1e6, 0.0], [4e6, 0.0], [9e6, 0.0]], status=[0, 0, 1])
+    said = summarise(data, strength=2e6)
+    assert said["exceeds"]["stress"]["limit"] == 2e6
+    assert said["exceeds"]["stress"]["probability"] == 2 / 3
+    np.testing.assert_array_equal(said["safety"], [0.5, np.inf])
+    both = summarise(data, {"stress": 5e6}, strength=2e6)
+    assert both["exceeds"]["stress"]["probability"] == 1 / 3
+    assert both["safety"][0] == 0.5
+    assert "safety" not in summarise(data)
+
+
+def test_a_quantity_is_described_by_those_draws_that_have_it():
+    data = draws(force=[1.0, 2, 4, NAN, np.inf, 7], status=[0, 0, 0, 0, 0, 1])
+    one = summarise(data)["quantities"]["force"]
+    assert (one["of"], one["assembled"], one["draws"]) == (6, 5, 3)
+    assert one["unit"] == "N"
+    assert one["mean"]["value"] == pytest.approx(7 / 3)
+    assert one["quantiles"]["0.5"]["value"] == 2.0
+    assert one["zero"]["probability"] == 0.0
+    assert set(one["quantiles"]) == {"0.05", "0.5", "0.95", "0.99"}
+
+
+@pytest.mark.parametrize(("known", "described"), [(0, False), (1, False), (2, True)])
+def test_two_draws_at_least_have_a_mean_and_a_mean_screw(known, described):
+    status = [0] * known + [1] * (5 - known)
+    screws = np.arange(30.0).reshape(5, 6)
+    said = summarise(draws(energy=[1.0, 3, 5, 7, 9], status=status, screws=screws))
+    assert ("mean" in said["quantities"]["energy"]) == described
+    assert ("platform_screw" in said) == described
+    if described:
+        screw = said["platform_screw"]
+        assert screw["draws"] == 2
+        np.testing.assert_allclose(screw["mean"], np.arange(6.0) + 3)
+        # (x, x + 6) of every component: variance 18, all alike
+        np.testing.assert_allclose(screw["covariance"], np.full((6, 6), 18.0))
+        assert len(screw["most_probable"]) == 6
+
+
+def test_the_screws_of_the_worst_clearances_are_those_of_the_least():
+    for play, named in (("worst", "least"), ("contact", "contact")):
+        assert (
+            summarise(draws(play, energy=[1.0, 2]))["platform_screw"]["play"] == named
+        )
+
+
+def test_screws_that_are_not_known_are_left_out_of_their_mean():
+    screws = np.ones((4, 6))
+    screws[2:] = [[3.0] * 6, [1.0] * 5 + [NAN]]
+    found = summarise(draws(energy=[1.0] * 4, screws=screws))["platform_screw"]
+    assert found["draws"] == 3
+    np.testing.assert_allclose(found["mean"], 5 / 3)
+
+
+@pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
+def test_zero_is_most_probable_where_more_than_half_are_zero(zeros, mode):
+    """The others about 7; 1e-19 of the largest is rounding, 1e-17 is not."""
+    energy = np.r_[
+        np.zeros(zeros - 2), 9e-19, -7e-18, np.linspace(6.9, 7.1, 100 - zeros)
+    ]
+    one = summarise(draws(energy=energy))["quantities"]["energy"]
+    assert one["most_probable"]["value"] == pytest.approx(mode, abs=0.2)
+    assert one["zero"]["probability"] == zeros / 100
+    energy[0] = 1e-16
+    more = summarise(draws(energy=energy))["quantities"]["energy"]
+    assert more["zero"]["probability"] == (zeros - 1) / 100
+
+
+def test_margins_are_also_those_of_draws_that_do_not_assemble():
+    """One without an answer has none that suffices: it counts as infinite."""
+    data = draws(margin=[0.5, 1.0, 2.0, np.inf, NAN], status=[0, 0, 1, 1, 1])
+    one = summarise(data)["quantities"]["margin"]
+    assert one["draws"] == 2
+    every = one["all_draws"]
+    assert every["infinite"]["probability"] == 2 / 5
+    assert every["quantiles"]["0.5"]["value"] == 2.0
+    assert every["quantiles"]["0.95"]["value"] == np.inf
+    text = summary_text(summarise(data))
+    assert "margin of all 5 draws: median 2 (" in text
+    energy = summarise(draws(energy=[1.0, 2]))["quantities"]["energy"]
+    assert "all_draws" not in energy
+
+
+def test_only_quantities_of_draws_are_described():
+    """Not bounds, gaps, screws, nor what is known of no link or of the whole run."""
+    data = draws("worst", translation=[1.0, 2], translation_lower=[0.5, 1.5],
+                 stress=np.zeros((2, 0)))  # fmt: skip
+    data["force"] = ("group", [1.0, 2.0, 3.0])
+    assert list(summarise(data)["quantities"]) == ["translation"]
+
+
+def test_the_summary_s_lines_name_quantities_units_and_intervals():
+    """A pure number has no unit; a pose error is given with its clearance model."""
+    one = {"value": 1.0, "lower": 0.5, "upper": 2.0}
+    described = {
+        "unit": "m", "play": "worst", "mean": one,
+        "most_probable": one | {"value": 1.25},
+        "quantiles": {"0.5": one, "0.95": one | {"value": 3.0, "upper": 4.0}},
+    }  # fmt: skip
+    share = {"probability": 0.25, "lower": 0.1234567, "upper": 0.5}
+    lines = summary_text({
+        "draws": 40, "assembled": 30, "confidence": 0.9, "play": "worst",
+        "play_means": "anywhere", "assembles": {"forced": share},
+        "exceeds": {"margin": share | {"limit": 1.5, "unit": "1", "undecided": 0}},
+        "within_limits": share | {"undecided": 7, "play": "worst"},
+        "quantities": {
+            "translation": described, "force": {"unit": "N"},
+            "margin": described | {"unit": "1", "all_draws": described},
+        },
+    }).splitlines()  # fmt: skip
+    shown = "0.25 (0.12346 to 0.5)"
+    quantiles = "median 1 (0.5 to 2), 95 % below 3 (0.5 to 4)"
+    assert lines == [
+        "40 draws; in brackets 90% intervals",
+        "pose errors: play worst: anywhere",
+        f"goes together, by force if need be: {shown}",
+        f"margin above 1.5: {shown}",
+        f"yield [play worst], all limits met: {shown}, 7 draws undecided",
+        "of the 30 of 40 draws that assemble:",
+        f"  translation [play worst]: most probable 1.25 m, {quantiles}",
+        f"  margin [play worst]: most probable 1.25, {quantiles}",
+        f"margin of all 40 draws: {quantiles}",
+    ]
+
+
+@pytest.mark.parametrize("key", ["force", "stress"])
+def test_a_limit_on_what_was_not_computed_is_refused(key):
+    """Not at all, or of no link."""
+    data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
+    with pytest.raises(BadInput, match=f"^limit {key}: not among what was computed$"):
+        summarise(data, {"energy": 1.0, key: 1.0})
+
+
+def test_where_no_draw_assembles_only_margins_are_told():
+    text = summary_text(summarise(draws(margin=[2.0, 3, 4], status=[1, 1, 1])))
+    assert text.splitlines()[-2:] == [
+        "of the 0 of 3 draws that assemble: nothing to say",
+        "margin of all 3 draws: median 3 (-inf to inf), 95 % below 3.9 (3 to inf)",
+    ]

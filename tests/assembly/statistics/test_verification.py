@@ -1,0 +1,191 @@
+"""Proofs of springs in a row, and verdicts on draws that are counted by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Clearance
+from assembly.statistics import verification
+from assembly.statistics.requirement import FRESH, Requirement
+from assembly.statistics.verification import prove_worst, verify, verify_yield
+from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import PLAY, plan_for
+
+ENDS = [("one", 3), ("two", 3)]
+T = np.array([2.0, 3.0]) * PLAY
+REACH = 5 * PLAY  # both errors together
+
+
+def silent(*_):
+    """No progress is shown."""
+
+
+def springs(stiffnesses, limits, clearance=None):
+    """A requirement of two bars in a row, equally stiff, at each posture."""
+    play = None if clearance is None else Clearance(radial=clearance)
+    postures = [
+        home_posture(coaxial_beams(np.zeros(6), (k, k), clearance=play))
+        for k in stiffnesses
+    ]
+    return Requirement(postures, plan_for(postures[0].robot, ENDS, [1, 1], limits))
+
+
+@pytest.mark.parametrize(("limit", "scale"), [(0.01, 0.2), (0.25, 1.0), (1.0, 1.0)])
+def test_the_energy_of_springs_is_proven_and_scales_as_the_square(limit, scale):
+    """k (t1 + t2)^2 / 4 at the stiffer of three postures; 0.25 J of 1e6 N/m."""
+    requirement, seen = springs([4e5, 4e6, 1e6], {"energy": limit}), []
+    k = 4e6
+    truth = k * REACH**2 / 4
+    worst, found = prove_worst(requirement, T, lambda *step: seen.append(step))
+    assert truth == pytest.approx(0.25)
+    np.testing.assert_allclose(worst["energy"], truth, rtol=1e-4)
+    assert found == pytest.approx(scale, rel=1e-4)
+    assert seen == [("proofs", i, 3) for i in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(("limit", "scale"), [(1.0, 0.2), (4.0, 0.8), (6.0, 1.0)])
+def test_a_margin_is_proven_and_scales_with_the_tolerances(limit, scale):
+    """(t1 + t2) / p = 5 whatever the springs."""
+    requirement = springs([1e6, 1e5], {"margin": limit}, PLAY)
+    worst, found = prove_worst(requirement, T, silent)
+    np.testing.assert_allclose(worst["margin"], 5.0, rtol=1e-5)
+    assert found == pytest.approx(scale, rel=1e-5)
+
+
+def test_the_tightest_of_all_limits_scales_and_a_force_is_not_proven():
+    """Half of k (t1 + t2) is found; nothing bounds it, and so nothing is to scale."""
+    requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
+    worst, found = prove_worst(requirement, T, silent)
+    assert worst["force"][0] == pytest.approx(1e6 * REACH / 2, rel=1e-6)
+    assert np.isnan(worst["force"][1])
+    assert worst["energy"][1] == pytest.approx(1e6 * REACH**2 / 4, rel=1e-4)
+    assert np.isnan(found)
+    several = springs([1e6], {"margin": 4.0, "energy": 1.0, "margin_free": 2.0}, PLAY)
+    assert prove_worst(several, T, silent)[1] == pytest.approx(0.4, rel=1e-5)
+
+
+class Given:
+    """A requirement with two limits at two postures, of given shares for each draw."""
+
+    cases = [("a", 0), ("a", 1), ("b", 0), ("b", 1)]
+    postures = (None, None)
+
+    def __init__(self, lower, upper, asked_yield):
+        self.asked_yield, self.plan, self.streams = asked_yield, self, []
+        self.bounds = np.array([lower, upper])
+
+    def draws_of(self, stream, count):
+        """Their numbers: a tolerance of 2 tells that it was multiplied."""
+        self.streams.append((stream, count))
+        return np.arange(count)[:, None].astype(float)
+
+    def spread(self, tolerances):
+        return tolerances
+
+    def utilisations(self, values):
+        return self.bounds[:, :, np.rint(values[:, 0] / 2.0).astype(int)]
+
+
+TWO = np.array([2.0])
+
+
+def test_a_draw_fits_where_it_meets_every_limit_at_every_posture():
+    """Of 600 draws in three batches, 60 fail at the first posture, 30 at the second."""
+    share = np.full((4, 600), 0.5)
+    share[0, 240:270] = 1.5  # limit a, first posture, in two batches
+    share[2, 580:] = 2.5  # limit b
+    share[2, 260:280] = 1.5  # ten of them fail already
+    share[3, 570:600] = 1.1
+    share[1, 0] = 1 + 5e-10  # rounding
+    seen = []
+    given = Given(share, share, 0.9)
+    found = verify_yield(given, TWO, 600, lambda *step: seen.append(step), 14, 0.9)
+    assert found["draws"] == 600
+    assert found["posture_yields"] == [1 - 60 / 600, 1 - 30 / 600]
+    assert found["worst_posture_yield"] == 1 - 60 / 600
+    assert found["yield"]["probability"] == 1 - 70 / 600
+    assert found["yield"]["undecided"] == 0
+    assert found["largest_share_of_a_limit"] == 2.5
+    assert found["verdict"] == "not contradicted"
+    assert seen == [("verification", done, 600) for done in (256, 512, 600)]
+    assert given.streams == [(14, 600)]
+
+
+def test_a_draw_between_its_bounds_is_undecided():
+    lower, upper = np.full((2, 4, 10), 0.5)
+    lower[0, :3] = upper[0, :3] = 1.5  # fail
+    upper[1, 2:5] = 1.5  # the third has failed elsewhere
+    lower[1, 3] = 1 + 5e-10  # rounding
+    found = verify_yield(Given(lower, upper, 0.2), TWO, 10, silent)
+    assert found["yield"]["probability"] == 0.5
+    assert found["yield"]["undecided"] == 2
+    assert found["posture_yields"] == [0.7, 0.7]
+
+
+@pytest.mark.parametrize(
+    ("failing", "asked", "verdict"),
+    [
+        (0, 1.0, "no draw failed"),
+        (1, 1.0, "contradicted"),
+        # 0 of 100: at least 1 - 0.025^(1/100) = 0.9638 with 95 %
+        (0, 0.96, "shown"),
+        (0, 0.97, "not contradicted"),
+        # 10 of 100: between 0.824 and 0.951
+        (10, 0.82, "shown"),
+        (10, 0.83, "not contradicted"),
+        (10, 0.95, "not contradicted"),
+        (10, 0.96, "contradicted"),
+    ],
+)
+def test_the_verdict_is_that_of_the_interval(failing, asked, verdict):
+    share = np.zeros((4, 100))
+    share[2, :failing] = 2.0
+    found = verify_yield(Given(share, share, asked), TWO, 100, silent)
+    assert found["verdict"] == verdict
+
+
+def test_contradicted_tolerances_are_scaled_until_as_few_of_those_draws_fail(
+    monkeypatch,
+):
+    """Of 100 draws the asked yield of 0.75 lets 25 fail; every look draws anew."""
+    asked = []
+
+    def scaled(requirement, samples, t):
+        asked.append((samples.values[:, 0].tolist(), samples.allowed))
+        return t / 2
+
+    def looked(requirement, t, fresh, progress, stream, level):
+        verdicts = {2.0: "contradicted", 1.0: "contradicted", 0.5: "shown"}
+        return {"verdict": verdicts[float(t[0])], "stream": stream, "level": level}
+
+    monkeypatch.setattr(verification, "scale_uniformly", scaled)
+    monkeypatch.setattr(verification, "verify_yield", looked)
+    given = Given(np.zeros((4, 1)), np.zeros((4, 1)), 0.75)
+    t, last = verify(given, TWO, 100, silent)
+    assert (t, last["verdict"]) == (0.5, "shown")
+    assert (last["look"], last["stream"]) == (3, FRESH + 2)
+    assert asked == [(list(range(100)), 25)] * 2
+    assert given.streams == [(FRESH, 100), (FRESH + 1, 100)]
+    # four looks share 5 %
+    assert last["level"] == last["confidence_of_a_look"] == pytest.approx(0.9875)
+
+
+def test_other_corners_are_tried_than_those_the_tolerances_were_made_with():
+    """A search that began where the tolerances' did would find no other worst."""
+    tried = []
+
+    def worst_corner(key, i, t, corners):
+        tried.append(corners)
+        return SimpleNamespace(value=1.0)
+
+    plan = SimpleNamespace(spread=lambda t: t, seed=4, limits={"force": 1.0})
+    requirement = SimpleNamespace(
+        plan=plan, prepared={"force": [None]}, convex={}, worst_corner=worst_corner
+    )
+    worst, scale = prove_worst(requirement, np.ones(5), silent)
+    (corners,) = tried
+    np.testing.assert_array_equal(corners, verification.random_corners(24, 5, 5))
+    assert worst["force"][0] == 1.0
+    assert np.isnan(scale)
