@@ -132,7 +132,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
     proper = points.ndim == 2 and cells.ndim == 2 and np.isfinite(points).all()
-    return (points, cells) if proper and cells.max() < len(points) else None
+    return (points, cells) if proper and cells.max(initial=-1) < len(points) else None
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
@@ -261,7 +261,7 @@ def _nearest_patch(
     outward = surface.normals()
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
     center = corners.mean(axis=1)
-    size = np.sqrt(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) ** 2)
+    size = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     best, patch = np.full(len(faces), np.inf), np.zeros(len(faces), dtype=int)
     for weight in (0.0, 0.4, 0.8):
         for k in range(3 if weight else 1):
