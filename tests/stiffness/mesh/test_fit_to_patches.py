@@ -141,7 +141,7 @@ def test_a_face_of_one_tetrahedron_alone_is_on_the_boundary():
 
 
 def thin(heights):
-    """Tetrahedra side by side, of these heights on unit bases; all bases are patch 0."""
+    """Tetrahedra side by side, of these heights on unit bases, patch 0."""
     points, cells = [], []
     for k, height in enumerate(heights):
         base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, height]])

@@ -142,6 +142,19 @@ def test_a_cached_mesh_that_cannot_be_one_is_made_anew(
     assert len(made) == 2
 
 
+def test_every_edge_has_a_mesh_of_its_own_in_the_cache(tmp_path, monkeypatch):
+    """Seventeen that differ by a thousandth: more than a hexadecimal digit can name."""
+    cube = kuhn_cube(1)
+    monkeypatch.setattr(
+        mesh_module, "_tetrahedralize", lambda *_: (cube.points, cube.cells)
+    )
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    for edge in 0.02 * (1 + 0.001 * np.arange(17)):
+        mesh_solid(surface, *faces, edge=edge, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 17
+
+
 def test_what_the_mesher_is_asked_for(tmp_path, monkeypatch):
     """Edges of a 20th of the diagonal and 300 s at most unless others are wanted; a
     coarser surface may leave the part by the envelope's share of the diagonal."""
