@@ -24,7 +24,7 @@ from stiffness.surface.surface import Surface, check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
 X, Z = np.array([1.0, 0, 0]), np.array([0.0, 0, 1])
-CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0.4, 0]]) + [3.0, -2.0, 1.0]
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0.4, 0]]) + [3.0, -2.0, -7.0]
 MIDDLE = CORNERS.mean(axis=0)
 # the middle, and 0.4 and 0.8 of the ways to the corners
 PLACES = np.array([

@@ -133,9 +133,18 @@ def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
                 check_surface(points, triangles, "cube")
 
 
+def test_a_wall_within_a_part_has_edges_of_three_triangles():
+    """Two tetrahedra on one base that is there once."""
+    points = np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]])
+    below = np.array([[0, 1, 4], [1, 2, 4], [2, 0, 4]])[:, ::-1]
+    triangles = np.concatenate([TETRAHEDRON, below])
+    with pytest.raises(BadInput, match="pyramids: 3 edges are shared by more than two"):
+        check_surface(points, triangles, "pyramids")
+
+
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
 def test_a_flat_surface_encloses_no_volume(unit):
-    """Less than a million millionth of its diagonal's cube."""
+    """Less than a million millionth of its diagonal's cube, wherever it lies."""
     for share in (1e-11, 1e-13):
         points = unit * CORNERS.copy()
         diagonal = unit * 0.1 * np.sqrt(2)
@@ -144,6 +153,7 @@ def test_a_flat_surface_encloses_no_volume(unit):
         if share > 1e-12:
             surface = check_surface(points, TETRAHEDRON, "sheet")
             assert surface.volume == pytest.approx(share * diagonal**3, rel=1e-3)
+            check_surface(points + [5 * unit, 0, 0], TETRAHEDRON, "sheet")
         else:
             with pytest.raises(BadInput, match="sheet: the surface encloses no volume"):
                 check_surface(points, TETRAHEDRON, "sheet")
