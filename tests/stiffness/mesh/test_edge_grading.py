@@ -263,3 +263,11 @@ def test_a_clamped_base_is_split_until_no_edge_joins_two_of_its_sides(base, tria
     check_chordless(solid, (0,))
     assert solid.volumes().sum() == pytest.approx(whole.volumes().sum(), rel=1e-12)
     assert len(solid.cells) > len(whole.cells)
+
+
+def test_what_touches_more_than_an_edge_of_the_singular_ones_stays_whole():
+    """A clamped triangle that was not split before; its neighbours' corners too."""
+    solid = pyramid([(-1, -1), (1, -1), (0, 1)], [(0, 1, 2)])
+    parts = layered(solid, (0,))
+    np.testing.assert_array_equal(parts.corners, np.sort(solid.cells, axis=1))
+    np.testing.assert_array_equal(parts.places, [np.eye(4)])

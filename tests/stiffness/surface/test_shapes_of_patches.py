@@ -23,9 +23,9 @@ from tests.solids_for_tests import bar, cylinder
 FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface
 
 
-def loose(*triangles, unit=1.0):
+def loose(*triangles, unit=1.0, shift=(0.0, 0.0, 0.0)):
     """Triangles that share nothing, and one that makes the box sqrt 2 across."""
-    corners = np.array([*triangles, FAR]).reshape(-1, 3)
+    corners = np.array([*triangles, FAR]).reshape(-1, 3) + shift
     return Surface(unit * corners, np.arange(len(corners)).reshape(-1, 3), "loose")
 
 
@@ -97,15 +97,18 @@ def spoke(low, high):
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
 def test_a_disc_has_what_lies_within_its_radius(unit):
     """To 0.2 %; what goes from 1 % inside to 1 % outside is cut, and refused."""
-    radius = 0.2
-    disc = parse_interface(f"disc=0,0,0/0,0,1/{unit * radius}")
+    radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
+    center = ",".join(map(str, unit * shift))
+    disc = parse_interface(f"disc={center}/0,0,1/{unit * radius}")
     ends = [(0.1, 0.999), (0.5, 1.001), (0.98, 1.003), (0.995, 1.05), (1.2, 1.4)]
     fine = [spoke(low * radius, high * radius) for low, high in ends]
-    surface = loose(*fine, unit=unit)
+    surface = loose(*fine, unit=unit, shift=shift)
     assert triangles_on(surface, disc, "base").tolist() == [0, 1]
     for low, high, cut in ((0.98, 1.02, True), (0.98, 1.009, False),
                            (0.992, 1.02, False)):  # fmt: skip
-        surface = loose(*fine, spoke(low * radius, high * radius), unit=unit)
+        surface = loose(
+            *fine, spoke(low * radius, high * radius), unit=unit, shift=shift
+        )
         if cut:
             words = f"loose: the tip interface {disc} [m] cuts 1 triangles; a disc must"
             with pytest.raises(BadInput, match=re.escape(words)):
