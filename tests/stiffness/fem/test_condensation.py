@@ -82,8 +82,8 @@ def scaled_screw(screw):
 
 @pytest.mark.parametrize("size", sorted(permutations([1.0, 0.3, 0.02])))
 def test_six_supports_hold_a_body_of_any_shape_and_turn(rng, size):
-    """No rigid motion of a flat, long or thick body leaves them all at rest: the least
-    is a fiftieth of the thickness to the length."""
+    """No rigid motion of a flat, long or thick body rests them all; the second
+    node is the furthest from the first, the third the furthest from their line."""
     solid = box_solid((1, 2, 1), np.array(size))
     for turn in (np.eye(3), *(rotation_matrix(rng.normal(size=3)) for _ in range(4))):
         body = Solid(
@@ -93,19 +93,30 @@ def test_six_supports_hold_a_body_of_any_shape_and_turn(rng, size):
         mesh = isoparametric(body, 2)
         supports = _isostatic_supports(mesh)
         assert len(set(supports.tolist())) == 6
+        first, second, third = mesh.nodes[supports[[0, 3, 5]] // 3]
+        apart = np.linalg.norm(mesh.nodes - first, axis=1)
+        assert np.linalg.norm(second - first) > apart.max() * (1 - 1e-9)
+        line = (second - first) / np.linalg.norm(second - first)
+        off = np.linalg.norm(np.cross(mesh.nodes - first, line), axis=1)
+        assert np.linalg.norm(np.cross(third - first, line)) > off.max() * (1 - 1e-9)
         motions = rigid_motions(mesh.nodes, mesh.nodes.mean(axis=0)).reshape(-1, 6)
         assert np.linalg.svd(motions[supports], compute_uv=False)[-1] > 0.02
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stiffness_is_twice_the_energy_of_its_fields(kind):
-    """K by assembling all of it; the base rests, the tip's mean motion is the screw."""
+    """K by assembling all of it; the base rests, the tip's mean motion is the screw,
+    and forces act at the interfaces alone."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     solution = condense(mesh, *constants(mesh), CENTERS, kind)
     upper = assemble(mesh, *constants(mesh)).toarray()
     whole = upper + np.triu(upper, 1).T
     flat = solution.fields.reshape(-1, 6)
     K = solution.stiffness
+    forces = (whole @ flat).reshape(-1, 3, 6)
+    away = np.ones(len(mesh.nodes), dtype=bool)
+    away[np.unique(mesh.faces[mesh.patch <= 1])] = False
+    assert np.abs(forces[away]).max() < 1e-9 * np.abs(forces).max()
     assert np.abs(scaled(flat.T @ whole @ flat - K, K)).max() < 1e-9
     means = [
         np.einsum(
