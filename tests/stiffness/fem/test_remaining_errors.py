@@ -54,7 +54,8 @@ def share_of_the_rest(ratio):
     return min(3**-b / (2**-b - 3**-b), 3.0)
 
 
-@pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0])
+# at -3.75 the stress of some elements has its least value in their middle: no slope
+@pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0, -3.75, -3.5])
 @pytest.mark.parametrize("stiffness", [E, 7.0])
 def test_the_remaining_error_follows_from_the_decay(bend, stiffness):
     """u = z^2 / 2 + c z^3 / 3: a stress z + c z^2.  By what cases are compared is the
