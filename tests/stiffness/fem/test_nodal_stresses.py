@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
+from stiffness.fem import stress as stress_module
 from stiffness.fem.elements import isoparametric, lame
 from stiffness.fem.error_indicator import VOIGT
 from stiffness.fem.stress import (
     StressInfluence,
     _interface_radius,
     _nodal_stresses,
+    peak_stress,
     stress_influence,
     von_mises,
 )
@@ -148,3 +150,53 @@ def test_the_peak_is_at_the_node_of_the_largest_equivalent_stress(rng):
     words = "9 nodes at least 0.1 m away from both interfaces"
     assert stress.region.startswith(words)
     assert not stress.reentrant_edges
+
+
+@pytest.mark.parametrize(
+    ("tip_moment", "place", "largest", "whole"),
+    [
+        # arms in lengths of the beam: the force bends the base most, or the tip if a
+        # moment there turns against it
+        (0.0, 0.1, 0.9, 1.0),
+        (0.5, 0.1, 1.4, 1.5),
+        (-1.5, 0.9, 1.4, 1.5),
+    ],
+)
+def test_beside_the_peak_stands_the_beams_between_the_same_sections(
+    rng, monkeypatch, tip_moment, place, largest, whole
+):
+    """A bar in any direction from anywhere, M = (tip's + L - x) F, stress M R / I."""
+    axes = rotation_matrix(rng.normal(size=3))
+    d, u = axes[:, 0], axes[:, 1]
+    base, length, radius, force = np.array([3.0, -2.0, 1.0]), 2.0, 0.03, 7.0
+    wrench = np.r_[tip_moment * length * force * np.cross(d, u), force * u]
+    field = StressInfluence(rng.normal(size=(4, 3)), rng.normal(size=(4, 6, 6)), 0.2)
+    asked = []
+
+    def influence(solved, away):
+        asked.append(away)
+        return field
+
+    monkeypatch.setattr(stress_module, "stress_influence", influence)
+    link = SimpleNamespace(base=base, tip=base + length * d)
+    solved = SimpleNamespace(link=link)
+    peak = peak_stress(solved, wrench, section={"radius": radius}, away=0.2)
+    assert asked == [0.2]
+    unit = length * force * radius / (np.pi / 4 * radius**4)
+    stress, where = peak.beam
+    # of the 360 fibres one is within half a degree of the furthest
+    assert stress == pytest.approx(largest * unit, rel=1e-4)
+    assert peak.beam_whole == pytest.approx(whole * unit, rel=1e-4)
+    assert (where - base) @ d == pytest.approx(place * length)
+    out = (where - base) - place * length * d
+    assert np.linalg.norm(out) == pytest.approx(radius)
+    assert abs(out @ u) == pytest.approx(radius, rel=1e-4)
+    value, somewhere = field.peak(wrench)
+    assert peak.von_mises == value
+    np.testing.assert_array_equal(peak.place, somewhere)
+    np.testing.assert_array_equal(peak.wrench, wrench)
+    assert (peak.away, peak.region) == (0.2, field.region)
+    alone = peak_stress(solved, wrench)
+    assert alone.von_mises == value
+    assert alone.beam is None
+    assert np.isnan(alone.beam_whole)
