@@ -89,3 +89,19 @@ def test_where_mkl_is_not_installed_there_is_no_library(monkeypatch):
 
     monkeypatch.setattr(sparse_solver, "files", absent)
     assert _mkl() is None
+
+
+@pytest.mark.parametrize("best", ["PARDISO", "SuperLU"])
+def test_unless_another_is_wanted_the_machines_best_solver_is_used(monkeypatch, best):
+    asked = []
+
+    def by_pardiso(upper, loads):
+        asked.append("PARDISO")
+        return loads / 2
+
+    monkeypatch.setattr(sparse_solver, "_solve_with_pardiso", by_pardiso)
+    monkeypatch.setattr(sparse_solver, "solver_name", lambda: best)
+    twice, loads = csr_array(2.0 * np.eye(3)), np.ones((3, 2))
+    for wish in (None, "PARDISO", "SuperLU"):
+        np.testing.assert_allclose(solve(twice, loads, wish), 0.5)
+    assert len(asked) == (2 if best == "PARDISO" else 1)
