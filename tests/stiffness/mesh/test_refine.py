@@ -109,8 +109,8 @@ def test_a_split_edge_has_its_middle_and_each_cell_there_two_halves(rng):
 @pytest.mark.parametrize("solid", [crooked(np.random.default_rng(1)),
                                    bar_solid(2, 4, 0.02, 0.1)])  # fmt: skip
 def test_faces_stay_the_boundary_outward_and_of_their_patch(solid):
-    """Each patch keeps the sum of its faces' vectors where its shape is unknown; a bar's
-    side stays on its circle, and no end shrinks."""
+    """Each patch keeps the sum of its faces' vectors where its shape is unknown; a
+    bar's side stays on its circle, and no end shrinks."""
     asked = np.random.default_rng(2).integers(1, 4, len(solid.cells))
     finer = refine(solid, asked).solid
     faces = {tuple(np.roll(f, -int(np.argmin(f)))) for f in finer.faces}
