@@ -180,7 +180,7 @@ def test_projecting_nothing_gives_nothing():
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 def test_a_point_goes_to_the_common_line_of_two_round_shapes(unit):
-    """To rounding, by Newton's method: the first step alone leaves a hundredth."""
+    """To rounding, by Newton's method: the first step alone leaves a tenth."""
     sphere = Sphere(unit * CENTER, 2.0 * unit)
     cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
     points = ring_points([1.3, 0.9], [1.6, -1.9])
