@@ -108,3 +108,13 @@ def test_a_bar_without_a_hole_is_a_tube_of_inner_radius_zero():
     for size in (1e-41, 1e41, math.nan):
         with pytest.raises(BadInput, match="no size of a section"):
             check_section("link", {"radius": size})
+
+
+@pytest.mark.parametrize(
+    ("nu", "factor"), [(0.0, 5 / 6), (0.3, 130 / 153), (-0.5, 10 / 13)]
+)
+def test_a_rectangles_shear_factor_is_cowpers(nu, factor):
+    """10 (1 + nu) / (12 + 11 nu), whatever its sides; 5 / 6 where nothing shrinks."""
+    for sides in ((0.1, 0.3), (0.3, 0.1), (1.0, 1.0)):
+        section = rectangular_section(*sides, nu)
+        assert (section.shear_y, section.shear_z) == pytest.approx((factor, factor))

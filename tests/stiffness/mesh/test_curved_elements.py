@@ -183,11 +183,16 @@ def test_what_does_not_fold_is_left_as_it_is():
 
 
 def test_a_cells_faces_are_of_the_boundarys_patches_or_inside():
-    """The k-th face lacks corner 3 - k; looked up one by one."""
-    solid = box_solid((2, 2, 1), (1.0, 1.0, 1.0))
-    corners = np.sort(solid.cells, axis=1)
+    """The k-th face lacks corner 3 - k; looked up one by one, however corners are
+    numbered."""
+    solid = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
+    name = np.random.default_rng(8).permutation(len(solid.points))
+    points = np.empty_like(solid.points)
+    points[name] = solid.points
     numbers = np.arange(len(solid.faces)) % 7
-    solid = Solid(solid.points, solid.cells, solid.faces, numbers, (None,) * 7)
+    cells, faces = name[solid.cells], name[solid.faces]
+    solid = Solid(points, cells, faces, numbers, (None,) * 7)
+    corners = np.sort(cells, axis=1)
     known = {frozenset(f): n for f, n in zip(solid.faces, numbers, strict=True)}
     expected = [
         [known.get(frozenset(np.delete(cell, 3 - k)), -1) for k in range(4)]
