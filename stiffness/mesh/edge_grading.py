@@ -31,15 +31,19 @@ ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their out
 LAYER_SHARE = 0.25  # thickness of the layer over the element's; 0.15 to 0.3 do as well
 _PASSES = 100  # of splitting joining edges; 3 to 12 do for the links of meshes/
 _REENTRANT = np.cos(np.radians(35.0))  # a flatter re-entrant edge is hardly singular
-# a prism's six corners so turned that the k-th comes first (Dompierre et al. 1999)
-_TURNS = np.array([
-    [0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4],
-    [3, 5, 4, 0, 2, 1], [4, 3, 5, 1, 0, 2], [5, 4, 3, 2, 1, 0],
-])  # fmt: skip
-_CUTS = np.array([
-    [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
-    [[0, 1, 2, 4], [0, 4, 2, 5], [0, 4, 5, 3]],
-])
+# edges that are cut where a corner is singular, or an edge: singular corners first
+_CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
+# parts by corners, 0 to 3, and cuts in this order, from 4 on.  A small tetrahedron and
+# a prism, or two prisms; each is three tetrahedra by the diagonals that start at its
+# sides' smallest numbers, so that neighbours agree (Dompierre et al. 1999).  Corners'
+# numbers rise and cuts' follow them: the diagonals are the same in all tetrahedra.
+_PARTS = {
+    1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
+    2: np.array([
+        [0, 4, 5, 7], [0, 4, 7, 6], [0, 6, 7, 1],
+        [2, 4, 6, 7], [2, 4, 7, 5], [2, 5, 7, 3],
+    ]),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,51 +166,26 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = LAYER_SHARE) -> 
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)
     kinds = on.sum(axis=1)
-    split_edges_of = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
     cut = np.unique(
         np.concatenate([
             edge_code(corners[kinds == k][:, pairs].reshape(-1, 2), count)
-            for k, pairs in split_edges_of.items()
+            for k, pairs in _CUT_EDGES.items()
         ])
     )
     pieces = [(corners[kinds == 0], places[kinds == 0], parts.parent[kinds == 0])]
-    for kind, pairs in split_edges_of.items():
+    for kind, pairs in _CUT_EDGES.items():
         own, near = corners[kinds == kind], places[kinds == kind]
         new = count + np.searchsorted(cut, edge_code(own[:, pairs], count))
         start, end = np.array(pairs).T
         between = (1 - share) * near[:, start] + share * near[:, end]
         own, near = np.hstack([own, new]), np.concatenate([near, between], axis=1)
-        members = _corner_parts(own) if kind == 1 else _edge_parts(own)
-        row = np.arange(len(own))[:, None, None]
+        members = _PARTS[kind]
         pieces.append((
-            own[row, members].reshape(-1, 4),
-            near[row, members].reshape(-1, 4, 4),
-            np.repeat(parts.parent[kinds == kind], members.shape[1]),
+            own[:, members].reshape(-1, 4),
+            near[:, members].reshape(-1, 4, 4),
+            np.repeat(parts.parent[kinds == kind], len(members)),
         ))
     corners, places, parent = (np.concatenate(v) for v in zip(*pieces, strict=True))
     order = np.argsort(corners, axis=1)
     corners = np.take_along_axis(corners, order, axis=1)
     return Parts(corners, np.take_along_axis(places, order[:, :, None], axis=1), parent)
-
-
-def _corner_parts(numbers: NDArray) -> NDArray:
-    """(t, 4, 4) parts of tetrahedra whose corner 0 is singular."""
-    # 4, 5, 6 are the cuts on the way to 1, 2, 3
-    tip = np.broadcast_to([[[0, 4, 5, 6]]], (len(numbers), 1, 4))
-    return np.concatenate([tip, _prism_parts([4, 5, 6, 1, 2, 3], numbers)], axis=1)
-
-
-def _edge_parts(numbers: NDArray) -> NDArray:
-    """(t, 6, 4) parts of tetrahedra whose edge 01 is singular."""
-    # 4, 5 are the cuts on the way from 0 to 2, 3 and 6, 7 from 1
-    wedge = _prism_parts([0, 4, 5, 1, 6, 7], numbers)
-    return np.concatenate([wedge, _prism_parts([2, 4, 6, 3, 5, 7], numbers)], axis=1)
-
-
-def _prism_parts(prism: list[int], numbers: NDArray) -> NDArray:
-    """(t, 3, 4) tetrahedra of prisms, by the diagonals from the smallest numbers."""
-    local = np.array(prism)
-    local = local[_TURNS[numbers[:, local].argmin(axis=1)]]
-    named = np.take_along_axis(numbers, local, axis=1)
-    other = np.minimum(named[:, 1], named[:, 5]) > np.minimum(named[:, 2], named[:, 4])
-    return np.take_along_axis(local[:, None, :], _CUTS[other.astype(int)], axis=2)

@@ -104,11 +104,11 @@ def mesh_solid(
     key = f"{_FORMAT} {surface.digest()} {edge / surface.diagonal:.4e} {envelope:.4e}"
     name = hashlib.sha256(key.encode()).hexdigest()[:32]
     path = (cache_folder() if cache is None else Path(cache)) / f"mesh-{name}.npz"
-    points, cells = _from_cache(path) or (None, None)
-    if points is None or cells is None:
-        points, cells = _tetrahedralize(surface, edge, envelope, time_limit)
-        _to_cache(path, points, cells)
-    return fit_to_patches(points, cells, surface, patches)
+    mesh = _from_cache(path)
+    if mesh is None:
+        mesh = _tetrahedralize(surface, edge, envelope, time_limit)
+        _to_cache(path, *mesh)
+    return fit_to_patches(*mesh, surface, patches)
 
 
 def cache_folder() -> Path:
@@ -132,7 +132,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
     proper = points.ndim == 2 and cells.ndim == 2 and np.isfinite(points).all()
-    return (points, cells) if proper and cells.max() < len(points) else None
+    return (points, cells) if proper and (cells < len(points)).all() else None
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
@@ -261,7 +261,7 @@ def _nearest_patch(
     outward = surface.normals()
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
     center = corners.mean(axis=1)
-    size = np.sqrt(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) ** 2)
+    size = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     best, patch = np.full(len(faces), np.inf), np.zeros(len(faces), dtype=int)
     for weight in (0.0, 0.4, 0.8):
         for k in range(3 if weight else 1):

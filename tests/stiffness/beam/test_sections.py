@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from numpy.polynomial import Polynomial
 
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import (
@@ -108,3 +109,70 @@ def test_a_bar_without_a_hole_is_a_tube_of_inner_radius_zero():
     for size in (1e-41, 1e41, math.nan):
         with pytest.raises(BadInput, match="no size of a section"):
             check_section("link", {"radius": size})
+
+
+@pytest.mark.parametrize(
+    ("nu", "factor"), [(0.0, 5 / 6), (0.3, 130 / 153), (-0.5, 10 / 13)]
+)
+def test_a_rectangles_shear_factor_is_cowpers(nu, factor):
+    """10 (1 + nu) / (12 + 11 nu), whatever its sides; 5 / 6 where nothing shrinks."""
+    for sides in ((0.1, 0.3), (0.3, 0.1), (1.0, 1.0)):
+        section = rectangular_section(*sides, nu)
+        assert (section.shear_y, section.shear_z) == pytest.approx((factor, factor))
+
+
+def thin_shear_factor(h, b, web, flange, webs, nu):
+    """Cowper's integral over thin walls: webs along x at y = b / 2, or one at y = 0.
+
+    2 (1 + nu) I / (nu / 2 (I_y - I) - A / I times the integral of x (chi + x y^2)),
+    chi by the shear flow: its slope along a wall is -2 (1 + nu) I tau - n_x (nu x^2 / 2
+    + (1 - nu / 2) y^2) - n_y (2 + nu) x y; zero at x = 0.
+    """
+    s, up = Polynomial([0.0, 1.0]), h / 2
+    y = b / 2 if webs == 2 else 0.0
+    area = webs * web * h + 2 * flange * b
+    second = webs * web * h**3 / 12 + 2 * flange * b * up**2
+    other = webs * web * h * y**2 + 2 * flange * b**3 / 12
+    # each web takes what half of a flange gathers, or both halves
+    gathered = up * flange * b / webs
+    tau = gathered / web + (up**2 - s**2) / 2
+    slope = -2 * (1 + nu) * tau - nu * s**2 / 2 - (1 - nu / 2) * y**2
+    chi = slope.integ()
+    corner = chi(up)
+    total = webs * 2 * web * (s * (chi + s * y**2)).integ()(up)
+    # in the flange from the web on: outward to its end, or inward to the middle
+    tau = up * (b / 2 - s) if webs == 1 else -up * s
+    chi = (-2 * (1 + nu) * tau - (2 + nu) * up * s).integ()
+    chi = chi + (corner - chi(y))
+    total += 4 * flange * (up * (chi + up * s**2)).integ()(b / 2)
+    return 2 * (1 + nu) * second / (nu / 2 * (other - second) - area / second * total)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, -0.4])
+@pytest.mark.parametrize(("b", "h"), [(0.06, 0.1), (0.2, 0.05), (0.1, 0.1)])
+def test_shear_factors_of_thin_sections_are_cowpers_integral(b, h, nu):
+    """Of a box in both directions; of an I along its web, and across as of its flanges,
+    two rectangles."""
+    wall, web, flange = 0.002, 0.003, 0.005
+    box = box_section(b + wall, h + wall, wall, nu)
+    across, along = (
+        thin_shear_factor(*sides, wall, wall, 2, nu) for sides in ((b, h), (h, b))
+    )
+    assert (box.shear_y, box.shear_z) == pytest.approx((across, along), rel=1e-9)
+    beam = i_section(b, h + flange, web, flange, nu)
+    expected = thin_shear_factor(h, b, web, flange, 1, nu)
+    assert beam.shear_z == pytest.approx(expected, rel=1e-9)
+    share = 2 * b * flange / (2 * b * flange + (h - flange) * web)
+    rectangle = rectangular_section(1.0, 1.0, nu).shear_y
+    assert beam.shear_y == pytest.approx(share * rectangle, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("web", "flange"), [(0.06, 0.008), (0.07, 0.008), (0.006, 0.05), (0.006, 0.06)]
+)
+def test_an_i_has_a_web_narrower_than_it_and_flanges_that_leave_one(web, flange):
+    """Of 60 by 100 mm: either alone is refused, and what is just within is not."""
+    words = "i_section: web or flange is thicker than the section allows"
+    with pytest.raises(BadInput, match=words):
+        i_section(0.06, 0.1, web, flange, NU)
+    assert i_section(0.06, 0.1, min(web, 0.0599), min(flange, 0.0499), NU).area > 0

@@ -43,3 +43,9 @@ def test_an_element_is_of_the_last_material_that_says_its_centre():
         material_of_elements(mesh, [stiff, soft][:1])
     with pytest.raises(BadInput, match="at least one"):
         material_of_elements(mesh, [])
+
+
+def test_a_material_may_be_as_soft_and_light_as_one_likes():
+    mesh = isoparametric(box_solid((1, 1, 1), np.array([0.1, 0.1, 0.1])), 2)
+    table = material_of_elements(mesh, [Material(1e-3, 0.25)])
+    np.testing.assert_allclose(table, [[4e-4, 4e-4, 0.0]] * len(mesh.cells))

@@ -17,11 +17,15 @@ from stiffness.mesh.edge_grading import (
     split_joining_edges,
 )
 from stiffness.mesh.lagrange import FACES
+from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.mesh.refine import edges_of
+from stiffness.surface.primitives import Plane
 from tests.solids_for_tests import (
+    Z,
     bar_solid,
     box_solid,
     masked_solid,
+    outward,
     with_plane_sides,
 )
 
@@ -205,3 +209,65 @@ def test_a_smooth_box_stays_whole():
     assert split_joining_edges(solid, ()).cells.shape == solid.cells.shape
     mesh = isoparametric(solid, 3, layered(solid, ()))
     assert len(mesh.nodes) == prod(3 * n + 1 for n in (2, 2, 3))
+
+
+def bent_plate(angle, unit, way):
+    """A plate of 2 by 1 by 1, bent along the middle by an angle toward y or away."""
+    solid = box_solid((2, 1, 2), (2.0, 1.0, 1.0))
+    x, y, z = solid.points.T
+    points = np.column_stack([x, y + way * np.tan(angle) * np.maximum(x - 1, 0), z])
+    return with_plane_sides(
+        Solid(unit * points, solid.cells, solid.faces, solid.patch,
+              (solid.shapes[0], Plane(unit * Z, Z), None))
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_inner_edge_of_more_than_35_degrees_is_singular(unit, way):
+    """On the side toward which a plate is bent; on the other it is an outer one."""
+    for degrees, edges in ((34.0, 0), (36.0, 2), (60.0, 2)):
+        solid = bent_plate(np.radians(degrees), unit, way)
+        found = singular_edges(solid, ())
+        assert len(found) == edges
+        places = solid.points[found] / unit
+        np.testing.assert_allclose(places[..., 0], 1.0)
+        np.testing.assert_allclose(places[..., 1], 1.0 if way > 0 else 0.0, atol=1e-12)
+
+
+def pyramid(base, triangles):
+    """A pyramid of height 5 whose base is patch 0, on triangles of its corners."""
+    points = np.array([*[[x, y, 0.0] for x, y in base], [0.0, 0.0, 5.0]])
+    apex = len(base)
+    cells = outward(points, np.array([[*corners, apex] for corners in triangles]))
+    faces = boundary_faces(cells)
+    low = (faces < apex).all(axis=1)
+    patch = np.where(low, 0, np.arange(len(faces)) + 1)
+    return Solid(points, cells, faces, patch, (None,) * (len(faces) + 1))
+
+
+@pytest.mark.parametrize(
+    ("base", "triangles"),
+    [
+        # the only edge that joins two singular ones is the shortest of all
+        ([(-0.1, 0), (0.1, 0), (0, 1), (0, -1)], [(0, 1, 2), (0, 1, 3)]),
+        # or the longest
+        ([(-3, 0), (3, 0), (0, 1), (0, -1)], [(0, 1, 2), (0, 1, 3)]),
+        # a face between singular edges alone
+        ([(-1, -1), (1, -1), (0, 1)], [(0, 1, 2)]),
+    ],
+)
+def test_a_clamped_base_is_split_until_no_edge_joins_two_of_its_sides(base, triangles):
+    whole = pyramid(base, triangles)
+    solid = split_joining_edges(whole, (0,))
+    check_chordless(solid, (0,))
+    assert solid.volumes().sum() == pytest.approx(whole.volumes().sum(), rel=1e-12)
+    assert len(solid.cells) > len(whole.cells)
+
+
+def test_what_touches_more_than_an_edge_of_the_singular_ones_stays_whole():
+    """A clamped triangle that was not split before; its neighbours' corners too."""
+    solid = pyramid([(-1, -1), (1, -1), (0, 1)], [(0, 1, 2)])
+    parts = layered(solid, (0,))
+    np.testing.assert_array_equal(parts.corners, np.sort(solid.cells, axis=1))
+    np.testing.assert_array_equal(parts.places, [np.eye(4)])

@@ -104,6 +104,100 @@ def test_a_damaged_cache_file_is_made_anew(tmp_path, monkeypatch):
         assert len(kept.read_bytes()) == len(whole)
 
 
+@pytest.mark.parametrize(
+    ("points", "cells"),
+    [
+        ("flat", "whole"), ("whole", "flat"), ("not a number", "whole"),
+        ("one too few", "whole"), ("whole", "none"),
+    ],
+)  # fmt: skip
+def test_a_cached_mesh_that_cannot_be_one_is_made_anew(
+    tmp_path, monkeypatch, points, cells
+):
+    """Arrays of another shape, numbers that are none, corners of no point."""
+    cube, made = kuhn_cube(2), []
+
+    def fake(*given):
+        made.append(given)
+        return cube.points, cube.cells
+
+    wrong = {
+        "flat": lambda array: array.ravel(),
+        "whole": lambda array: array,
+        "not a number": lambda array: np.where(array == array.max(), np.nan, array),
+        "one too few": lambda array: array[: cube.cells.max()],
+    }
+    monkeypatch.setattr(mesh_module, "_tetrahedralize", fake)
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    mesh_solid(surface, *faces, cache=tmp_path)
+    mesh_solid(surface, *faces, cache=tmp_path)
+    assert len(made) == 1
+    (kept,) = tmp_path.iterdir()
+    arrays = {"points": wrong[points](cube.points)}
+    if cells in wrong:
+        arrays["cells"] = wrong[cells](cube.cells)
+    np.savez(kept, **arrays)
+    assert mesh_solid(surface, *faces, cache=tmp_path).volumes().min() > 0
+    assert len(made) == 2
+
+
+def test_every_edge_has_a_mesh_of_its_own_in_the_cache(tmp_path, monkeypatch):
+    """Seventeen that differ by a thousandth: more than a hexadecimal digit can name."""
+    cube = kuhn_cube(1)
+    monkeypatch.setattr(
+        mesh_module, "_tetrahedralize", lambda *_: (cube.points, cube.cells)
+    )
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    for edge in 0.02 * (1 + 0.001 * np.arange(17)):
+        mesh_solid(surface, *faces, edge=edge, cache=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 17
+
+
+def test_what_the_mesher_is_asked_for(tmp_path, monkeypatch):
+    """Edges of a 20th of the diagonal and 300 s at most unless others are wanted; a
+    coarser surface may leave the part by the envelope's share of the diagonal."""
+    cube, asked, tolerances = kuhn_cube(2), [], []
+    monkeypatch.setattr(
+        mesh_module,
+        "coarser_surface",
+        lambda s, tolerance: tolerances.append(tolerance) or (s.points, s.triangles),
+    )
+
+    def mesher(command, timeout, **_):
+        with np.load(command[3]) as given:
+            asked.append([*given["settings"], timeout])
+        np.savez(command[4], points=cube.points, cells=cube.cells)
+        return subprocess.CompletedProcess(command, 0, b"", b"")
+
+    monkeypatch.setattr(mesh_module.subprocess, "run", mesher)
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    mesh_solid(surface, *faces, cache=tmp_path)
+    other = {"edge": 0.02, "envelope": 1e-3, "time_limit": 7.0}
+    mesh_solid(surface, *faces, **other, cache=tmp_path)
+    diagonal = 0.1 * np.sqrt(3)
+    np.testing.assert_allclose(asked, [[diagonal / 20, 5e-4, 300], [0.02, 1e-3, 7]])
+    np.testing.assert_allclose(tolerances, [5e-4 * diagonal, 1e-3 * diagonal])
+
+
+@pytest.mark.parametrize("words", ["first\nno inside", "no inside\n"])
+def test_a_mesher_without_an_answer_is_reported_with_its_last_words(
+    tmp_path, monkeypatch, words
+):
+    """A surface that it takes for no solid has no tetrahedra."""
+
+    def mesher(command, **_):
+        np.savez(command[4], points=CUBE, cells=np.zeros((0, 4), dtype=int))
+        return subprocess.CompletedProcess(command, 0, b"", words.encode())
+
+    monkeypatch.setattr(mesh_module.subprocess, "run", mesher)
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    with pytest.raises(MeshFailed, match=r"bar: the mesher gave nothing no inside$"):
+        mesh_solid(bar(), *faces, cache=tmp_path)
+
+
 def test_the_mesher_is_ended_when_its_time_is_up(tmp_path):
     """0.05 s is less than a Python process needs to start."""
     faces = parse_interface("z=0"), parse_interface("z=0.1")

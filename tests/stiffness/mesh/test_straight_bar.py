@@ -79,3 +79,130 @@ def test_a_square_bar_bends_alike_about_both_axes_and_its_estimate_covers_its_er
     size = np.sqrt(np.outer(np.diag(K), np.diag(K)))
     off = np.abs((coarse.stiffness - K) / size).max()
     assert off < coarse.relative_error_estimate
+
+
+def bounds_of_angle(radius, inner):
+    """The most that an element around a full circle may see, of three limits."""
+    eighth = 2 * np.pi / 8
+    # a chord leaves its arc by radius angle^2 / 8: 0.008 of the length at most
+    arc = np.sqrt(8 * 0.008 / radius)
+    # and by an eighth of the wall
+    wall = np.sqrt((radius - inner) / radius)
+    return eighth, arc, wall
+
+
+@pytest.mark.parametrize(
+    ("section", "limit"),
+    [
+        ({"radius": 0.02}, 0),
+        ({"radius": 0.2}, 1),
+        ({"radius": 2.0}, 1),
+        ({"radius": 0.02, "inner_radius": 0.005}, 0),
+        ({"radius": 0.3, "inner_radius": 0.1}, 1),
+        ({"radius": 0.03, "inner_radius": 0.0285}, 2),
+    ],
+)
+def test_a_circle_has_as_few_elements_as_its_chords_allow(section, limit):
+    """Eight; more where chords would leave a length's 0.008 or the wall's eighth."""
+    radius, inner = section["radius"], section.get("inner_radius", 0.0)
+    bounds = bounds_of_angle(radius, inner)
+    assert np.argmin(bounds) == limit
+    solid = straight_bar(section)
+    end = solid.points[solid.points[:, 2] == 0.0]
+    away = np.linalg.norm(end[:, :2], axis=1)
+    count = np.isclose(away, radius).sum()
+    assert 2 * np.pi / count <= min(bounds) * (1 + 1e-12)
+    assert 2 * np.pi / (count - 1) > min(bounds)
+    # one element through a wall, two rings and the axis in a full section
+    rings = [inner, radius] if inner else [0.0, 0.5 * radius, radius]
+    expected = np.repeat(rings, [1 if r == 0.0 else count for r in rings])
+    np.testing.assert_allclose(np.sort(away), expected, atol=1e-12)
+    # a polygon's area in place of the circle's
+    area = count / 2 * np.sin(2 * np.pi / count) * (radius**2 - inner**2)
+    assert solid.volumes().sum() == pytest.approx(area, rel=1e-12)
+
+
+LAYERS = [
+    ({"radius": 0.5}, 0.25),
+    ({"width": 0.4, "height": 3.0}, 0.25),
+    ({"width": 0.9, "height": 0.04}, 0.04),
+    ({"radius": 0.3, "inner_radius": 0.29}, 0.01),
+    ({"width": 0.02, "height": 0.01}, 0.01),
+    ({"width": 0.1, "height": 0.2, "web": 0.01, "flange": 0.02}, 0.01),
+]
+
+
+@pytest.mark.parametrize(("section", "first"), LAYERS)
+def test_layers_are_thin_at_both_ends_and_double_inward(section, first):
+    """As few as reach the middle: from the smallest thickness, a quarter at most, each
+    twice the one before until it is two widths long."""
+    solid = straight_bar(section)
+    heights = np.unique(solid.points[:, 2].round(12))
+    steps = np.diff(heights)
+    assert (heights[0], heights[-1]) == (0.0, 1.0)
+    np.testing.assert_allclose(steps, steps[::-1], atol=1e-11)
+    width = 2 * section["radius"] if "radius" in section else section["width"]
+    half, expected = steps[: len(steps) // 2], [first]
+    while sum(expected) < 0.5:
+        expected.append(min(2 * expected[-1], 2 * width))
+    assert len(steps) == 2 * len(expected)
+    np.testing.assert_allclose(
+        half, np.array(expected) * 0.5 / sum(expected), atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("section", "x", "y"),
+    [
+        # between the cuts no side is longer than four of the smallest thickness
+        ({"width": 0.1, "height": 0.3}, [-0.05, 0.05], [-0.15, 0.15]),
+        ({"width": 0.1, "height": 0.41}, [-0.05, 0.05], [-0.205, 0.0, 0.205]),
+        (
+            {"width": 0.1, "height": 0.2, "wall": 0.02},
+            [-0.05, -0.03, 0.03, 0.05],
+            [-0.1, -0.08, 0.0, 0.08, 0.1],
+        ),
+        (
+            {"width": 0.1, "height": 0.16, "web": 0.01, "flange": 0.02},
+            [-0.05, -0.0275, -0.005, 0.005, 0.0275, 0.05],
+            [-0.08, -0.06, -0.02, 0.02, 0.06, 0.08],
+        ),
+    ],
+)
+def test_an_angular_section_is_cut_at_its_walls_and_no_finer_than_need_be(
+    section, x, y
+):
+    """Corners of its rectangles, halved by a diagonal, and no others."""
+    solid = straight_bar(section)
+    end = solid.points[solid.points[:, 2] == 0.0]
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    if "wall" in section:
+        inside = (np.abs(X) > 0.0299) | (np.abs(Y) > 0.0799)
+    elif "web" in section:
+        inside = (np.abs(X) < 0.0051) | (np.abs(Y) > 0.0599)
+    else:
+        inside = np.ones(X.shape, dtype=bool)
+    expected = np.column_stack([X[inside], Y[inside]])
+    order = [np.lexsort(p.round(9).T) for p in (expected, end[:, :2])]
+    np.testing.assert_allclose(end[order[1], :2], expected[order[0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
+def test_each_side_of_a_bar_is_a_patch(section):
+    """Round ones by radius, the outer first; flat ones across x, then across y."""
+    solid = straight_bar(section)
+    corners = solid.points[solid.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ends = np.abs(normals[:, 2]) > 1e-9 * np.linalg.norm(normals, axis=1)
+    np.testing.assert_array_equal(solid.patch < 2, ends)
+    np.testing.assert_allclose(corners[ends][..., 2].T, [solid.patch[ends]] * 3)
+    if "radius" in section:
+        radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
+        assert [shape.radius for shape in solid.shapes[2:]] == radii
+        expected = np.array(radii)[solid.patch[~ends] - 2]
+        away = np.linalg.norm(corners[~ends][..., :2], axis=2)
+        np.testing.assert_allclose(away.T, [expected] * 3, rtol=1e-12)
+    else:
+        assert solid.shapes[2:] == (None, None)
+        across = np.abs(normals[~ends]).argmax(axis=1)
+        np.testing.assert_array_equal(solid.patch[~ends], 2 + across)

@@ -57,3 +57,16 @@ def test_facets_are_the_same_in_every_unit(unit):
     expected, actual = one.signed(somewhere), other.signed(unit * somewhere)
     np.testing.assert_allclose(actual[0] / unit, expected[0], atol=1e-5)
     np.testing.assert_allclose(actual[1], expected[1], atol=1e-4)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_one_facet_alone_is_flat(size):
+    """However narrow its corners are: unit normals, distances from its plane."""
+    corners = size * np.array([[0.0, 0, 2], [1, 0, 2], [0.05, 0.1, 2]])
+    facet = Facets(corners, np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(facet.normals, [[0, 0, 1]] * 3, atol=1e-12)
+    inside = np.einsum("pc,ci->pi", [[0.2, 0.3, 0.5], [0.8, 0.1, 0.1]], corners)
+    for lift in (0.1, -0.1):
+        distances, gradients = facet.signed(inside + [0, 0, lift * size])
+        np.testing.assert_allclose(distances / size, lift, atol=1e-6)
+        np.testing.assert_allclose(gradients, [[0, 0, 1]] * 2, atol=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.interface import parse_interface
+from stiffness.surface.interface import Interface, parse_interface
 
 
 @pytest.mark.parametrize(
@@ -53,3 +53,97 @@ def test_what_is_no_interface_is_refused(text, message):
         parse_interface(text, "--base")
     assert message in str(caught.value)
     assert str(caught.value).startswith("--base: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "point", "direction"),
+    [
+        ("x=0.452", [0.452, 0, 0], [1, 0, 0]),
+        ("y=-2", [0, -2, 0], [0, 1, 0]),
+        ("plane=1,2,3/0,3,4", [1, 2, 3], [0, 0.6, 0.8]),
+        ("bore=1,2,3/0,3,4/5", [1, 2, 3], [0, 0.6, 0.8]),
+        (
+            {"plane": {"point": [1, 2, 3], "normal": [0, 3, 4]}},
+            [1, 2, 3], [0, 0.6, 0.8],
+        ),
+        (
+            {"bore": {"point": np.ones(3), "axis": [0, 3, 4], "radius": 5}},
+            [1, 1, 1], [0, 0.6, 0.8],
+        ),
+    ],
+)  # fmt: skip
+def test_an_interface_is_where_it_is_said_to_be(text, point, direction):
+    interface = parse_interface(text)
+    np.testing.assert_allclose(interface.point, point)
+    np.testing.assert_allclose(interface.direction, direction)
+    assert not interface.point.flags.writeable
+    assert not interface.direction.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("z=0.452", "plane=0,0,0.452/0,0,1"),
+        ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
+        ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
+    ],
+)
+def test_an_interface_is_written_as_it_is_read(text, written):
+    assert str(parse_interface(text)) == written
+    assert str(parse_interface(written)) == written
+
+
+def test_distances_are_from_the_plane_or_the_cylinder(rng):
+    """Along the normal, or across the axis beyond the radius; inside and outside."""
+    point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
+    u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
+    a, b = rng.normal(size=(2, 4, 5))
+    angle = rng.uniform(0, 2 * np.pi, (4, 5))
+    for text in ("plane=1,2,3/0,3,4", "disc=1,2,3/0,3,4/0.5"):
+        places = point + a[..., None] * d + b[..., None] * u
+        distance = parse_interface(text).distance(places)
+        np.testing.assert_allclose(distance, np.abs(a), atol=1e-14)
+    spokes = np.cos(angle)[..., None] * u + np.sin(angle)[..., None] * v
+    places = point + a[..., None] * d + np.abs(b)[..., None] * spokes
+    distance = parse_interface("bore=1,2,3/0,3,4/0.5").distance(places)
+    np.testing.assert_allclose(distance, np.abs(np.abs(b) - 0.5), atol=1e-14)
+    assert parse_interface("bore=1,2,3/0,3,4/0.5").distance(point) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("point", [[0.0, 0.0], [0.0, np.nan, 0.0], [np.inf, 0, 0]])
+def test_a_point_is_three_finite_numbers(point):
+    words = r"disc: the point must be 3 finite numbers \[m\]"
+    with pytest.raises(BadInput, match=words):
+        Interface("disc", point, [0, 0, 1], 1.0)
+
+
+@pytest.mark.parametrize("radius", [0, -1.0, np.inf, np.nan, "wide", None])
+def test_a_radius_of_a_table_is_a_finite_number_above_nothing(radius):
+    bore = {"point": [0, 0, 0], "axis": [0, 1, 0], "radius": radius}
+    plane = {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}, "radius": radius}
+    for name, table in (("bore.radius", {"bore": bore}), ("radius", plane)):
+        with pytest.raises(BadInput, match=f"tip: {name}: found .*a finite number > 0"):
+            parse_interface(table, "tip")
+    small = plane | {"radius": 1e-9}
+    assert parse_interface(small).radius == 1e-9
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"plane": {"point": [0, 0, 0], "normal": [0, 1, 0], "radius": 1}},
+         'plane: unknown key "radius"'),
+        ({"bore": {"point": [0, 0, 0], "axis": [0, 1, 0], "radius": 1}, "radius": 1},
+         'unknown key "radius"'),
+        ({"bore": {"point": [0, 0, 0], "axes": [0, 1, 0]}}, 'did you mean "axis"'),
+        ({"plane": [0, 0, 1]}, "found {"),
+        ({"plane": {"point": [0, 0, 0]}}, "normal: found nothing, expected 3 finite"),
+        ({"plane": {"point": [0, 0, np.inf], "normal": [0, 0, 1]}}, "point: found"),
+    ],
+)  # fmt: skip
+def test_a_table_says_what_is_wrong_with_it(table, message):
+    with pytest.raises(BadInput) as caught:
+        parse_interface(table, "tip")
+    assert str(caught.value).startswith("tip: " + message) or (
+        message.startswith("did") and message in str(caught.value)
+    )

@@ -82,3 +82,24 @@ def test_of_many_apart_only_those_that_meet_cross():
     assert np.sort(found, axis=1).tolist()[-1] == [1098, 1099]
     one = crossing_triangles(points[:3300:1100], np.array([[0, 1, 2]]))
     assert one.shape == (0, 2)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_only_touches_does_not_cross(unit, way):
+    """A needle's edge of length 2 ends in a triangle's plane, or passes its side; a
+    billionth of a length further it crosses."""
+    base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])[::way]
+
+    def crossing(at, low, high, third):
+        points = np.array([*base, [at, 0.4, low], [at, 0.4, high], third])
+        points = unit * (points + [3.0, -2.0, 1.0])
+        return len(crossing_triangles(points, np.array([[0, 1, 2], [3, 4, 5]])))
+
+    for deep, count in ((0.0, 0), (2e-10, 0), (1e-8, 1), (0.3, 1)):
+        assert crossing(0.2, -deep, 2.0, [0.2, 0.5, 5.0]) == count
+        assert crossing(0.2, -2.0, deep, [0.2, 0.5, -5.0]) == count
+        assert crossing(deep, -1.0, 1.0, [-1.0, 0.4, 3.0]) == count
+        assert crossing(0.6 - deep / 2, -1.0, 1.0, [2.0, 0.4, 3.0]) == count
+    for side in (-1e-8, 0.6 + 1e-8):
+        assert crossing(side, -1.0, 1.0, [10 * side - 3.0, 0.4, 3.0]) == 0

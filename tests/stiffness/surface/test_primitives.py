@@ -176,3 +176,18 @@ def test_projecting_onto_a_plane_takes_one_step_and_one_to_see_it(unit, monkeypa
 
 def test_projecting_nothing_gives_nothing():
     assert project(np.zeros((0, 3)), (CASES["plane"][0],)).shape == (0, 3)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_a_point_goes_to_the_common_line_of_two_round_shapes(unit):
+    """To rounding, by Newton's method: the first step alone leaves a tenth."""
+    sphere = Sphere(unit * CENTER, 2.0 * unit)
+    cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
+    points = ring_points([1.3, 0.9], [1.6, -1.9])
+    found = project(unit * points, (sphere, cylinder))
+    for shape in (sphere, cylinder):
+        np.testing.assert_allclose(shape.signed(found)[0] / unit, 0, atol=1e-12)
+    # no further than twice as far as the shapes are
+    away = [np.abs(s.signed(unit * points)[0]) for s in (sphere, cylinder)]
+    moved = np.linalg.norm(found - unit * points, axis=1)
+    assert (moved < 2 * np.max(away, axis=0) + 0.2 * unit).all()

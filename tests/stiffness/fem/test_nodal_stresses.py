@@ -1,0 +1,202 @@
+"""Stresses at nodes: exact for linear fields, the same in turned axes."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.fem import stress as stress_module
+from stiffness.fem.elements import isoparametric, lame
+from stiffness.fem.error_indicator import VOIGT
+from stiffness.fem.stress import (
+    StressInfluence,
+    _interface_radius,
+    _nodal_stresses,
+    peak_stress,
+    stress_influence,
+    von_mises,
+)
+from stiffness.screws import rotation_matrix
+from tests.solids_for_tests import bar_solid, box_solid
+
+
+def tensor(six):
+    """(..., 3, 3) of xx yy zz yz xz xy."""
+    x, y, z, yz, xz, xy = np.moveaxis(np.asarray(six), -1, 0)
+    rows = [[x, xy, xz], [xy, y, yz], [xz, yz, z]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def test_the_equivalent_stress_is_that_of_the_deviator_in_any_axes(rng):
+    """sqrt(3/2 s : s), s without its mean; the same of the turned tensor."""
+    six = rng.normal(size=(20, 6))
+    whole = tensor(six)
+    mean = np.trace(whole, axis1=1, axis2=2)[:, None, None] / 3
+    s = whole - mean * np.eye(3)
+    expected = np.sqrt(1.5 * (s**2).sum(axis=(1, 2)))
+    np.testing.assert_allclose(von_mises(six), expected, rtol=1e-12)
+    R = rotation_matrix(rng.normal(size=3))
+    turned = (R @ whole @ R.T)[:, VOIGT[:, 0], VOIGT[:, 1]]
+    np.testing.assert_allclose(von_mises(turned), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_a_linear_field_has_its_stress_at_every_node(rng, order):
+    """2 mu e + lam tr e, on bent elements too."""
+    mesh = isoparametric(bar_solid(1, 2, 0.04, 0.1), order)
+    A = rng.normal(size=(3, 3, 6))
+    lam, mu = lame(60e9, 0.3)
+    level = SimpleNamespace(
+        mesh=mesh,
+        solution=SimpleNamespace(fields=np.einsum("nx,ixk->nik", mesh.nodes, A)),
+        material=np.tile([lam, mu, 0.0], (len(mesh.cells), 1)),
+    )
+    strain = (A + A.swapaxes(0, 1)) / 2
+    stress = 2 * mu * strain + lam * np.einsum("iik->k", A) * np.eye(3)[:, :, None]
+    found = np.moveaxis(tensor(_nodal_stresses(level)), 1, -1)
+    np.testing.assert_allclose(found, [stress] * len(mesh.nodes), rtol=1e-9)
+
+
+def test_at_a_seam_the_stress_is_the_mean_of_the_elements():
+    """Two materials under one strain: a node's share of each is its elements'."""
+    mesh = isoparametric(box_solid((1, 1, 2), (1.0, 1.0, 2.0)), 2)
+    high = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)[:, 2] > 1
+    field = np.zeros((len(mesh.nodes), 3, 6))
+    field[:, 0, 5] = mesh.nodes[:, 1]  # a shear strain: stress mu in xy
+    level = SimpleNamespace(
+        mesh=mesh, solution=SimpleNamespace(fields=field),
+        material=np.column_stack([0 * high, np.where(high, 7.0, 3.0), 0 * high]),
+    )  # fmt: skip
+    found = _nodal_stresses(level)
+    expected = np.zeros((len(mesh.nodes), 6, 6))
+    for node in range(len(mesh.nodes)):
+        around = (mesh.cells == node).any(axis=1)
+        expected[node, 5, 5] = np.where(high, 7.0, 3.0)[around].mean()
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert len(np.unique(expected[:, 5, 5])) > 2
+
+
+@pytest.mark.parametrize("shift", [0.0, 3.0])
+def test_an_interface_is_as_large_as_from_its_middle_to_its_furthest_node(shift):
+    """Of a rectangle half its diagonal, wherever it lies and however it is meshed."""
+    solid = box_solid((3, 1, 1), (0.3, 0.4, 1.0))
+    stretched = solid.points.copy()
+    stretched[:, 0] = 0.3 * (stretched[:, 0] / 0.3) ** 2
+    stretched += [shift, -2 * shift, shift]
+    mesh = isoparametric(
+        type(solid)(stretched, solid.cells, solid.faces, solid.patch, (None,) * 3), 2
+    )
+    for patch in (0, 1):
+        assert _interface_radius(mesh, patch) == pytest.approx(0.25, rel=1e-9)
+
+
+def box_of_stress(tip_scale=1.0):
+    """A column of 0.3 by 0.4 by 1 m whose upper end is wider, and a made-up link."""
+    solid = box_solid((1, 1, 4), (0.3, 0.4, 1.0))
+    wider = 1 + (tip_scale - 1) * (solid.points[:, 2:] == 1.0)
+    points = solid.points * np.hstack([wider, wider, np.ones_like(wider)])
+    solid = type(solid)(points, solid.cells, solid.faces, solid.patch, (None,) * 3)
+    mesh = isoparametric(solid, 2)
+    lam, mu = lame(1.0, 0.25)
+    field = np.zeros((len(mesh.nodes), 3, 6))
+    field[:, 2, 5] = mesh.nodes[:, 2]
+    level = SimpleNamespace(
+        mesh=mesh, solid=solid, solution=SimpleNamespace(fields=field),
+        material=np.tile([lam, mu, 0.0], (len(mesh.cells), 1)),
+    )  # fmt: skip
+    link = SimpleNamespace(compliance=np.diag([1.0, 1, 1, 1, 1, 5.0]))
+    return SimpleNamespace(level=level, link=link)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
+def test_nothing_nearer_to_an_end_than_the_larger_radius_is_told(scale):
+    """A stretch of one along z, lam and lam + 2 mu, five times for a unit force."""
+    solved = box_of_stress(scale)
+    stress = stress_influence(solved)
+    assert stress.away == pytest.approx(0.25 * max(scale, 1.0), rel=1e-9)
+    height = stress.places[:, 2]
+    assert height.min() >= stress.away * (1 - 1e-9)
+    assert height.max() <= (1 - stress.away) * (1 + 1e-9)
+    expected = 5 * np.array([0.4, 0.4, 1.2, 0, 0, 0])
+    np.testing.assert_allclose(
+        stress.stresses([0, 0, 0, 0, 0, 1.0]), [expected] * len(height), atol=1e-9
+    )
+    assert np.abs(stress.influence[:, :5]).max() < 1e-12
+
+
+def test_a_layer_at_just_the_distance_belongs_to_it():
+    """Nodes at an eighth of the height; a hair more and these are out."""
+    solved = box_of_stress()
+    for away, lowest in ((0.125, 0.125), (0.125 * (1 + 1e-6), 0.25), (0.0, 0.0)):
+        stress = stress_influence(solved, away)
+        assert stress.places[:, 2].min() == pytest.approx(lowest)
+    assert len(stress.places) == len(solved.level.mesh.nodes)
+    words = "stress: nothing of the link is 0.6 m away from its interfaces; "
+    words += "the furthest node is 0.5 m"
+    with pytest.raises(BadInput, match=re.escape(words)):
+        stress_influence(solved, 0.6)
+
+
+def test_the_peak_is_at_the_node_of_the_largest_equivalent_stress(rng):
+    places, influence = rng.normal(size=(9, 3)), rng.normal(size=(9, 6, 6))
+    stress = StressInfluence(places, influence, 0.1)
+    wrench = rng.normal(size=6)
+    each = [von_mises(wrench @ node) for node in influence]
+    value, place = stress.peak(wrench)
+    assert value == pytest.approx(max(each))
+    np.testing.assert_allclose(place, places[int(np.argmax(each))])
+    words = "9 nodes at least 0.1 m away from both interfaces"
+    assert stress.region.startswith(words)
+    assert not stress.reentrant_edges
+
+
+@pytest.mark.parametrize(
+    ("tip_moment", "place", "largest", "whole"),
+    [
+        # arms in lengths of the beam: the force bends the base most, or the tip if a
+        # moment there turns against it
+        (0.0, 0.1, 0.9, 1.0),
+        (0.5, 0.1, 1.4, 1.5),
+        (-1.5, 0.9, 1.4, 1.5),
+    ],
+)
+def test_beside_the_peak_stands_the_beams_between_the_same_sections(
+    rng, monkeypatch, tip_moment, place, largest, whole
+):
+    """A bar in any direction from anywhere, M = (tip's + L - x) F, stress M R / I."""
+    axes = rotation_matrix(rng.normal(size=3))
+    d, u = axes[:, 0], axes[:, 1]
+    base, length, radius, force = np.array([3.0, -2.0, 1.0]), 2.0, 0.03, 7.0
+    wrench = np.r_[tip_moment * length * force * np.cross(d, u), force * u]
+    field = StressInfluence(rng.normal(size=(4, 3)), rng.normal(size=(4, 6, 6)), 0.2)
+    asked = []
+
+    def influence(solved, away):
+        asked.append(away)
+        return field
+
+    monkeypatch.setattr(stress_module, "stress_influence", influence)
+    link = SimpleNamespace(base=base, tip=base + length * d)
+    solved = SimpleNamespace(link=link)
+    peak = peak_stress(solved, wrench, section={"radius": radius}, away=0.2)
+    assert asked == [0.2]
+    unit = length * force * radius / (np.pi / 4 * radius**4)
+    stress, where = peak.beam
+    # of the 360 fibres one is within half a degree of the furthest
+    assert stress == pytest.approx(largest * unit, rel=1e-4)
+    assert peak.beam_whole == pytest.approx(whole * unit, rel=1e-4)
+    assert (where - base) @ d == pytest.approx(place * length)
+    out = (where - base) - place * length * d
+    assert np.linalg.norm(out) == pytest.approx(radius)
+    assert abs(out @ u) == pytest.approx(radius, rel=1e-4)
+    value, somewhere = field.peak(wrench)
+    assert peak.von_mises == value
+    np.testing.assert_array_equal(peak.place, somewhere)
+    np.testing.assert_array_equal(peak.wrench, wrench)
+    assert (peak.away, peak.region) == (0.2, field.region)
+    alone = peak_stress(solved, wrench)
+    assert alone.von_mises == value
+    assert alone.beam is None
+    assert np.isnan(alone.beam_whole)

@@ -1,0 +1,163 @@
+"""Indicated errors against the formulas of their rates, tractions by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from stiffness.fem.elements import isoparametric, lame
+from stiffness.fem.error_indicator import (
+    _energy_products,
+    _energy_roots,
+    _smallest_height,
+    error_matrices,
+    traction_errors,
+)
+from stiffness.mesh.lagrange import quadrature
+from tests.solids_for_tests import box_solid
+
+E = 60e9
+LAM, MU = lame(E, 0.3)
+
+
+def constants(mesh):
+    ones = np.ones(len(mesh.cells))
+    return LAM * ones, MU * ones
+
+
+def split_energies(mesh, stress):
+    """Energies of a stress zz less its best linear part, and of that less its mean; in
+    each element by least squares, for a unit modulus."""
+    places, weights = quadrature(6)
+    quadratic, linear = [], []
+    for corners in mesh.nodes[mesh.cells[:, :4]]:
+        root = np.sqrt(weights * abs(np.linalg.det(corners[1:] - corners[0])))
+        values = root * stress(places @ corners[:, 2])
+        A = root[:, None] * places
+        best = A @ np.linalg.lstsq(A, values)[0]
+        mean = root * (root @ best) / (root @ root)
+        quadratic.append((values - best) @ (values - best))
+        linear.append((best - mean) @ (best - mean))
+    return np.array(quadratic), np.array(linear)
+
+
+def share_of_the_rest(ratio):
+    """e_3 / s_3 if errors fall as p^-b from e_1 to e_2 to e_3 with this ratio of falls;
+    three at most."""
+    smallest, largest = 0.1, 40.0
+
+    def fall(b):
+        return (2**-b - 3**-b) / (1 - 2**-b) - ratio
+
+    if fall(smallest) < 0:
+        return 3.0
+    b = brentq(fall, smallest, largest)
+    return min(3**-b / (2**-b - 3**-b), 3.0)
+
+
+# at -3.75 the stress of some elements has its least value in their middle: no slope
+@pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0, -3.75, -3.5])
+@pytest.mark.parametrize("stiffness", [E, 7.0])
+def test_the_remaining_error_follows_from_the_decay(bend, stiffness):
+    """u = z^2 / 2 + c z^3 / 3: a stress z + c z^2.  By what cases are compared is the
+    same for both energies."""
+    mesh = isoparametric(box_solid((1, 1, 3), (0.5, 0.6, 0.8)))
+    field = np.zeros((len(mesh.nodes), 3, 1))
+    z = mesh.nodes[:, 2]
+    field[:, 2, 0] = z**2 / 2 + bend * z**3 / 3
+    s_3, s_2 = (
+        (LAM + 2 * MU) * s for s in split_energies(mesh, lambda z: z + bend * z**2)
+    )
+    expected = s_3 * [share_of_the_rest(r) for r in s_3 / s_2]
+    nowhere = np.zeros(len(mesh.cells), dtype=bool)
+    scale = np.array([[stiffness]])
+    estimate = error_matrices(mesh, field, *constants(mesh), nowhere, scale)
+    # between the table's 400 rates the share is interpolated
+    np.testing.assert_allclose(estimate[:, 0, 0], expected, rtol=5e-3, atol=1e-9 * E)
+    edge = error_matrices(mesh, field, *constants(mesh), ~nowhere, scale)
+    np.testing.assert_allclose(edge[:, 0, 0], 1.2 * s_3, rtol=1e-6)
+
+
+def test_cases_decide_together_in_proportion_to_their_stiffness():
+    """Two fields: the ratio is of the sums of energies over their stiffnesses."""
+    mesh = isoparametric(box_solid((1, 1, 1), (0.5, 0.6, 0.8)))
+    field = np.zeros((len(mesh.nodes), 3, 2))
+    z = mesh.nodes[:, 2]
+    field[:, 2, 0], field[:, 2, 1] = z**2 / 2 + z**3 / 3, z**2 / 2 + 4 * z**3 / 3
+    K = np.diag([2.0, 5.0])
+    s = [
+        [(LAM + 2 * MU) * v for v in split_energies(mesh, lambda z, c=c: z + c * z**2)]
+        for c in (1.0, 4.0)
+    ]
+    ratio = (s[0][0] / 2 + s[1][0] / 5) / (s[0][1] / 2 + s[1][1] / 5)
+    share = np.array([share_of_the_rest(r) for r in ratio])
+    nowhere = np.zeros(len(mesh.cells), dtype=bool)
+    estimate = error_matrices(mesh, field, *constants(mesh), nowhere, K)
+    for k in (0, 1):
+        np.testing.assert_allclose(estimate[:, k, k], share * s[k][0], rtol=5e-3)
+    mixed = share * np.sqrt(s[0][0] * s[1][0])  # one field's rest is the other's by 4
+    np.testing.assert_allclose(estimate[:, 0, 1], mixed, rtol=5e-3)
+
+
+def test_energy_roots_are_those_of_hookes_law(rng):
+    """lam tr^2 + 2 mu e : e', for any two fields, points and materials."""
+    G, u = rng.normal(size=(2, 4, 10, 3)), rng.normal(size=(2, 10, 3, 5))
+    lam, mu = rng.uniform(1, 3, (2, 2))
+    slope = np.einsum("cqmx,cmik->cqkix", G, u)
+    strain = (slope + slope.swapaxes(3, 4)) / 2
+    trace = np.trace(strain, axis1=3, axis2=4)
+    expected = np.einsum("c,cqk,cql->cqkl", lam, trace, trace)
+    expected += 2 * np.einsum("c,cqkij,cqlij->cqkl", mu, strain, strain)
+    roots = _energy_roots(G, u, lam, mu)
+    np.testing.assert_allclose(
+        np.einsum("cqkr,cqlr->cqkl", roots, roots), expected, atol=1e-10
+    )
+    w = rng.uniform(1, 2, (2, 4))
+    total = np.einsum("cq,cqkl->ckl", w, expected)
+    np.testing.assert_allclose(_energy_products(roots, w), total, atol=1e-10)
+
+
+SIZES = [(0.3, 0.4, 0.5), (0.3, 0.4, 0.01), (0.02, 0.4, 0.5), (30.0, 0.4, 50.0)]
+
+
+def heights(size):
+    """Of a face across x, y or z of a box of six tetrahedra: a right triangle's height
+    over its long side, or the depth of the box."""
+    found = []
+    for axis in range(3):
+        p, q = np.delete(size, axis)
+        found.append(min(p * q / np.hypot(p, q), size[axis]))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_face_is_as_high_as_its_triangle_or_its_element(size):
+    solid = box_solid((1, 1, 1), np.array(size))
+    far = solid.points + [3.0, -2.0, 1.0]
+    solid = replace(solid, points=far, shapes=(None,) * 3)
+    mesh = isoparametric(solid, 2)
+    axis = np.ptp(mesh.nodes[mesh.faces[:, :3]], axis=1).argmin(axis=1)
+    some = np.arange(len(mesh.faces))[::-1]
+    expected = heights(size)[axis[some]]
+    np.testing.assert_allclose(_smallest_height(mesh, some), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("order", [2, 3])
+def test_tractions_of_a_constant_stress_by_hand(rng, size, order):
+    """A face's energy is t^2 / (2 mu) times its area times its height over pi, for
+    every pair of fields; whichever faces are free."""
+    mesh = isoparametric(box_solid((1, 1, 1), np.array(size)), order)
+    A = rng.normal(size=(3, 3, 2))
+    fields = np.einsum("nx,ixk->nik", mesh.nodes, A)
+    strain = (A + A.swapaxes(0, 1)) / 2
+    stress = 2 * MU * strain + LAM * np.einsum("iik->k", A) * np.eye(3)[:, :, None]
+    axis = np.ptp(mesh.nodes[mesh.faces[:, :3]], axis=1).argmin(axis=1)
+    area = np.prod(size) / np.array(size)[axis] / 2
+    depth = heights(size)[axis] / np.pi
+    t = stress[:, axis]  # (3, f, k)
+    expected = np.einsum("f,ifk,ifl->fkl", area * depth / (2 * MU), t, t)
+    some = rng.permutation(len(mesh.faces))[:7]
+    found = traction_errors(mesh, fields, *constants(mesh), some)
+    np.testing.assert_allclose(found, expected[some], rtol=1e-9)

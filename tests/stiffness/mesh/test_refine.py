@@ -1,0 +1,154 @@
+"""Bisection: edges counted and ranked one by one, halves, who follows whom."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.refine import (
+    _terminal_edges,
+    chosen_by_all,
+    edge_code,
+    edges_of,
+    length_ranks,
+    refine,
+    split_edges,
+)
+from tests.solids_for_tests import bar_solid, box_solid
+
+
+def crooked(rng):
+    """A box whose corners are all shifted, so that no two edges are as long."""
+    solid = box_solid((2, 2, 2), (1.0, 1.0, 1.0))
+    points = solid.points + 0.05 * rng.uniform(-1, 1, solid.points.shape)
+    return Solid(points, solid.cells, solid.faces, solid.patch, (None,) * 3)
+
+
+def test_edges_are_the_pairs_of_each_cells_corners_once():
+    solid = box_solid((2, 3, 1), (1.0, 1.0, 1.0))
+    ends, of_cell = edges_of(solid.cells, len(solid.points))
+    pairs = {tuple(sorted(p)) for cell in solid.cells for p in combinations(cell, 2)}
+    assert [tuple(end) for end in ends] == sorted(pairs)
+    for cell, edges in zip(solid.cells, of_cell, strict=True):
+        expected = [sorted((cell[i], cell[j])) for i, j in combinations(range(4), 2)]
+        assert ends[edges].tolist() == expected
+
+
+def test_pairs_in_order_have_rising_codes():
+    pairs = np.array([[i, j] for i in range(7) for j in range(7)])
+    codes = edge_code(pairs, 7)
+    assert codes.tolist() == list(range(49))
+
+
+def test_ranks_are_by_length_and_of_equal_ones_by_place(rng):
+    x = rng.integers(0, 4, 30).astype(float)
+    points = np.column_stack([x, 0 * x, 0 * x])
+    ends = np.array(list(combinations(range(30), 2)))
+    rank = length_ranks(points, ends)
+    length = [abs(x[i] - x[j]) for i, j in ends]
+    order = sorted(range(len(ends)), key=lambda k: (length[k], k))
+    assert [order.index(k) for k in range(len(ends))] == rank.tolist()
+
+
+def test_an_edge_is_chosen_by_all_if_every_cell_around_it_chooses_it(rng):
+    _, of_cell = edges_of(box_solid((2, 2, 2), (1.0, 1.0, 1.0)).cells, 27)
+    count = of_cell.max() + 1
+    favourite = rng.permutation(count)
+    chosen = np.array([max(edges, key=lambda e: favourite[e]) for edges in of_cell])
+    every = [(chosen[(of_cell == e).any(axis=1)] == e).all() for e in range(count)]
+    assert 0 < sum(every) < count
+    assert chosen_by_all(of_cell, chosen, count).tolist() == every
+
+
+def test_edges_split_first_are_at_the_ends_of_the_paths_from_a_wanted_cell(rng):
+    """From cell to cell across their longest edges, to one that is the longest of all
+    around it (Rivara)."""
+    solid = crooked(rng)
+    ends, of_cell = edges_of(solid.cells, len(solid.points))
+    length = np.linalg.norm(np.subtract(*solid.points[ends.T]), axis=1)
+    longest = [int(max(edges, key=lambda e: length[e])) for edges in of_cell]
+    for wanted in range(0, len(solid.cells), 5):
+        marked, waiting = set(), [longest[wanted]]
+        while waiting:
+            edge = waiting.pop()
+            if edge not in marked:
+                marked.add(edge)
+                around = np.flatnonzero((of_cell == edge).any(axis=1))
+                waiting += [longest[cell] for cell in around]
+        last = {
+            e
+            for e in marked
+            if all(longest[c] == e for c in np.flatnonzero((of_cell == e).any(axis=1)))
+        }
+        mask = np.arange(len(solid.cells)) == wanted
+        split = _terminal_edges(solid.points, ends, of_cell, mask)
+        assert set(np.flatnonzero(split)) == last
+        assert last
+
+
+def test_a_split_edge_has_its_middle_and_each_cell_there_two_halves(rng):
+    solid = crooked(rng)
+    ends, of_cell = edges_of(solid.cells, len(solid.points))
+    length = np.linalg.norm(np.subtract(*solid.points[ends.T]), axis=1)
+    edge = int(np.argmax(length))
+    split = np.arange(len(ends)) == edge
+    finer, row = split_edges(solid, ends, of_cell, split)
+    assert set(row) == set(np.flatnonzero((of_cell == edge).any(axis=1)))
+    (new,) = finer.points[len(solid.points) :]
+    np.testing.assert_allclose(new, solid.points[ends[edge]].sum(axis=0) / 2)
+    halves = finer.volumes()
+    whole = solid.volumes()
+    first, second = halves[row], halves[len(whole) :]
+    np.testing.assert_allclose(first, whole[row] / 2, rtol=1e-12)
+    np.testing.assert_allclose(second, whole[row] / 2, rtol=1e-12)
+    others = np.setdiff1d(np.arange(len(whole)), row)
+    np.testing.assert_array_equal(finer.cells[others], solid.cells[others])
+
+
+@pytest.mark.parametrize("solid", [crooked(np.random.default_rng(1)),
+                                   bar_solid(2, 4, 0.02, 0.1)])  # fmt: skip
+def test_faces_stay_the_boundary_outward_and_of_their_patch(solid):
+    """Each patch keeps the sum of its faces' vectors where its shape is unknown; a
+    bar's side stays on its circle, and no end shrinks."""
+    asked = np.random.default_rng(2).integers(1, 4, len(solid.cells))
+    finer = refine(solid, asked).solid
+    faces = {tuple(np.roll(f, -int(np.argmin(f)))) for f in finer.faces}
+    expected = boundary_faces(finer.cells)
+    assert faces == {tuple(np.roll(f, -int(np.argmin(f)))) for f in expected}
+
+    def total(solid, patch):
+        a, b, c = np.moveaxis(solid.points[solid.faces[solid.patch == patch]], 1, 0)
+        return np.cross(b - a, c - a).sum(axis=0) / 2
+
+    for patch in (0, 1, 2):
+        before, after = total(solid, patch), total(finer, patch)
+        if solid.shapes[2] is None:
+            np.testing.assert_allclose(after, before, atol=1e-12)
+        elif patch < 2:
+            assert after @ before > (1 - 1e-9) * before @ before
+        else:
+            side = finer.points[finer.faces[finer.patch == 2]][..., :2]
+            np.testing.assert_allclose(np.linalg.norm(side, axis=2), 0.02, rtol=1e-9)
+    assert sum(total(finer, patch) for patch in (0, 1, 2)) == pytest.approx(
+        0, abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("halvings", [0, 1, 2, 4])
+def test_every_part_of_a_cell_is_halved_as_often_as_asked(rng, halvings):
+    """At least; and what is not asked for only where a neighbour must follow."""
+    solid = crooked(rng)
+    asked = np.zeros(len(solid.cells), dtype=int)
+    asked[7] = halvings
+    finer = refine(solid, asked)
+    volumes = finer.solid.volumes()
+    own = volumes[finer.parent == 7] / solid.volumes()[7]
+    assert own.sum() == pytest.approx(1)
+    assert own.max() <= 0.5**halvings * (1 + 1e-9)
+    steps = -np.log2(volumes / solid.volumes()[finer.parent])
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    if halvings == 0:
+        assert finer.solid.cells is solid.cells
+        assert len(finer.parent) == len(solid.cells)
+    assert asked[7] == halvings

@@ -1,0 +1,70 @@
+"""Coarser surfaces for the mesher: closed, of the same holes, as near as asked."""
+
+import numpy as np
+import pytest
+
+from stiffness.surface.decimate import (
+    _closed,
+    _distance,
+    coarser_surface,
+    euler_characteristic,
+)
+from stiffness.surface.surface import check_surface, signed_volume
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
+
+
+def test_a_surface_is_closed_if_each_edge_has_two_triangles():
+    assert _closed(CUBE_TRIANGLES)
+    assert not _closed(CUBE_TRIANGLES[1:])
+    assert not _closed(np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES[:1]]))
+
+
+def test_eulers_characteristic_is_of_what_is_there():
+    """Two a closed shell, one less for each triangle that is missing; points of no
+    triangle do not count."""
+    assert euler_characteristic(CUBE_TRIANGLES) == 2
+    assert euler_characteristic(CUBE_TRIANGLES + 5) == 2
+    assert euler_characteristic(CUBE_TRIANGLES[1:]) == 1
+    both = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+    assert euler_characteristic(both) == 4
+
+
+def test_the_distance_is_of_the_furthest_point():
+    import pyvista
+
+    mesh = pyvista.PolyData.from_regular_faces(CUBE, CUBE_TRIANGLES)
+    points = np.array([[0.05, 0.05, 0.13], [0.05, 0.05, 0.04], [-0.03, -0.04, 0.02]])
+    assert _distance(mesh, points) == pytest.approx(0.05)
+    assert _distance(mesh, points[:2]) == pytest.approx(0.04)
+
+
+def fine_cube(unit, bump=0.0):
+    """Each side in 10 by 10 squares; the middle of one is drawn out."""
+    solid = box_solid((10, 10, 10), (0.1, 0.1, 0.1))
+    used, triangles = np.unique(solid.faces, return_inverse=True)
+    points = solid.points[used]
+    points[np.linalg.norm(points - [0.05, 0.05, 0.1], axis=1) < 1e-9, 2] += bump
+    return check_surface(unit * points, triangles.reshape(-1, 3), "cube")
+
+
+@pytest.mark.parametrize("unit", [0.02, 100.0])
+def test_a_fine_cube_is_as_well_a_coarse_one(unit):
+    """Flat sides need no triangles within: a tenth and fewer, in any unit."""
+    surface = fine_cube(unit)
+    points, triangles = coarser_surface(surface, 1e-4 * unit)
+    assert len(triangles) < 0.1 * len(surface.triangles)
+    assert _closed(triangles)
+    volume = signed_volume(points, triangles)
+    assert volume == pytest.approx(1e-3 * unit**3, rel=0.01)
+    assert np.abs(np.abs(points / unit - 0.05).max(axis=1) - 0.05).max() < 1e-4
+
+
+@pytest.mark.parametrize("unit", [0.02, 100.0])
+def test_what_sticks_out_further_than_is_allowed_stays(unit):
+    """A bump of 0.8 mm: its tip is there to 0.1 mm."""
+    surface = fine_cube(unit, 8e-4)
+    points, triangles = coarser_surface(surface, 1e-4 * unit)
+    assert len(triangles) < len(surface.triangles)
+    tip = unit * np.array([0.05, 0.05, 0.1008])
+    assert np.linalg.norm(points - tip, axis=1).min() < 3e-4 * unit
+    assert points[:, 2].max() == pytest.approx(0.1008 * unit, abs=1e-4 * unit)

@@ -1,0 +1,278 @@
+"""Which triangles lie on an interface, and which shapes a part's patches are."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import (
+    _fit,
+    _ring,
+    _TriangleGraph,
+    find_patches,
+    interface_shape,
+    triangles_on,
+)
+from stiffness.surface.primitives import Cone, Plane, Sphere, Torus
+from stiffness.surface.surface import Surface, check_surface
+from tests.solids_for_tests import bar, cylinder
+
+FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface
+
+
+def loose(*triangles, unit=1.0, shift=(0.0, 0.0, 0.0)):
+    """Triangles that share nothing, and one that makes the box sqrt 2 across."""
+    corners = np.array([*triangles, FAR]).reshape(-1, 3) + shift
+    return Surface(unit * corners, np.arange(len(corners)).reshape(-1, 3), "loose")
+
+
+def tilted(angle, size):
+    """A triangle at the origin whose normal is at an angle to z."""
+    c, s = size * np.cos(angle), size * np.sin(angle)
+    return [[0, 0, 0], [c, 0, s], [0, size, 0]]
+
+
+@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("kind", ["plane=0,0,0/0,0,1", "disc=0,0,0/0,0,1/{}"])
+def test_a_triangle_on_a_plane_has_all_corners_there_and_faces_it(unit, kind):
+    """Within 1e-5 of the diagonal, either way; normals within acos 0.9."""
+    near = 1e-5 * np.sqrt(2)
+    flat = np.array(tilted(0.0, 0.1))
+    surface = loose(
+        flat + [0, 0, 0.9 * near], flat - [0, 0, 0.9 * near], flat + [0, 0, 1.1 * near],
+        flat + [[0, 0, 0], [0, 0, 0], [0, 0, 1.1 * near]], flat[::-1],
+        tilted(np.arccos(0.91), near), tilted(np.arccos(0.89), near), unit=unit,
+    )  # fmt: skip
+    interface = parse_interface(kind.format(unit))
+    assert triangles_on(surface, interface, "base").tolist() == [0, 1, 4, 5]
+
+
+def around(radius, angle, tilt=0.0):
+    """A triangle with its corners on a cylinder about z, its normal at a right angle to
+    z, or less by the tilt: two corners at one height, the third half way between."""
+    half = angle / 2
+    sagitta = radius * (1 - np.cos(half))
+    height = sagitta / np.tan(tilt) if tilt else radius
+    c, s = radius * np.cos(half), radius * np.sin(half)
+    return np.array([[c, -s, 0], [c, s, 0], [radius, 0, height]])
+
+
+@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
+def test_a_triangle_on_a_bore_has_all_corners_there_and_faces_across(unit):
+    """Within 2e-3 of the radius; normals 60 degrees and more from the axis."""
+    radius = 0.1
+    on = around(radius, 0.5)
+    out = on / radius
+    outward = out * [1, 1, 0]
+    surface = loose(
+        on + 1.9e-4 * outward, on - 1.9e-4 * outward, on + 2.1e-4 * outward,
+        on + 2.1e-4 * outward * [[1], [0], [0]], on[::-1],
+        around(radius, 0.5, tilt=np.radians(29)),
+        around(radius, 0.5, tilt=np.radians(31)), unit=unit,
+    )  # fmt: skip
+    bore = parse_interface(f"bore=0,0,0/0,0,1/{unit * radius}")
+    assert triangles_on(surface, bore, "tip").tolist() == [0, 1, 4, 5]
+
+
+@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
+def test_a_narrow_bore_is_as_near_as_a_plane_at_least(unit):
+    """1e-5 of the diagonal, where that is more than 2e-3 of the radius."""
+    radius, near = 1e-3, 1e-5 * np.sqrt(2)
+    on = around(radius, 0.5)
+    outward = on / radius * [1, 1, 0]
+    shifts = [0.9 * near, 1.1 * near]
+    surface = loose(*(on + shift * outward for shift in shifts), unit=unit)
+    bore = parse_interface(f"bore=0,0,0/0,0,1/{unit * radius}")
+    assert triangles_on(surface, bore, "tip").tolist() == [0]
+
+
+def spoke(low, high):
+    """A flat triangle between two distances from the origin."""
+    return [[low, 0, 0], [high, 0, 0], [low, 0.01, 0]]
+
+
+@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
+def test_a_disc_has_what_lies_within_its_radius(unit):
+    """To 0.2 %; what goes from 1 % inside to 1 % outside is cut, and refused."""
+    radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
+    center = ",".join(map(str, unit * shift))
+    disc = parse_interface(f"disc={center}/0,0,1/{unit * radius}")
+    ends = [(0.1, 0.999), (0.5, 1.001), (0.98, 1.003), (0.995, 1.05), (1.2, 1.4)]
+    fine = [spoke(low * radius, high * radius) for low, high in ends]
+    surface = loose(*fine, unit=unit, shift=shift)
+    assert triangles_on(surface, disc, "base").tolist() == [0, 1]
+    for low, high, cut in ((0.98, 1.02, True), (0.98, 1.009, False),
+                           (0.992, 1.02, False)):  # fmt: skip
+        surface = loose(
+            *fine, spoke(low * radius, high * radius), unit=unit, shift=shift
+        )
+        if cut:
+            words = f"loose: the tip interface {disc} [m] cuts 1 triangles; a disc must"
+            with pytest.raises(BadInput, match=re.escape(words)):
+                triangles_on(surface, disc, "tip")
+        else:
+            assert triangles_on(surface, disc, "tip").tolist() == [0, 1]
+
+
+def test_an_interface_off_the_part_is_told_where_the_part_is():
+    words = (
+        "bar: no face of the surface lies on the tip interface {} [m]; the part spans "
+    )
+    words += "x = -0.02 .. 0.02, y = -0.02 .. 0.02, z = 0 .. 0.1 m"
+    plane, disc = parse_interface("z=0.2"), parse_interface("disc=0,0,0.2/0,0,1/1")
+    with pytest.raises(BadInput, match=re.escape(words.format(plane)) + "$"):
+        triangles_on(bar(), plane, "tip")
+    words += "; a disc must be an outline of the surface's own triangles"
+    with pytest.raises(BadInput, match=re.escape(words.format(disc)) + "$"):
+        triangles_on(bar(), disc, "tip")
+
+
+def test_an_interface_is_the_shape_that_it_is_called():
+    bore = interface_shape(parse_interface("bore=1,2,3/0,3,4/0.5"))
+    assert isinstance(bore, Cone)
+    assert (bore.radius, bore.slope) == (0.5, 0.0)
+    np.testing.assert_allclose([bore.point, bore.axis], [[1, 2, 3], [0, 0.6, 0.8]])
+    for text in ("plane=1,2,3/0,3,4", "disc=1,2,3/0,3,4/0.5"):
+        plane = interface_shape(parse_interface(text))
+        assert isinstance(plane, Plane)
+        np.testing.assert_allclose([plane.point, plane.normal], [bore.point, bore.axis])
+
+
+# --- shapes --------------------------------------------------------------------------
+
+
+def revolved(profile, facets=24):
+    """A profile (r, z) turned about z, its first and last points closed by fans."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), z + 0 * angle])
+             for r, z in profile]  # fmt: skip
+    ends = [[0, 0, profile[0][1]], [0, 0, profile[-1][1]]]
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    triangles = []
+    for k in range(len(profile) - 1):
+        a, b = k * facets, (k + 1) * facets
+        triangles += [np.column_stack([i + a, j + a, j + b]),
+                      np.column_stack([i + a, j + b, i + b])]  # fmt: skip
+    last, count = (len(profile) - 1) * facets, len(profile) * facets
+    triangles += [np.column_stack([0 * i + count, j, i]),
+                  np.column_stack([0 * i + count + 1, i + last, j + last])]  # fmt: skip
+    return np.concatenate([*rings, ends]), np.concatenate(triangles)
+
+
+def patches_of(points, triangles, top):
+    surface = check_surface(points, triangles, "part")
+    ends = parse_interface("z=0"), parse_interface(f"z={top}")
+    return surface, find_patches(surface, *ends)
+
+
+@pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
+def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
+    """Ten sides meet at 36 degrees and are planes, eleven at 33 and are a cylinder."""
+    for sides, kind, count in ((10, Plane, 10), (11, Cone, 1)):
+        points, triangles = cylinder(0.02 * unit, 0.1 * unit, sides)
+        surface, patches = patches_of(points, triangles, 0.1 * unit)
+        shapes = patches.shapes[2:]
+        assert [type(shape) for shape in shapes] == [kind] * count
+        members = np.bincount(patches.patch)
+        assert members.tolist() == [sides, sides, *([2 * sides // count] * count)]
+        assert (patches.patch >= 0).all()
+
+
+@pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
+def test_corners_are_on_a_shape_to_two_millionths_of_the_parts_size(unit):
+    """The middle ring's corners in turn in and out."""
+    points, triangles = revolved(
+        unit * np.array([(0.02, 0), (0.02, 0.05), (0.02, 0.1)]), 12
+    )
+    diagonal = unit * np.sqrt(0.04**2 + 0.04**2 + 0.1**2)
+    spokes = points[12:24] * [1, 1, 0] / (0.02 * unit)
+    turns = np.where(np.arange(12) % 2, 1, -1)[:, None]
+    for off, kind in ((1.5e-6, Cone), (2.8e-6, type(None))):
+        moved = points.copy()
+        moved[12:24] += off * diagonal * turns * spokes
+        graph = _TriangleGraph(check_surface(moved, triangles, "part"))
+        side = np.flatnonzero(np.abs(graph.normals[:, 2]) < 0.5)
+        assert isinstance(_fit(graph, side), kind)
+
+
+def test_a_cap_with_its_corners_on_a_cylinder_is_not_of_it():
+    """A fan from a corner of the rim: all its corners are on the cylinder."""
+    points, triangles = cylinder(0.02, 0.1, 24)
+    i = np.arange(1, 23)
+    caps = [np.column_stack([0 * i, i + 1, i]), np.column_stack([0 * i, i, i + 1]) + 24]
+    surface = check_surface(
+        points[:48], np.concatenate([triangles[:48], *caps]), "prism"
+    )
+    along = np.abs(surface.normals()[:, 2]) > 0
+    graph = _TriangleGraph(surface)
+    cone = Cone(np.zeros(3), np.array([0.0, 0, 1]), 0.02)
+    every = np.arange(len(surface.triangles))
+    np.testing.assert_array_equal(graph.fits(cone, every), ~along)
+    inside_out = Cone(np.zeros(3), np.array([0.0, 0, -1]), 0.02)
+    np.testing.assert_array_equal(graph.fits(inside_out, every), ~along)
+    assert not graph.fits(Cone(np.zeros(3), cone.axis, 0.0201), every).any()
+
+
+@pytest.mark.parametrize("rings", [0, 1, 2, 4])
+def test_a_seed_grows_by_a_facet_to_each_side_and_over_no_sharp_edge(rings):
+    """On a prism of sixteen sides: 2 n + 1 of them, two triangles each."""
+    surface = bar(16)
+    graph = _TriangleGraph(surface)
+    side = np.abs(surface.normals()[:, 2]) < 1e-12
+    flat = graph.connected_parts(side, 1 - 1e-10)
+    seed = int(np.flatnonzero(side)[5])
+    members = _ring(graph, np.ones_like(side), flat, seed, rings)
+    assert side[members].all()
+    assert len(members) == 2 * (2 * rings + 1)
+    normals = graph.normals[members]
+    widest = np.arccos(np.clip(normals @ graph.normals[seed], -1, 1)).max()
+    assert widest == pytest.approx(rings * 2 * np.pi / 16, abs=1e-6)
+
+
+def points_on(shape, count):
+    """Somewhere on each shape, in general position."""
+    rng = np.random.default_rng(4)
+    a, b = rng.uniform(0.2, 1.4, (2, count))
+    if shape is Plane:
+        return np.column_stack([a, b, 0 * a])
+    if shape is Cone:
+        return np.column_stack([
+            (2 + 0.3 * b) * np.cos(a),
+            (2 + 0.3 * b) * np.sin(a),
+            b,
+        ])
+    if shape is Sphere:
+        return np.column_stack([
+            np.cos(a) * np.cos(b),
+            np.sin(a) * np.cos(b),
+            np.sin(b),
+        ])
+    a, b = 2.4 * np.arange(count), 0.9 * np.arange(count)
+    r = 2 + 0.5 * np.cos(b)
+    return np.column_stack([r * np.cos(a), r * np.sin(a), 0.5 * np.sin(b)])
+
+
+@pytest.mark.parametrize(
+    ("shape", "least"), [(Plane, 3), (Cone, 7), (Sphere, 7), (Torus, 12)]
+)
+def test_a_shape_is_that_of_so_many_points_at_least(shape, least):
+    """Seven for what six numbers or fewer determine, twelve for a torus."""
+
+    def recognised(count):
+        points = points_on(shape, count)
+        normals = np.tile([0.0, 0, 1], (count, 1))
+        if shape is Cone:
+            normals = points * [1, 1, 0]
+            normals[:, 2] = -0.3 * np.linalg.norm(normals, axis=1)
+        graph = SimpleNamespace(
+            points=points, triangles=np.arange(count)[:, None].repeat(3, axis=1),
+            normals=normals, tolerance=1e-8,
+        )  # fmt: skip
+        return _fit(graph, np.arange(count))
+
+    assert recognised(least - 1) is None
+    for count in (least, least + 1, 150):
+        assert isinstance(recognised(count), shape)

@@ -1,0 +1,212 @@
+"""What a surface is refused for, to the last triangle, and what is mended in it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface import surface as surface_module
+from stiffness.surface.surface import (
+    Surface,
+    area_vectors,
+    check_surface,
+    directed_edges,
+    read_surface,
+)
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, cylinder
+
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+CORNERS = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
+    """Legs 3 and 4 in the plane z = 7: 6 upward; turned over, downward."""
+    points = np.array([[1.0, 2, 7], [4, 2, 7], [1, 6, 7]])
+    triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0]])
+    expected = [[0, 0, 6], [0, 0, 6], [0, 0, -6]]
+    np.testing.assert_allclose(area_vectors(points, triangles), expected, rtol=1e-14)
+    surface = Surface(points, triangles, "legs")
+    assert surface.area == pytest.approx(18)
+    assert surface.diagonal == pytest.approx(5)
+
+
+def test_edges_run_as_their_triangles_do():
+    edges = directed_edges(np.array([[4, 7, 2], [1, 0, 3]]))
+    assert edges.tolist() == [[4, 7], [7, 2], [2, 4], [1, 0], [0, 3], [3, 1]]
+
+
+def test_a_digest_is_of_the_geometry_alone():
+    """To the last bit of a coordinate and the last corner; of no name, no layout."""
+    one = Surface(CUBE, CUBE_TRIANGLES, "one")
+    same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
+    assert one.digest() == same.digest()
+    moved, turned = CUBE.copy(), CUBE_TRIANGLES.copy()
+    moved[3, 1] = np.nextafter(moved[3, 1], 1)
+    turned[5] = turned[5][[1, 2, 0]]
+    assert len({one.digest(), Surface(moved, CUBE_TRIANGLES, "one").digest(),
+                Surface(CUBE, turned, "one").digest()}) == 3  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "hint"),
+    [
+        (19.99, "m", None), (20.01, "m", "mm"), (20.01, "mm", "m"),
+        (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
+    ],
+)  # fmt: skip
+def test_a_part_of_no_plausible_size_betrays_its_unit(size, unit, hint):
+    """A millimetre to twenty metres across."""
+    points = CUBE * size / (0.1 * np.sqrt(3))
+    if hint is None:
+        check_surface(points, CUBE_TRIANGLES, "part", unit)
+        return
+    words = f'part: the part is {size:.4g} m across with unit = "{unit}"; '
+    words += f'is the file in "{hint}"?'
+    with pytest.raises(BadInput, match="^" + re.escape(words) + "$"):
+        check_surface(points, CUBE_TRIANGLES, "part", unit)
+
+
+def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
+    """What is said beside it does not count; for other files it does."""
+    points, triangles = cylinder()
+    monkeypatch.setattr(
+        surface_module, "_read_triangles", lambda *_: (points, triangles)
+    )
+    assert read_surface("bar.STEP", "mm").diagonal == pytest.approx(
+        read_surface("bar.stl", "m").diagonal
+    )
+    tenth = read_surface("bar.stl", "dm").diagonal
+    assert tenth == pytest.approx(0.1 * read_surface("bar.stp", "dm").diagonal)
+
+
+@pytest.mark.parametrize("corner", [-1, 8])
+def test_a_corner_beyond_the_points_is_refused(corner):
+    wrong = CUBE_TRIANGLES.copy()
+    wrong[-1, 0] = corner
+    words = "cube: a triangle has a corner that is not among the points"
+    with pytest.raises(BadInput, match=words):
+        check_surface(CUBE, wrong, "cube")
+
+
+def test_points_of_no_triangle_are_of_no_concern():
+    """Neither one that is no number nor one far away."""
+    points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
+    surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
+    assert surface.volume == pytest.approx(1e-3)
+    assert len(surface.points) == 8
+    assert surface.repairs == ()
+
+
+def test_four_triangles_are_the_least_that_bound_a_solid():
+    assert check_surface(CORNERS, TETRAHEDRON, "one").volume == pytest.approx(1e-3 / 6)
+    words = "one: 3 proper triangles bound no solid"
+    with pytest.raises(BadInput, match=words):
+        check_surface(CORNERS, TETRAHEDRON[:3], "one")
+    flat = np.concatenate([TETRAHEDRON[:3], [[0, 0, 3], [3, 1, 1], [2, 1, 2]]])
+    with pytest.raises(BadInput, match=words):
+        check_surface(CORNERS, flat, "one")
+
+
+@pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [1, 0, 1]])
+def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
+    triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
+    surface = check_surface(CUBE, triangles, "cube")
+    assert len(surface.triangles) == 12
+    assert surface.repairs == ("1 triangles without area dropped",)
+
+
+@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
+def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
+    """A second corner for one triangle of a cube: a slit that is closed or refused."""
+    size = unit * 0.1 * np.sqrt(3)
+    for gap, closed in ((0.9e-7 * size, True), (1.1e-7 * size, False)):
+        points = np.concatenate([unit * CUBE, [unit * CUBE[7] + [gap, 0, 0]]])
+        triangles = CUBE_TRIANGLES.copy()
+        triangles[3, triangles[3] == 7] = 8
+        if closed:
+            surface = check_surface(points, triangles, "cube")
+            assert surface.repairs == ("1 pairs of nearly equal vertices merged",)
+            assert len(surface.points) == 8
+        else:
+            with pytest.raises(BadInput, match="cube: the surface is open: 4 edges"):
+                check_surface(points, triangles, "cube")
+
+
+def test_a_wall_within_a_part_has_edges_of_three_triangles():
+    """Two tetrahedra on one base that is there once."""
+    points = np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]])
+    below = np.array([[0, 1, 4], [1, 2, 4], [2, 0, 4]])[:, ::-1]
+    triangles = np.concatenate([TETRAHEDRON, below])
+    with pytest.raises(BadInput, match="pyramids: 3 edges are shared by more than two"):
+        check_surface(points, triangles, "pyramids")
+
+
+@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
+def test_a_flat_surface_encloses_no_volume(unit):
+    """Less than a million millionth of its diagonal's cube, wherever it lies."""
+    for share in (1e-11, 1e-13):
+        points = unit * CORNERS.copy()
+        diagonal = unit * 0.1 * np.sqrt(2)
+        points[3] = unit * np.array([0.03, 0.03, 0.0])
+        points[3, 2] = share * diagonal**3 * 6 / (unit * 0.1) ** 2
+        if share > 1e-12:
+            surface = check_surface(points, TETRAHEDRON, "sheet")
+            assert surface.volume == pytest.approx(share * diagonal**3, rel=1e-3)
+            check_surface(points + [5 * unit, 0, 0], TETRAHEDRON, "sheet")
+        else:
+            with pytest.raises(BadInput, match="sheet: the surface encloses no volume"):
+                check_surface(points, TETRAHEDRON, "sheet")
+
+
+@pytest.mark.parametrize("turned", [1, 5, 7, 11])
+@pytest.mark.parametrize("hollow", [False, True])
+def test_however_triangles_are_turned_the_part_is_the_same(rng, turned, hollow):
+    """The smaller number of a shell's is turned; then a shell that is inside out."""
+    mixed = CUBE_TRIANGLES.copy()
+    some = rng.choice(12, turned, replace=False)
+    mixed[some] = mixed[some][:, ::-1]
+    points, triangles, expected = CUBE, mixed, 1e-3
+    if hollow:  # a cavity whose triangles look as a cavity's should
+        points = np.concatenate([CUBE, 0.5 * CUBE + 0.025])
+        triangles = np.concatenate([mixed, CUBE_TRIANGLES[:, ::-1] + 8])
+        expected = 1e-3 * 7 / 8
+    surface = check_surface(points, triangles, "cube")
+    assert surface.volume == pytest.approx(expected)
+    words = [f"{min(turned, 12 - turned)} triangles turned to agree with the rest"]
+    if turned > 6:
+        words.append("the surface was inside out and has been turned")
+    assert surface.repairs == tuple(words)
+    edges = {tuple(edge) for edge in directed_edges(surface.triangles)}
+    assert edges == {(b, a) for a, b in edges}
+
+
+def test_a_second_body_is_named_by_its_middle():
+    far = CUBE + [0.3, 0.4, 0.5]
+    points = np.concatenate([2 * CUBE, far])
+    triangles = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+    words = "cubes: 2 separate bodies, the second near (0.3"
+    with pytest.raises(BadInput, match=re.escape(words)) as no:
+        check_surface(points, triangles, "cubes")
+    place = np.array([float(v) for v in re.findall(r"0\.\d+", str(no.value))])
+    corners = far[CUBE_TRIANGLES].reshape(-1, 3).mean(axis=0)
+    np.testing.assert_allclose(place, corners, rtol=1e-3)
+
+
+def test_where_a_surface_cuts_itself_is_said():
+    """The cube's top drawn up to a spike, or down through its bottom: the middle of two
+    triangles that cross is named, one of the spike's and one of the bottom's."""
+    sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]
+    bottom = [t for t in CUBE_TRIANGLES if (CUBE[t][:, 2] == 0.0).all()]
+    ring = [1, 5, 7, 3, 1]
+    spike = [[a, b, 8] for a, b in zip(ring, ring[1:], strict=False)]
+    triangles = np.array([*sides, *spike])
+    up = np.concatenate([CUBE, [[0.06, 0.03, 0.15]]])
+    assert check_surface(up, triangles, "spike").volume == pytest.approx(7e-3 / 6)
+    down = np.concatenate([CUBE, [[0.06, 0.03, -0.05]]])
+    with pytest.raises(BadInput, match=r"cuts itself at \d+ pairs of triangles") as no:
+        check_surface(down, triangles, "spike")
+    named = re.search(r"first near \((.*)\) m; unite the parts", str(no.value))
+    place = [float(v) for v in named[1].split(", ")]
+    middles = [down[[*a, *b]].mean(axis=0) for a in spike for b in bottom]
+    assert np.abs(np.array(middles) - place).max(axis=1).min() < 1e-4
