@@ -131,6 +131,15 @@ def test_what_is_outside_is_drawn_towards_the_start_until_a_cone_is_met(
     assert 0 < share < 1
 
 
+@pytest.mark.parametrize("to", [1.05, -1.05, 1.3, -1.3])
+@pytest.mark.parametrize("at", [0.5, -0.5, 0.0])
+def test_an_interval_ends_at_one_on_either_side(at, to):
+    one = ConvexBody(
+        np.zeros(6), np.zeros((6, 1)), np.zeros((0, 1)), np.array([at]), np.arange(2)
+    )
+    assert within(one, np.array([to]))[0] == pytest.approx(np.sign(to), rel=1e-12)
+
+
 def test_what_is_within_stays(rng):
     one = body(rng, 0)
     v = 0.99 * np.array([0.6, 0.8, -1.0, 0.0, 0.6, -0.8])
