@@ -300,6 +300,21 @@ def test_newton_ends_where_nothing_can_close(careful):
     assert not fine
 
 
+@pytest.mark.parametrize(
+    ("gap", "accepted"),
+    [(0.0, True), (0.9e-5, True), (1.1e-5, False), (1e-3, False), (0.5, False)],
+)
+def test_what_no_joint_can_close_is_accepted_to_a_hundred_thousandth(gap, accepted):
+    """Of the reference length, 2 m: what rounding leaves in files may be so much."""
+    robot = Robot("gap", "far", (
+        Frame("a"), Frame("b", translation=[2 * gap, 0, 0]),
+        Frame("c", joint="revolute"), Frame("far", "c", [2.0, 0, 0]),
+    ), (("a", "b"),))  # fmt: skip
+    assert size_of(robot) == 2.0
+    _, (fine, *_) = solved(robot, np.zeros(4), [NAN] * 6, held_at(robot), careful=True)
+    assert fine == accepted
+
+
 @pytest.mark.parametrize("target", [0.55, 1.5, 4.0, -3.0])
 def test_a_crank_is_followed_as_far_as_it_is_asked_to_turn(target):
     """In the assembly mode of its start, whatever number of steps that takes."""

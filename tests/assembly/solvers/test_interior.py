@@ -173,11 +173,11 @@ def test_a_row_lost_to_rounding_is_left_alone_and_no_number_is_refused():
     nothing = np.diag([1.0, 0.0])
     assert _cholesky(nothing)
     assert nothing[1, 1] == 1e-64
-    # 1e-14 of the diagonal is still a pivot
-    near = np.array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])
-    assert _cholesky(near)
-    assert near[1, 1] > 1e6
-    assert near[1, 1] < 1e8
+    # 1e-14 of the diagonal is still a pivot, in any unit
+    for unit in (2.0**-40, 1.0, 2.0**40):
+        near = unit * np.array([[1.0, 1.0], [1.0, 1.0 + 1e-14]])
+        assert _cholesky(near)
+        assert 1e6 < near[1, 1] * np.sqrt(unit) < 1e8
     assert not _cholesky(np.diag([1.0, np.nan]))
     assert not _cholesky(np.diag([1.0, -1.0]))
 
@@ -266,3 +266,55 @@ def test_rows_that_no_clearance_closes_break_the_method_down():
     u, _, taken = interior_point(p, 1e-9, 0.0)
     assert taken == -1
     assert np.linalg.norm(u) <= 1 + 1e-9
+
+
+def programme(seed, rows):
+    rng = np.random.default_rng(seed)
+    nu = STARTS[-1]
+    H = np.linalg.qr(rng.normal(size=(nu, rows)))[0].T.copy()
+    return Programme(
+        rng.normal(size=(SPRINGS, nu)), 2.0 * rng.normal(size=SPRINGS),
+        0.3 * rng.normal(size=nu), H, H @ (0.3 * rng.uniform(-1, 1, nu)), STARTS,
+    )  # fmt: skip
+
+
+def gap_and_energy(p, u, n):
+    """|G u + h|^2 / 2 - d.u above what y = G u + h and n prove, and the first term."""
+    y = p.G @ u + p.h
+    z = p.G.T @ y + p.H.T @ n - p.d
+    sizes = np.sqrt(np.add.reduceat(z * z, STARTS[:-1]))
+    return z @ u + sizes.sum(), y @ y / 2
+
+
+@pytest.mark.parametrize("rows", [0, 2])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_method_stops_at_the_first_gap_that_is_small_enough(seed, rows):
+    """Asked a little less than it left, it takes one more step; a little more, none.
+
+    The gap in z0, s.z over all cones, is at least that which u and n prove; near the
+    end of a step the two are as good as the same.
+    """
+    p = programme(seed, rows)
+    u, n, taken = interior_point(p, 1e-3, 0.0)
+    gap, energy = gap_and_energy(p, u, n)
+    assert 0 < gap <= 1e-3
+    low, high = 0.0, 1e-3
+    for _ in range(20):
+        middle = (low + high) / 2
+        same = interior_point(p, middle, 0.0)[2] == taken
+        low, high = (low, middle) if same else (middle, high)
+    assert gap <= high
+    # the same with parts of the springs' energy, alone and beside a gap
+    for share in (0.0, 0.5):
+        beside = (1 - share) * high / energy
+        for factor, more in ((1.01, 0), (0.99, 1)):
+            asked = factor * share * high, factor * beside
+            assert interior_point(p, *asked)[2] == taken + more
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_however_large_a_gap_may_be_rows_are_closed(seed):
+    p = programme(seed, 2)
+    u, _, taken = interior_point(p, 100.0, 0.0)
+    assert taken > 0
+    assert np.abs(p.H @ u - p.k).max() < 1e-12
