@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 from assembly.exact.contact_qp import (
     ClearanceProblem,
     _active_step,
+    _newton,
     boundary_normals,
     clearance_step,
     cone_multipliers,
@@ -130,7 +131,7 @@ def active_problem(rng, rows, units=1.0):
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("units", [1e-6, 1.0])
+@pytest.mark.parametrize("units", [1e-12, 1.0, 1e6])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_step_along_boundaries_balances_and_stays_on_them(seed, rows, units):
     """S v + g + C f - H' n = 0 with C' v and H v as far as boundaries and rows are."""
@@ -162,6 +163,18 @@ def test_a_step_along_a_soft_boundary_is_shortened():
         assert change @ across < 0
     # softer still nothing that is added suffices
     assert _active_step(p, soft, 1e3 * across, u, active) is None
+
+
+@pytest.mark.parametrize("units", [1e-12, 1.0, 1e6])
+@pytest.mark.parametrize(("least", "minimum"), [(-1e-8, False), (-1e-10, True)])
+def test_a_saddle_has_no_step_even_where_nothing_pulls(least, minimum, units):
+    """Less than a billionth of the largest curvature is rounding."""
+    Q = np.linalg.qr(np.random.default_rng(4).normal(size=(6, 6)))[0]
+    S = units * Q @ np.diag([3.0, 2.0, 1.0, 1.0, 0.5, 3.0 * least]) @ Q.T
+    nothing, inside = np.zeros((0, 6)), np.full(6, 0.1)
+    p = ClearanceProblem(S, np.zeros(6), inside, GROUP, nothing, np.zeros(0))
+    step = _active_step(p, S, np.zeros(6), inside, np.zeros(3, dtype=bool))
+    assert (step is not None) == minimum
 
 
 def test_where_boundaries_or_curvature_leave_no_minimum_there_is_no_step():
@@ -251,3 +264,41 @@ def test_of_one_interval_the_step_is_the_least_of_a_parabola(push):
         step, rigid = clearance_step(p, near)
         assert step == pytest.approx([min(push, 0.8)], abs=1e-7)
         assert len(rigid) == 0
+
+
+@pytest.mark.parametrize("units", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("share", "refused"), [(0.6, False), (0.45, True)])
+def test_newtons_end_is_taken_where_the_energy_does_not_rise(share, refused, units):
+    """Rows that leave one end v: s.v + v.S v / 2 with s = -share S v."""
+    rng = np.random.default_rng(3)
+    p, v = problem(rng, 0, units=units), 0.05 * rng.normal(size=6)
+    forced = ClearanceProblem(
+        p.S, -share * p.S @ v, p.start, GROUP, np.eye(6), p.start + v
+    )
+    found = _newton(forced)
+    assert (found is None) == refused
+    if found is not None:
+        assert found[0] == pytest.approx(v, abs=1e-12)
+    assert clearance_step(forced, True)[0] == pytest.approx(v, abs=1e-6)
+
+
+def test_newtons_end_is_on_the_boundaries_to_rounding():
+    """However long its last step was, which leaves a circle by half of its square."""
+    ends = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        p = problem(rng, 0, push=10.0)
+        u = p.start + clearance_step(p, near=False)[0]
+        # on the boundaries met, and off along them
+        turned = u + 1e-3 * rng.normal(size=6)
+        on = sizes(u) > 0.999
+        turned = turned / np.where(on, sizes(turned), 1.0)[GROUP]
+        moved = ClearanceProblem(
+            p.S, p.s + p.S @ (turned - p.start), turned, GROUP, p.rows, p.right
+        )
+        found = _newton(moved)
+        if found is not None:
+            ends += 1
+            at_end = sizes(turned + found[0])
+            assert np.abs(at_end[at_end > 0.999] - 1).max(initial=0.0) < 4e-15
+    assert ends > 30
