@@ -144,10 +144,12 @@ def test_motions_of_the_basis_change_no_closure_but_those_left_to_clearances(
     assert local.rigid_right == pytest.approx(right, abs=1e-12)
 
 
-def test_rows_are_combined_into_as_many_as_are_independent(rng):
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_rows_are_combined_into_as_many_as_are_independent(rng, unit):
     rows = rng.normal(size=(2, 5))
     some = np.vstack([rows, rows[0] - 2 * rows[1], 1e-14 * rng.normal(size=5)])
-    found, how = _independent(some)
+    found, how = _independent(unit * some)
+    found = found / unit
     assert found.shape == (2, 5)
     assert how.T @ some == pytest.approx(found, abs=1e-13)
     assert how.T @ how == pytest.approx(np.eye(2), abs=1e-13)
@@ -173,8 +175,8 @@ def test_small_wrenches_are_those_of_a_billionth_in_the_stiffest_spring():
     model = FiniteRobot(posture, virtual_joints(posture.robot))
     at = place(model, np.zeros(len(model.frame)))
     local = expand(at, dead_loads(posture), np.zeros(0))
-    assert local.small_wrench == pytest.approx(1e-9 * 700.0, rel=1e-12)
-    assert local.small_energy == pytest.approx(1e-18 * 700.0 / 2, rel=1e-12)
+    assert local.small_wrench == pytest.approx(1e-9 * 700.0, rel=1e-12, abs=0)
+    assert local.small_energy == pytest.approx(1e-18 * 700.0 / 2, rel=1e-12, abs=0)
     # a length counts in reference lengths, 2 m: 10 N/m are 40 N m
     stiff = replace(frames[1], joint_stiffness=None, joint="fixed")
     soft = replace(frames[0], joint_stiffness=only(2, 30.0))
@@ -183,7 +185,15 @@ def test_small_wrenches_are_those_of_a_billionth_in_the_stiffest_spring():
     local = expand(
         place(model, np.zeros(len(model.frame))), dead_loads(posture), np.zeros(0)
     )
-    assert local.small_wrench == pytest.approx(1e-9 * 40.0, rel=1e-12)
+    assert local.small_wrench == pytest.approx(1e-9 * 40.0, rel=1e-12, abs=0)
+
+
+def test_where_no_spring_is_a_small_wrench_is_that_of_one_newton_metre_a_radian():
+    robot = Robot("pin", "tip", (Frame("tip", clearance=Clearance(axial=1e-4)),))
+    posture = home_posture(robot)
+    at = place(FiniteRobot(posture, virtual_joints(robot)), np.zeros(1))
+    local = expand(at, dead_loads(posture), np.zeros(0))
+    assert local.small_wrench == pytest.approx(1e-9, rel=1e-12, abs=0)
 
 
 def test_problems_are_named_by_robot_and_load():
