@@ -16,7 +16,7 @@ from assembly.exact.descent import (
     potential,
     problem_name,
 )
-from assembly.exact.finite_robot import FiniteRobot
+from assembly.exact.finite_robot import SPRING, FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.kinematics.se3 import inverse
@@ -230,3 +230,32 @@ def test_closures_that_no_clearance_within_its_bounds_closes_have_no_step():
     message = "rigid: no clearance within its bounds closes what no spring can"
     with pytest.raises(NotConverged, match=message):
         advance(local, 1.0, 0.0, False)
+
+
+@pytest.mark.parametrize("near", [False, True])
+def test_a_step_lowers_the_potential_by_part_of_what_is_foretold(near):
+    """Of a heavy pendulum on a weak spring, from anywhere: a full step may overshoot.
+
+    No step is longer than a radian; what was damped is damped less after a good step.
+    """
+    posture = home_posture(Robot("bar", "tip", (
+        Frame("hinge", joint="revolute", joint_stiffness=only(2, 2.0)),
+        Frame("tip", "hinge", [0.5, 0, 0]),
+    )))  # fmt: skip
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    loads = dead_loads(posture, [0, 0, 0.5, 40.0, -3.0, 0])
+    damped = 0
+    for angle in np.linspace(-3.1, 3.1, 63):
+        at = place(model, np.array([angle * np.sqrt(2.0)]))
+        assert at.screws[SPRING, 0, 2] == pytest.approx(angle, abs=1e-12)
+        before = potential(at, loads)
+        step = advance(expand(at, loads, np.zeros(0)), 1.0, 0.0, near)
+        after = potential(step.placement, loads)
+        assert before - after >= 0.99e-4 * step.gain - 1e-9
+        assert step.gain > 0
+        assert step.length <= 1.0
+        turned = abs(step.placement.screws[SPRING, 0, 2] - angle)
+        assert step.length == pytest.approx(turned, rel=1e-9)
+        damped += step.damping > 0
+        assert step.decrement == pytest.approx(step.gain, rel=1e-6)
+    assert damped > 10

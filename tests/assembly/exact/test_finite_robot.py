@@ -51,7 +51,7 @@ def test_every_unknown_is_one_screw_of_one_frame(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_springs_store_half_their_square_whatever_they_belong_to(seed):
-    """A link's screw of unknowns y has the energy y.y / 2, as has a joint's: L L' = C."""
+    """Of a link's screw or a joint's it is y.y / 2: their columns L have L L' = C."""
     model = with_all_motions(seed)
     robot = model.posture.robot
     for kind, compliances in (
