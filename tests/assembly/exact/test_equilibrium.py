@@ -18,7 +18,7 @@ from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from tests.assembly.exact.test_exact import pendulum
+from tests.assembly.exact.test_exact import only, pendulum, two_bars
 
 C = 2e-3  # [m] of plays
 
@@ -65,8 +65,32 @@ def test_a_spring_that_nothing_loads_lacks_all_its_moment():
     assert imbalance(at(pendulum(10.0, 0.5), [tiny], None)) == pytest.approx(0.25)
 
 
+@pytest.mark.parametrize(("size", "small"), [(1.0, 0.0), (1e-10, 1e-9)])
+def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
+    size, small
+):
+    """Of 1 N/m each, pulling 3 and -1: the closure carries 2, and 1 is left over.
+
+    Relative to the 2 and the spring's own 1, and to a billionth of a metre's force.
+    """
+    spring = only(3, 1.0)
+    posture = home_posture(Robot("pair", "one", (
+        Frame("a", joint_stiffness=spring), Frame("one", "a"),
+        Frame("b", joint_stiffness=spring), Frame("two", "b"),
+    ), (("one", "two"),)))  # fmt: skip
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    there = place(model, size * np.array([3.0, -1.0]))
+    local = expand(there, dead_loads(posture), np.zeros(6))
+    assert np.linalg.norm(local.multipliers) == pytest.approx(2 * size, rel=1e-6, abs=0)
+    expected = size / (2 * size + small + size)
+    assert imbalance(local) == pytest.approx(expected, rel=1e-6)
+    # in balance where they pull alike
+    there = place(model, size * np.array([2.0, -2.0]))
+    assert imbalance(expand(there, dead_loads(posture), np.zeros(6))) < 1e-9
+
+
 @pytest.mark.parametrize(
-    ("place", "force", "expected"),
+    ("at_share", "force", "expected"),
     [
         (0.0, 5.0, 0.5),  # within its bounds nothing holds it
         (1.0, 5.0, 0.0),  # pressed against its bound
@@ -78,8 +102,8 @@ def test_a_spring_that_nothing_loads_lacks_all_its_moment():
         (0.3, 0.0, 0.0),
     ],
 )
-def test_a_play_lacks_what_no_bound_holds(place, force, expected):
-    local = at(pin(axial=C), [place], [0, 0, 0, 0, 0, force])
+def test_a_play_lacks_what_no_bound_holds(at_share, force, expected):
+    local = at(pin(axial=C), [at_share], [0, 0, 0, 0, 0, force])
     assert imbalance(local) == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
@@ -156,3 +180,16 @@ def test_a_solution_is_what_the_search_says_it_is():
     assert answer.stationarity == imbalance(answer.expansion)
     assert answer.stationarity < 1e-9
     assert answer.least_curvature == least_curvature(answer.expansion)
+
+
+def test_a_bound_presses_with_the_energy_that_a_larger_play_would_save():
+    """Of a closed chain: force times play is -c dE/dc, by central differences."""
+    play, step = 5e-3, 1e-6
+    low, here, high = (
+        solve_exact(two_bars(0.06, Clearance(radial=c)))
+        for c in (play - step, play, play + step)
+    )
+    active, force = active_clearances(here.expansion)
+    assert active.tolist() == [True]
+    saved = (low.energy - high.energy) / (2 * step)
+    assert force == pytest.approx([play * saved], rel=1e-6)
