@@ -14,7 +14,7 @@ from assembly.kinematics.se3 import (
 from assembly.linear.closure import closure_signs
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import Clearance
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
 from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
@@ -284,3 +284,49 @@ def test_an_answer_shows_its_load_its_energy_and_how_good_it_is():
     assert lines["certificate"].endswith("steps")
     still = repr(solve_exact(pendulum(10.0, 0.5)))
     assert "load" not in still
+
+
+@pytest.mark.parametrize("parent", ["base", "hinge"])
+def test_the_first_body_bends_in_pieces_as_it_does_in_one(parent):
+    """From the base, or from a drive that is turned; under a small load."""
+
+    def solved(pieces):
+        beam = BeamLink({"radius": 0.01}, 7e10, 0.3, pieces=pieces)
+        drive = Frame("hinge", rotation=[0, 0.3, 0], joint="revolute", actuated=True,
+                      position=0.7)  # fmt: skip
+        arm = Frame("arm", parent, [0.5, 0.1, 0.2], [0, 0, 0.4], link=beam)
+        frames = (drive, arm) if parent == "hinge" else (arm,)
+        posture = home_posture(Robot("arm", "arm", frames))
+        return solve_exact(posture, [1e-3, 0, 2e-3, 2e-3, -4e-3, 3e-3])
+
+    one, cut = (solved(pieces).link_screws[-1] for pieces in (1, 3))
+    for part in (slice(3), slice(3, 6)):
+        size = np.abs(one[part]).max()
+        assert size > 1e-7
+        assert cut[part] == pytest.approx(one[part], rel=0, abs=1e-4 * size)
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 5])
+@pytest.mark.parametrize("radius", [0.01, 0.03])
+def test_a_load_of_any_size_is_in_balance_whatever_it_acts_on(pieces, radius):
+    """From newtons down to nanonewtons the pose is as the load: the beam is linear.
+
+    What a step gains is then far below the rounding of the load's work, and it is
+    taken all the same.
+    """
+    link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
+    arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)
+    posture = home_posture(Robot("arm", "arm", (arm,)))
+    load = np.array([0.1, 0.0, 0.2, 0.2, -0.4, 0.3])
+    C = solve_assembly(posture, load).platform_screw
+    for size in 10.0 ** np.arange(-9, 1):
+        for given in ({"load": size * load}, {"bodies": size * load[None]}):
+            answer = solve_exact(posture, **given)
+            assert answer.stationarity <= 1e-7
+            assert answer.iterations <= 4
+            for part in (slice(3), slice(3, 6)):
+                found = answer.platform_screw[part] / size
+                rounding = 1e-15 / size
+                assert found == pytest.approx(
+                    C[part], abs=1e-3 * np.abs(C[part]).max() + rounding
+                )
