@@ -8,8 +8,10 @@ from assembly.exact.dead_load import dead_loads
 from assembly.exact.descent import Step, advance, expand
 from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
+from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
-from tests.assembly.exact.test_exact import pendulum
+from assembly.model.robot import Frame, Robot
+from tests.assembly.exact.test_exact import only, pendulum
 
 K = 2.0  # [N m/rad]
 LEAST = 1e-9 * K  # [N m] wrench that counts as small, where nothing else acts
@@ -23,19 +25,18 @@ def tried(monkeypatch):
     steps, and what ``advance`` has beside; returns the step taken and what was asked.
     """
 
-    def run(y, steps, load=None, penalty=1.0, damping=0.0, near=False):
-        posture, asked = pendulum(K, 0.5), []
+    def run(y, steps, load=None, penalty=1.0, damping=0.0, near=False, posture=None):
+        posture, asked = posture or pendulum(K, 0.5), []
         model = FiniteRobot(posture, virtual_joints(posture.robot))
-        local = expand(
-            place(model, np.array([y])), dead_loads(posture, load), np.zeros(0)
-        )
+        at = place(model, np.atleast_1d(y))
+        local = expand(at, dead_loads(posture, load), np.zeros(len(at.residual)))
 
         def solve(_, damping, newton):
             asked.append((damping, newton))
             if steps[len(asked) - 1] is None:
                 return None
             new, gain, length = steps[len(asked) - 1]
-            there = place(model, np.array([new]))
+            there = place(model, np.atleast_1d(new))
             return Step(there, gain, gain, length, np.zeros(0), damping)
 
         monkeypatch.setattr(descent, "_solve", solve)
@@ -100,8 +101,29 @@ def test_what_rounding_raises_is_taken(tried, rise, taken):
     noise = 1e-13
     noise += 1e-14  # of the penalty of 1 N m
     offered = (np.sqrt(1.0 + 2 * rise * noise), 0.0, 0.1)
-    step, asked = tried(1.0, [offered, (0.5, 0.375, 0.5)])
+    step, asked = tried(1.0, [offered, (0.5, 0.375, 0.5)], damping=1e4)
     assert len(asked) == (1 if taken else 2)
+    if taken:  # what is lost in rounding is good
+        assert step.damping == pytest.approx(1e3, rel=1e-12)
+
+
+@pytest.mark.parametrize(("share", "damping"), [(0.4, 1e4), (0.6, 1e3)])
+def test_closing_counts_by_the_penalty_in_what_is_gained_and_foretold(
+    tried, share, damping
+):
+    """Two springs of 1 N/m, open by 0.04 m at 2 N: from 0.0805 J to 0.0001 J."""
+    spring = only(3, 1.0)
+    posture = home_posture(Robot("pair", "one", (
+        Frame("a", joint_stiffness=spring), Frame("one", "a"),
+        Frame("b", joint_stiffness=spring), Frame("two", "b"),
+    ), (("one", "two"),)))  # fmt: skip
+    gain = 0.0804 / share - 0.08
+    step, asked = tried(
+        [0.03, -0.01], [([0.01, 0.01], gain, 0.1)], penalty=2.0, damping=1e4,
+        posture=posture,
+    )  # fmt: skip
+    assert len(asked) == 1
+    assert step.damping == pytest.approx(damping, rel=1e-12)
 
 
 @pytest.mark.parametrize("penalty", [1.0, 50.0])
