@@ -1,5 +1,7 @@
 """Where the search for an equilibrium begins, what steps are given, where it ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,10 @@ from assembly.exact.exact import solve_exact
 from assembly.exact.finite_robot import CLEARANCE
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, Robot
 from assembly.robots.hexapod import hexapod
 from tests.assembly.exact.test_exact import pendulum
+from tests.assembly.kinematics.test_open_closures import parallelograms
 from tests.robots_for_tests import random_robot
 
 K, MOMENT = 10.0, 4.0  # [N m/rad], [N m]
@@ -144,3 +148,44 @@ def test_nothing_to_do_is_done_at_once():
     assert answer.iterations == 1
     assert answer.energy == 0.0
     assert np.abs(answer.platform_screw).max() < 1e-12
+
+
+def on_springs(joint_stiffness, *frames):
+    """The first frame on springs, others behind it."""
+    first = Frame("first", joint_stiffness=np.diag(joint_stiffness))
+    rest = [replace(f, parent=p) for f, p in zip(
+        frames, ["first", *(f.name for f in frames)], strict=False
+    )]  # fmt: skip
+    return home_posture(Robot("row", [first, *rest][-1].name, (first, *rest)))
+
+
+def test_turns_count_by_their_size_and_each_joints_by_itself(monkeypatch):
+    """Two of 0.9 rad in a row are no longer; about two axes of one joint they are."""
+    free, hinge = [np.inf] * 3, [np.inf, np.inf, K, *[np.inf] * 3]
+    row = on_springs(hinge, Frame("tip", joint_stiffness=np.diag(hinge)), Frame("end"))
+    one = on_springs([K, K, np.inf, *free], Frame("end"))
+    slide = on_springs([*free, 50.0, np.inf, np.inf], Frame("end"))
+    for posture, load, expected in (
+        (row, [0, 0, 9.0, 0, 0, 0], [0, 0, 0.9, 0, 0, 0]),
+        (one, [9.0, 9.0, 0, 0, 0, 0], [0.5**0.5, 0.5**0.5, 0, 0, 0, 0]),
+        (slide, [0, 0, 0, 150.0, 0, 0], [0, 0, 0, 3.0, 0, 0]),  # metres are no turns
+    ):
+        called = []
+
+        def stop(local, *_, called=called):
+            called.append(local.placement)
+            raise NotConverged("first", "guess")
+
+        monkeypatch.setattr(exact, "advance", stop)
+        with pytest.raises(NotConverged, match="first: guess"):
+            solve_exact(posture, load)
+        assert called[0].screws[2, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_what_rounded_files_leave_open_is_no_gap():
+    """Cranks of six digits, open by up to 1e-6 m, are as closed as they can be."""
+    posture = home_posture(parallelograms(digits=6))
+    assert posture.mismatch > 1e-9
+    answer = solve_exact(posture)
+    assert answer.iterations <= 2
+    assert answer.energy == 0.0
