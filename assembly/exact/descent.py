@@ -225,10 +225,12 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
     least = float(np.abs(local.multipliers).max(initial=local.small_wrench))
-    least = max(least, largest_wrench(start, local.loads))
+    pull = largest_wrench(start, local.loads)
+    least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    noise += 1e-14 * penalty
+    # rounding of angles and of places in reference lengths, times what acts there
+    noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
         # a refused Newton step is followed by the conic one before either is damped
         newton = near and attempt != 1

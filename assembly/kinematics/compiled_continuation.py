@@ -94,7 +94,7 @@ def follow_all(
         still_open: (k, closures) to fill [rad, m]: largest component of each closure.
     """
     count, n = held.shape
-    pose, turn = vector(6), vector(3)
+    pose, gap = vector(6), vector(6)
     for i in range(count):
         for k in range(6):
             pose[k] = poses[i, k] if len(poses) else np.nan
@@ -107,12 +107,10 @@ def follow_all(
                     T[i, j, k, l] = R[j, k, l]
         for c in range(len(tree.pairs)):
             a, b = tree.pairs[c]
-            rotation_between(R, a, R, b, turn, 0)
+            rotation_between(R, a, R, b, gap, 0)
             for k in range(3):
-                most = max(abs(turn[k]), abs(p[a, k] - p[b, k]))
-                # written so that NaN stays
-                if not most <= still_open[i, c]:
-                    still_open[i, c] = most
+                gap[3 + k] = p[a, k] - p[b, k]
+            still_open[i, c] = _largest(gap)
 
 
 @part

@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.exact.dead_load import curvature_of, dead_loads, work_gradient, work_of
+from assembly.exact.dead_load import (
+    curvature_of,
+    dead_loads,
+    work_gradient,
+    work_of,
+)
 from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import LINK
+from assembly.exact.finite_robot import LINK, FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
@@ -137,6 +143,22 @@ def test_a_beams_weight_acts_at_its_middle():
     answer = solve_exact(posture, gravity=[0, -G, 0])
     assert abs(angle) > 1.0
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-8)
+
+
+def test_a_straight_beam_off_its_place_has_its_weight_at_its_own_middle():
+    """From its erring end back along its erring axis by half of its length."""
+    beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
+    turn, off = 0.3, np.array([0.01, 0.05])
+    tip = Frame("tip", "hinge", [0.6, 0, 0], link=beam,
+                geometric_error=[0, 0, turn, *off, 0])  # fmt: skip
+    posture = on_a_hinge(5.0, tip)
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    here = place(model, np.zeros(len(model.frame)))
+    weight = 8000.0 * np.pi * 0.02**2 * 0.6 * G
+    x = 0.6 + off[0] - 0.3 * np.cos(turn)
+    hinge = model.frame == 0
+    found = work_gradient(here, dead_loads(posture, gravity=[0, -G, 0]))[hinge]
+    assert found * np.sqrt(5.0) == pytest.approx([-weight * x], rel=1e-9)
 
 
 def test_a_couple_is_two_dead_forces():

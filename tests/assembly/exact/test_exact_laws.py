@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture, place_robot
@@ -13,10 +14,12 @@ from assembly.kinematics.se3 import (
 from assembly.linear.closure import closure_signs
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import joint_compliances, link_compliances
+from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
 from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
 from stiffness.screws import rotation_matrix, rotation_vector, transform
+from tests.assembly.exact.test_exact import pendulum, two_bars
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -233,3 +236,97 @@ def test_from_a_solution_nearby_there_are_fewer_steps_to_the_same_one():
     stranger = solve_exact(posture, load, near=other)
     assert stranger.iterations == before.iterations
     assert np.array_equal(stranger.platform_screw, before.platform_screw)
+
+
+@pytest.mark.parametrize("point", [(0.2, 0.0, 0.0), (-0.1, 0.3, 0.0)])
+def test_a_force_at_a_point_of_the_platform_turns_with_it(point):
+    """k a = r x F with r = L + point, turned by a; and so starts the linear model."""
+    k, L, force = 10.0, 0.5, np.array([4.0, 9.0])
+    posture = pendulum(k, L)
+    x, y = L + point[0], point[1]
+
+    def balance(a):
+        c, s = np.cos(a), np.sin(a)
+        arm = [c * x - s * y, s * x + c * y]
+        return k * a - (arm[0] * force[1] - arm[1] * force[0])
+
+    angle = brentq(balance, -1.5, 1.5)
+    load = [0, 0, 0, *force, 0]
+    answer = solve_exact(posture, load, point=point)
+    assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
+    R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    work = force @ ((R - np.eye(2)) @ [x, y])
+    assert answer.potential == pytest.approx(k * angle**2 / 2 - work, rel=1e-9)
+    # the linear model has the same force, and its moment about the origin
+    moment = point[0] * force[1] - point[1] * force[0]
+    start = solve_assembly(posture, [0, 0, moment, *force, 0])
+    assert answer.linear.load == pytest.approx(start.load, abs=1e-12)
+    given = solve_exact(posture, load, start=start, point=point)
+    assert given.platform_screw == pytest.approx(answer.platform_screw, rel=1e-12)
+
+
+def test_where_nothing_is_forced_energies_are_compared_with_those_without_play():
+    """4 mm too long, 5 mm of play: of 1e-6 of the energy that no play would leave."""
+    found = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
+    error = found.linearisation_error
+    scale = 1e-6 * found.linear.energy_without_clearance
+    assert error.relative_energy * scale == pytest.approx(error.energy, rel=1e-12)
+    assert abs(error.relative_energy) < 1e-6
+
+
+def test_an_answer_shows_its_load_its_energy_and_how_good_it_is():
+    text = repr(solve_exact(pendulum(10.0, 0.5), [0, 0, 2.0, 0, 0, 0]))
+    lines = dict(line.split(maxsplit=1) for line in text.splitlines()[1:])
+    assert text.startswith("ExactAssembly of bar\n")
+    assert lines["load"] == "[0 0 2 0 0 0] N m, N"
+    assert lines["energy"] == "0.2 J with finite motions"
+    assert "closures hold to 0.0e+00, balance to " in lines["certificate"]
+    assert lines["certificate"].endswith("steps")
+    still = repr(solve_exact(pendulum(10.0, 0.5)))
+    assert "load" not in still
+
+
+@pytest.mark.parametrize("parent", ["base", "hinge"])
+def test_the_first_body_bends_in_pieces_as_it_does_in_one(parent):
+    """From the base, or from a drive that is turned; under a small load."""
+
+    def solved(pieces):
+        beam = BeamLink({"radius": 0.01}, 7e10, 0.3, pieces=pieces)
+        drive = Frame("hinge", rotation=[0, 0.3, 0], joint="revolute", actuated=True,
+                      position=0.7)  # fmt: skip
+        arm = Frame("arm", parent, [0.5, 0.1, 0.2], [0, 0, 0.4], link=beam)
+        frames = (drive, arm) if parent == "hinge" else (arm,)
+        posture = home_posture(Robot("arm", "arm", frames))
+        return solve_exact(posture, [1e-3, 0, 2e-3, 2e-3, -4e-3, 3e-3])
+
+    one, cut = (solved(pieces).link_screws[-1] for pieces in (1, 3))
+    for part in (slice(3), slice(3, 6)):
+        size = np.abs(one[part]).max()
+        assert size > 1e-7
+        assert cut[part] == pytest.approx(one[part], rel=0, abs=1e-4 * size)
+
+
+@pytest.mark.parametrize("pieces", [1, 3, 5])
+@pytest.mark.parametrize("radius", [0.01, 0.03])
+def test_a_load_of_any_size_is_in_balance_whatever_it_acts_on(pieces, radius):
+    """From newtons down to nanonewtons the pose is as the load: the beam is linear.
+
+    What a step gains is then far below the rounding of the load's work, and it is
+    taken all the same.
+    """
+    link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
+    arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)
+    posture = home_posture(Robot("arm", "arm", (arm,)))
+    load = np.array([0.1, 0.0, 0.2, 0.2, -0.4, 0.3])
+    C = solve_assembly(posture, load).platform_screw
+    for size in 10.0 ** np.arange(-9, 1):
+        for given in ({"load": size * load}, {"bodies": size * load[None]}):
+            answer = solve_exact(posture, **given)
+            assert answer.stationarity <= 1e-7
+            assert answer.iterations <= 4
+            for part in (slice(3), slice(3, 6)):
+                found = answer.platform_screw[part] / size
+                rounding = 1e-15 / size
+                assert found == pytest.approx(
+                    C[part], abs=1e-3 * np.abs(C[part]).max() + rounding
+                )

@@ -13,7 +13,10 @@ from assembly.kinematics.posture import (
     place_robot,
     pose_components,
 )
+from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
+from forcefit.native.libraries import by_numba
+from tests.assembly.kinematics.test_compiled_continuation import frames_of
 from tests.linkages_for_tests import five_bar, four_bar
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
@@ -114,3 +117,95 @@ def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
         for k in range(5)
     )
     assert all(np.abs(first - other).max() < 1e-6 for other in others)
+
+
+def ended(robot, start, target, guess=False):
+    """A track of numba's loops."""
+    with by_numba():
+        return follow(robot, np.array(start, dtype=float), target, guess)
+
+
+def test_frames_and_what_is_open_are_those_of_the_end():
+    """Per closure the largest of three turns and three gaps, by scipy."""
+    turns = [[1e-3, -4e-3, 2e-3], [0.0, 0.0, -3e-7], [0.0, 0.0, 0.0]]
+    gaps = [[1e-3, 0.0, -2e-3], [0.0, 2e-7, 1e-7], [3e-3, -7e-3, 5e-3]]
+    seats = [
+        Frame(f"b{k}", "a", gap, turn)
+        for k, (gap, turn) in enumerate(zip(gaps, turns, strict=True))
+    ]
+    robot = Robot("open", "a", (
+        Frame("arm", joint="prismatic", actuated=True), Frame("a", "arm", [1.0, 0, 0]),
+        *seats,
+    ), tuple(("a", seat.name) for seat in seats))  # fmt: skip
+    held = np.full((2, 5), np.nan)
+    held[:, 0] = 0.3, -0.4
+    track = ended(robot, np.zeros(5), Target(coordinates=held), guess=True)
+    for row in range(2):
+        q = [held[row, 0], 0, 0, 0, 0]
+        assert track.coordinates[row] == pytest.approx(q, abs=1e-15)
+        assert track.transforms[row] == pytest.approx(frames_of(robot, q), abs=1e-14)
+        assert track.closure_mismatch[row] == pytest.approx([4e-3, 3e-7, 7e-3])
+
+
+@pytest.mark.parametrize("loops", ["numba", "default"])
+def test_a_closure_is_open_by_no_number_where_a_frame_is_at_none(loops):
+    """However well its turns are closed, and along whichever axis."""
+    half = math.pi / 2
+    for turn in ([0, half, 0], [half, 0, 0], [0, 0, 0]):  # slides along x, y, z
+        robot = Robot("slide", "a", (
+            Frame("arm", rotation=turn, joint="prismatic"), Frame("a", "arm"),
+            Frame("b", translation=[1e-3, 0, 0]),
+        ), (("a", "b"),))  # fmt: skip
+        nowhere = np.full(3, np.nan), Target(coordinates=np.full((1, 3), np.nan)), True
+        track = (ended if loops == "numba" else follow)(robot, *nowhere)
+        assert np.isnan(track.closure_mismatch).all()
+        assert not track.reached.any()
+
+
+@pytest.mark.parametrize("loops", ["numba", "default"])
+def test_what_cannot_be_reached_stops_on_the_straight_line_to_it(loops):
+    """Of three hinges in a plane, place and turn: in parts as progress says.
+
+    The last step is 1e-5 of the way, 1 m and 1 rad.
+    """
+    robot = Robot("arm", "hand", (
+        Frame("a", joint="revolute", actuated=True, position=0.4),
+        Frame("b", "a", [0.5, 0, 0], joint="revolute", actuated=True, position=0.9),
+        Frame("c", "b", [0.4, 0, 0], joint="revolute", actuated=True, position=-0.6),
+        Frame("hand", "c", [0.1, 0, 0]),
+    ))  # fmt: skip
+    home = frames_of(robot, robot.positions)[3]
+    begin = np.array([home[0, 3], home[1, 3], 0.7])
+    goal = begin + [0.8, -0.3, 0.5]
+    pose = np.full((2, 6), np.nan)
+    pose[:, [0, 1, 5]] = goal, begin + 0.1 * (goal - begin)
+    target = Target(pose=pose)
+    if loops == "numba":
+        track = ended(robot, robot.positions, target)
+    else:
+        track = follow(robot, robot.positions, target)
+    assert track.reached.tolist() == [False, True]
+    assert 0.1 < track.progress[0] < 1
+    wanted = begin + np.outer([track.progress[0], 0.1], goal - begin)
+    T = track.transforms[:, 3]
+    found = np.c_[T[:, 0, 3], T[:, 1, 3], np.arctan2(T[:, 1, 0], T[:, 0, 0])]
+    assert found[1] == pytest.approx(wanted[1], abs=1e-9)
+    assert found[0] == pytest.approx(wanted[0], abs=2e-4)
+    # there the arm without its hand is straight
+    wrist = T[0, :2, 3] - 0.1 * T[0, :2, 0]
+    assert np.hypot(*wrist) == pytest.approx(0.9, abs=1e-4)
+
+
+def test_both_poses_and_coordinates_are_followed_together():
+    """A drive held and one component asked: the other drive closes."""
+    robot = five_bar()
+    home = ended(robot, robot.positions, Target(coordinates=np.full((1, 8), np.nan)))
+    pose, held = np.full((1, 6), np.nan), np.full((1, 8), np.nan)
+    pose[0, 0] = home.transforms[0, robot.index("right.tip"), 0, 3] + 0.02
+    held[0, 0] = robot.positions[0] + 0.03
+    track = ended(robot, robot.positions, Target(pose, held))
+    assert track.reached[0]
+    assert track.coordinates[0, 0] == held[0, 0]
+    tip = track.transforms[0, robot.index("right.tip")]
+    assert tip[0, 3] == pytest.approx(pose[0, 0], abs=1e-9)
+    assert track.mismatch[0] < 1e-9

@@ -27,8 +27,6 @@ from assembly.solvers.support import (
     ConvexBody,
     screw_at,
     support,
-    symmetric,
-    within,
 )
 
 # as Python, loops warn of what they then look at
@@ -348,29 +346,3 @@ def test_without_rows_each_clearance_lies_along_its_gradient(body):
     height, v, _, _ = support(still, 3, direction, 1e-9)
     assert height == free.centre[3]
     np.testing.assert_array_equal(v, free.start)
-
-
-def test_what_is_brought_back_lies_on_rows_and_rims(body):
-    rng = np.random.default_rng(1)
-    kernel = np.eye(6) - body.rows.T @ body.rows
-    for size in (0.1, 1.0, 10.0):
-        v = body.start + size * rng.normal(size=6)
-        inside = within(body, v)
-        np.testing.assert_allclose(body.rows @ (inside - body.start), 0, atol=1e-13)
-        wanted = kernel @ (v - body.start)
-        step = inside - body.start
-        share = (step @ wanted) / (wanted @ wanted)
-        np.testing.assert_allclose(step, share * wanted, atol=1e-12)
-        whole = lengths(body.start + wanted) <= 1
-        if whole.all():
-            assert share == pytest.approx(1.0, rel=1e-12)
-        else:  # as far as the first rim
-            assert lengths(inside).max() == pytest.approx(1.0, rel=1e-12)
-    assert lengths(inside).max() <= 1 + 1e-13
-
-
-def test_a_body_is_symmetric_where_rows_do_not_feel_its_start(body):
-    assert not symmetric(body)
-    middle = body.start - body.rows.T @ (body.rows @ body.start)
-    assert symmetric(body._replace(start=middle))
-    assert symmetric(body._replace(rows=np.zeros((0, 6))))

@@ -19,6 +19,9 @@ MATRICES = {
     "diagonal": [[3.0, 0.0, 0.0], [0.0, -2.0, 0.0], [0.0, 0.0, 1.0]],
     "twice the same": [[2.0, 1.0, 1.0], [1.0, 2.0, 1.0], [1.0, 1.0, 2.0]],
     "zero": [[0.0] * 3] * 3,
+    "only xy": [[1.0, -0.5, 0.0], [-0.5, 2.0, 0.0], [0.0, 0.0, 3.0]],
+    "only xz": [[1.0, 0.0, -0.5], [0.0, 2.0, 0.0], [-0.5, 0.0, 3.0]],
+    "only yz": [[1.0, 0.0, 0.0], [0.0, 2.0, -0.5], [0.0, -0.5, 3.0]],
     "stiff": [[1e6, 1.0, 0.0], [1.0, 1e-3, 2e-4], [0.0, 2e-4, 1.0]],
 }
 
@@ -125,4 +128,94 @@ def test_a_gradient_of_zero_bounds_nothing():
     bound = bound_of(
         X, np.zeros((0, 2)), np.zeros(2), [0, 2], np.eye(3)[0], np.zeros(0)
     )
+    assert bound == np.inf
+
+
+def largest_by_eigenvalues(Q, g):
+    """The multiplier m of the sphere is the last real eigenvalue of a block matrix.
+
+    Gander, Golub, von Matt (1989): ((Q - m)^2 - g g') x = 0 at the solution.
+    """
+    blocks = np.block([[Q, -np.eye(3)], [-np.outer(g, g), Q]])
+    m = np.linalg.eigvals(blocks).real.max()
+    values, V = np.linalg.eigh(Q)
+    # from above, as rounding moves a double root by its square root
+    return min(
+        k / 2 + ((V.T @ g) ** 2 / (2 * (k - values))).sum()
+        for k in m + np.abs([*Q.ravel(), *g]).max() * np.array([1e-8, 1e-10, 1e-12])
+        if k > values.max()
+    )
+
+
+@pytest.mark.parametrize("units", [1e-7, 1.0, 1e5])
+@pytest.mark.parametrize("name", [name for name in MATRICES if name != "zero"])
+@pytest.mark.parametrize(
+    "g", [(0.2, -0.5, 0.3), (4.0, 1.0, -2.0), (1e-3, 1e-2, -1e-3), (0.0, 0.0, 7.0)]
+)
+def test_the_largest_value_on_the_sphere_is_that_of_an_eigenvalue(name, g, units):
+    """In any unit; 1e-8 of the size is what a double root loses."""
+    Q, g = np.array(MATRICES[name]), np.array(g)
+    size = np.abs(Q).max() + np.linalg.norm(g)
+    found = largest_on_sphere(units * Q, units * g)
+    expected = largest_by_eigenvalues(Q, g)
+    assert found == pytest.approx(units * expected, rel=0, abs=1e-7 * size * units)
+
+
+def quadratic_above(X, H, start, starts, w, centre, d):
+    """At d: |w_k|^2 / (2 s_k) + s_k / 2 for each cone, with the best n for the rows."""
+    group = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    s = np.sqrt(np.bincount(group, w**2))
+    s = np.maximum(s, 1e-9 * s.max())
+    root = 1 / np.sqrt(s[group])
+    # min over n of |root (X'd - H'n)|^2 / 2 + n.H start
+    A = (root[:, None] * H.T).T
+    n = np.linalg.solve(A @ A.T, A @ (root * (X.T @ d)) - H @ start)
+    v = X.T @ d - H.T @ n
+    return (
+        d @ (centre - X @ start)
+        + n @ H @ start
+        + ((root * v) @ (root * v) + s.sum()) / 2
+    )
+
+
+@pytest.mark.parametrize("rows", [0, 1, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_bound_is_the_largest_value_of_the_quadratic_with_the_best_rows(seed, rows):
+    """Ten values on the sphere determine a quadratic; its largest by eigenvalues."""
+    rng = np.random.default_rng(seed)
+    starts = np.array([0, 2, 4, 5, 7, 8])
+    X, centre = rng.normal(size=(3, 8)), rng.normal(size=3)
+    H = np.linalg.qr(rng.normal(size=(8, rows)))[0].T
+    start = 0.3 * rng.uniform(-1, 1, 8)
+    d = rng.normal(size=(40, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    w = X.T @ d[0] - H.T @ rng.normal(size=rows)
+    values = [quadratic_above(X, H, start, starts, w, centre, one) for one in d]
+    pairs = d[:, [0, 1, 2, 0, 0, 1]] * d[:, [0, 1, 2, 1, 2, 2]]
+    terms = np.hstack([d, pairs])  # |d|^2 = 1 is the constant
+    found = np.linalg.lstsq(terms, np.array(values))[0]
+    xx, yy, zz, xy, xz, yz = found[3:]
+    Q = np.array([[2 * xx, xy, xz], [xy, 2 * yy, yz], [xz, yz, 2 * zz]])
+    bound = majorant_bound(centre, X, H, start, starts, w)
+    assert bound == pytest.approx(largest_by_eigenvalues(Q, found[:3]), rel=1e-6)
+
+
+def test_a_cone_that_the_gradient_misses_counts_as_a_billionth_of_the_largest():
+    """Interval and disc, d along the interval: d_y^2 / (2 1e-9 w) outweighs all."""
+    X = np.array([[3.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    bound = bound_of(
+        X, np.zeros((0, 3)), np.zeros(3), [0, 1, 3], np.eye(3)[0], np.zeros(0)
+    )
+    assert bound == pytest.approx(1 / (2 * 3e-9), rel=1e-7)
+    # and a gradient that is small in whatever unit is no zero
+    small = bound_of(
+        1e-6 * X, np.zeros((0, 3)), np.zeros(3), [0, 3], np.eye(3)[0], np.zeros(0)
+    )
+    assert small == pytest.approx(3e-6, rel=1e-9)
+
+
+def test_rows_that_depend_on_each_other_bound_nothing():
+    X, H = np.eye(3), np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    w = np.array([1.0, 0.0, 0.0])
+    bound = majorant_bound(np.zeros(3), X, H, np.zeros(3), np.array([0, 3]), w)
     assert bound == np.inf

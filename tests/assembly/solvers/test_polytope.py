@@ -60,24 +60,36 @@ def test_a_plane_outside_cuts_nothing_and_one_through_a_corner_neither(box):
     assert box.used.tolist() == [8, 8]
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-14, 1e9])
 @pytest.mark.parametrize("seed", range(4))
-def test_many_cuts_leave_the_corners_that_qhull_says(seed):
+def test_many_cuts_leave_the_corners_that_qhull_says(seed, unit):
+    """In whatever unit: what is rounding is measured by the corners."""
     rng = np.random.default_rng(seed)
     body = empty_polytope()
-    start_box(body, np.eye(3), LOW, HIGH)
+    start_box(body, np.eye(3), unit * LOW, unit * HIGH)
     half = [*np.c_[np.eye(3), -HIGH], *np.c_[-np.eye(3), LOW]]
     for _ in range(12):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
         height = rng.uniform(0.4, 1.5)
-        assert cut(body, normal, height)
+        assert cut(body, normal, unit * height)
         half.append(np.r_[normal, -height])
     truth = HalfspaceIntersection(np.array(half), np.zeros(3)).intersections
-    gaps = np.linalg.norm(truth[:, None] - corners(body)[None], axis=2)
+    gaps = np.linalg.norm(truth[:, None] - corners(body)[None] / unit, axis=2)
     assert gaps.min(axis=0).max() < 1e-9
     assert gaps.min(axis=1).max() < 1e-9
     largest = np.linalg.norm(truth, axis=1).max()
-    assert np.linalg.norm(farthest_corner(body)) == pytest.approx(largest, rel=1e-12)
+    found = np.linalg.norm(farthest_corner(body))
+    assert found == pytest.approx(unit * largest, rel=1e-12, abs=0)
+
+
+def test_no_new_corner_lies_beyond_the_edge_that_it_is_on(box):
+    """Both ends above the plane, one by rounding: that one is the new corner."""
+    start_box(box, np.eye(3), np.full(3, -1000.0), np.full(3, 1000.0))
+    # at x = 1000 above by 1e-11 +- 4e-12; 1e-14 of the size counts as none
+    assert cut(box, np.array([1.0, 4e-15, 0.0]), 1000.0 - 1e-11)
+    assert np.abs(corners(box)).max() <= 1000.0
+    assert (corners(box)[:, 0] > 999.0).sum() >= 4
 
 
 def test_without_room_the_corners_stay():

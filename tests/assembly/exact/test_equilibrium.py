@@ -1,0 +1,195 @@
+"""What holds at an equilibrium, and by how much where it does not: closed forms."""
+
+import numpy as np
+import pytest
+
+from assembly.exact.dead_load import dead_loads
+from assembly.exact.descent import expand
+from assembly.exact.equilibrium import (
+    active_clearances,
+    curvature_modes,
+    imbalance,
+    least_curvature,
+    tangent_space,
+)
+from assembly.exact.exact import solve_exact
+from assembly.exact.finite_robot import FiniteRobot
+from assembly.exact.placement import place
+from assembly.kinematics.posture import home_posture
+from assembly.linear.closure import virtual_joints
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from tests.assembly.exact.test_exact import only, pendulum, two_bars
+
+C = 2e-3  # [m] of plays
+
+
+def at(posture, x, load):
+    """The problem of an open chain, expanded where its unknowns are given."""
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    x = np.array(x, dtype=float)
+    assert len(x) == len(model.frame)
+    return expand(place(model, x), dead_loads(posture, load), np.zeros(0))
+
+
+def pin(**play):
+    """A frame with a play and no stiffness, the tip of the robot."""
+    frames = Frame("pin", clearance=Clearance(**play)), Frame("tip", "pin")
+    return home_posture(Robot("pin", "tip", frames))
+
+
+def two_slides(link=None):
+    """Plays of C along z, then along x; perhaps on a spring."""
+    quarter = [0, np.pi / 2, 0]
+    return home_posture(Robot("slides", "tip", (
+        Frame("near", clearance=Clearance(axial=C), link=link),
+        Frame("far", "near", rotation=quarter, clearance=Clearance(axial=C)),
+        Frame("tip", "far"),
+    )))  # fmt: skip
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9, 1.0, 2.0])
+def test_a_spring_lacks_the_part_of_its_moment_that_a_load_does_not_balance(share):
+    """|y - w| of |y - w| + w for a moment w = m / sqrt(k) of the scaled unknown y."""
+    k, m = 10.0, 3.0
+    y = share * m / np.sqrt(k)
+    local = at(pendulum(k, 0.5), [y], [0, 0, m, 0, 0, 0])
+    expected = abs(share - 1) / (abs(share - 1) + 1)
+    assert imbalance(local) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_spring_that_nothing_loads_lacks_all_its_moment():
+    assert imbalance(at(pendulum(10.0, 0.5), [0.3], None)) == pytest.approx(1.0)
+    assert imbalance(at(pendulum(10.0, 0.5), [0.0], None)) == 0.0
+    # less than that of a billionth of a radian counts by it
+    tiny = 0.25e-9 * np.sqrt(10.0)
+    assert imbalance(at(pendulum(10.0, 0.5), [tiny], None)) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(("size", "small"), [(1.0, 0.0), (1e-10, 1e-9)])
+def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
+    size, small
+):
+    """Of 1 N/m each, pulling 3 and -1: the closure carries 2, and 1 is left over.
+
+    Relative to the 2 and the spring's own 1, and to a billionth of a metre's force.
+    """
+    spring = only(3, 1.0)
+    posture = home_posture(Robot("pair", "one", (
+        Frame("a", joint_stiffness=spring), Frame("one", "a"),
+        Frame("b", joint_stiffness=spring), Frame("two", "b"),
+    ), (("one", "two"),)))  # fmt: skip
+    model = FiniteRobot(posture, virtual_joints(posture.robot))
+    there = place(model, size * np.array([3.0, -1.0]))
+    local = expand(there, dead_loads(posture), np.zeros(6))
+    assert np.linalg.norm(local.multipliers) == pytest.approx(2 * size, rel=1e-6, abs=0)
+    expected = size / (2 * size + small + size)
+    assert imbalance(local) == pytest.approx(expected, rel=1e-6)
+    # in balance where they pull alike
+    there = place(model, size * np.array([2.0, -2.0]))
+    assert imbalance(expand(there, dead_loads(posture), np.zeros(6))) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("at_share", "force", "expected"),
+    [
+        (0.0, 5.0, 0.5),  # within its bounds nothing holds it
+        (1.0, 5.0, 0.0),  # pressed against its bound
+        (-1.0, -5.0, 0.0),
+        (1.0, -5.0, 0.5),  # a bound does not pull
+        (-1.0, 5.0, 0.5),
+        (1.0 - 5e-6, 5.0, (1 - (1 - 5e-6) ** 2) / 2),  # short of where it is held
+        (1.0 - 2e-5, 5.0, 0.5),  # too far from its bound to be held
+        (0.3, 0.0, 0.0),
+    ],
+)
+def test_a_play_lacks_what_no_bound_holds(at_share, force, expected):
+    local = at(pin(axial=C), [at_share], [0, 0, 0, 0, 0, force])
+    assert imbalance(local) == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("F", [1.0, 300.0])
+def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_plays_length(F):
+    """-F c cos a: F c^2 / c per squared length along the rim, and nothing normal."""
+    local = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, 0.6 * F, 0.8 * F, 0])
+    active, force = active_clearances(local)
+    assert active.tolist() == [True]
+    assert force == pytest.approx([F * C], rel=1e-12)
+    D, H = tangent_space(local)
+    assert D.shape == (2, 1)
+    assert D[:, 0] @ [0.6, 0.8] == pytest.approx(0.0, abs=1e-12)
+    assert H[0, 0] / (D[:, 0] @ D[:, 0]) == pytest.approx(F * C, rel=1e-12)
+    assert least_curvature(local) == pytest.approx(F / C, rel=1e-12)
+    # pulled off the rim it is free, and falls
+    away = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, -0.6 * F, -0.8 * F, 0])
+    assert active_clearances(away)[0].tolist() == [False]
+    assert active_clearances(away)[1].tolist() == [0.0]
+
+
+def test_where_all_plays_are_pressed_nothing_moves():
+    local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 4.0, 0, 3.0])
+    assert active_clearances(local)[1] == pytest.approx([3 * C, 4 * C], rel=1e-12)
+    assert tangent_space(local)[0].shape == (2, 0)
+    assert least_curvature(local) == np.inf
+
+
+@pytest.mark.parametrize(("ratio", "pressed"), [(1e-8, True), (1e-10, False)])
+def test_a_play_that_touches_is_pressed_by_a_billionth_of_the_largest_force(
+    ratio, pressed
+):
+    """What touches without being pressed may leave, or is held if that is asked."""
+    local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 1e3 * ratio, 0, 1e3])
+    assert active_clearances(local)[0].tolist() == [True, pressed]
+    assert tangent_space(local)[0].shape[1] == (0 if pressed else 1)
+    assert tangent_space(local, hold_touching=True)[0].shape[1] == 0
+    inside = at(two_slides(), [1.0, 0.5], [0, 0, 0, 1e3 * ratio, 0, 1e3])
+    assert tangent_space(inside, hold_touching=True)[0].shape[1] == 1
+
+
+@pytest.mark.parametrize("stiffness", [None, 1e6])
+@pytest.mark.parametrize(("times", "pressed"), [(2.0, True), (0.5, False)])
+def test_a_force_of_an_angles_rounding_presses_nothing(times, pressed, stiffness):
+    """1e-5 of 1e-9 in the stiffest spring, here per reference length of 1 m."""
+    link = None if stiffness is None else MatrixLink(stiffness * np.eye(6))
+    springs = [0.0] * (0 if link is None else 6)
+    force = times * 1e-14 * (stiffness or 1.0)
+    local = at(two_slides(link), [*springs, 0.0, 1.0], [0, 0, 0, force, 0, 0])
+    assert active_clearances(local)[0].tolist() == [False, pressed]
+
+
+@pytest.mark.parametrize("units", [1.0, 1e-3])
+def test_modes_are_orthonormal_in_their_units_and_do_not_mix(rng, units):
+    """Whatever the basis of the motions."""
+    D, A = rng.normal(size=(7, 3)), rng.normal(size=(3, 3))
+    H, scales = A + A.T, units * rng.uniform(0.5, 2.0, 7)
+    values, motions = curvature_modes(D, H, scales)
+    assert (np.diff(values) > 0).all()
+    scaled = motions / scales[:, None]
+    assert scaled.T @ scaled == pytest.approx(np.eye(3), abs=1e-12)
+    parts = np.linalg.lstsq(D, motions)[0]
+    assert D @ parts == pytest.approx(motions, abs=1e-12 * units)
+    size = np.abs(values).max()
+    assert parts.T @ H @ parts == pytest.approx(np.diag(values), abs=1e-11 * size)
+    other = rng.normal(size=(3, 3))
+    again, _ = curvature_modes(D @ other, other.T @ H @ other, scales)
+    assert again == pytest.approx(values, abs=1e-9 * size)
+
+
+def test_a_solution_is_what_the_search_says_it_is():
+    """Its imbalance is that of the expansion it carries, of 1e-7 at most."""
+    answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 2.0, 3.0, -1.0, 0])
+    assert answer.stationarity == imbalance(answer.expansion)
+    assert answer.stationarity < 1e-9
+    assert answer.least_curvature == least_curvature(answer.expansion)
+
+
+def test_a_bound_presses_with_the_energy_that_a_larger_play_would_save():
+    """Of a closed chain: force times play is -c dE/dc, by central differences."""
+    play, step = 5e-3, 1e-6
+    low, here, high = (
+        solve_exact(two_bars(0.06, Clearance(radial=c)))
+        for c in (play - step, play, play + step)
+    )
+    active, force = active_clearances(here.expansion)
+    assert active.tolist() == [True]
+    saved = (low.energy - high.energy) / (2 * step)
+    assert force == pytest.approx([play * saved], rel=1e-6)

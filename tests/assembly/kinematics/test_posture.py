@@ -1,0 +1,251 @@
+"""Postures, one or many in one: what they show, their maps, their cached contents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.nominal import Target, follow, motion_screws, size_of
+from assembly.kinematics.posture import (
+    Posture,
+    content_of,
+    home_posture,
+    joint_target,
+    place_many_joints,
+    place_robot,
+    pose_target,
+)
+from assembly.kinematics.track import Track
+from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from stiffness.screws import rotation_matrix, transform
+from tests.linkages_for_tests import CRANK, GROUND, four_bar, four_bar_angles
+
+
+def many_of(*postures):
+    """Several postures of one robot in one."""
+    return replace(
+        postures[0],
+        coordinates=np.stack([p.coordinates for p in postures]),
+        transforms=np.stack([p.transforms for p in postures]),
+    )
+
+
+def turned(*angles):
+    return [place_robot(four_bar(), joints={"crank": angle}) for angle in angles]
+
+
+def test_one_posture_shows_its_pose_and_many_their_number():
+    one, other = turned(0.4, 0.9)
+    assert "drives" in repr(one)
+    assert "crank 0.4 [rad, m]" in repr(one)
+    many = many_of(one, other, one)
+    assert repr(many) == "Posture of bars\n  postures  (3,)"
+    grid = replace(
+        many, coordinates=many.coordinates[None], transforms=many.transforms[None]
+    )
+    assert "(1, 3)" in repr(grid)
+
+
+def test_a_robot_without_drives_says_so():
+    assert "drives            none [rad, m]" in repr(
+        home_posture(Robot("rod", "tip", (Frame("tip", translation=[1.0, 0, 0]),)))
+    )
+
+
+def test_paths_move_screws_from_each_frame_to_the_platform():
+    """[R 0; [p_j - p]x R, R], of one posture and of each of many."""
+    postures = turned(0.4, 0.9)
+    many = many_of(*postures)
+    last = postures[0].robot.index(postures[0].robot.platform)
+    for row, one in enumerate(postures):
+        for j, T in enumerate(one.transforms):
+            R, (x, y, z) = T[:3, :3], T[:3, 3] - one.transforms[last, :3, 3]
+            cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            expected = np.block([[R, np.zeros((3, 3))], [cross @ R, R]])
+            assert one.paths[j] == pytest.approx(expected, abs=1e-15)
+            assert many.paths[row, j] == pytest.approx(expected, abs=1e-15)
+    with pytest.raises(ValueError, match="read-only"):
+        many.paths[0, 0, 0, 0] = 1.0
+
+
+def test_postures_that_repeat_are_told_apart_once():
+    """Distinct ones, taken again in their order, are those given."""
+    first, second = turned(0.4, 0.9)
+    many = many_of(second, first, second, second, first)
+    distinct, which = many.distinct
+    assert len(distinct.coordinates) == len(distinct.transforms) == 2
+    assert which.shape == (5,)
+    assert np.array_equal(distinct.coordinates[which], many.coordinates)
+    assert np.array_equal(distinct.transforms[which], many.transforms)
+
+
+def test_a_content_is_its_numbers_whatever_array_holds_them(rng):
+    many = many_of(*turned(0.4, 0.9))
+    x = rng.normal(size=(2, 3))
+    key = content_of(many, (x,), "a")
+    same = content_of(replace(many, transforms=many.transforms.copy()), (x.copy(),),
+                      "a")  # fmt: skip
+    assert same == key
+    assert hash(same) == hash(key)
+    assert same.postures is not key.postures
+    moved = replace(many, transforms=many.transforms + 1e-15)
+    for other in (
+        content_of(many, (x + 1e-15,), "a"), content_of(many, (x,), "b"),
+        content_of(many, (x.reshape(3, 2),), "a"), content_of(moved, (x,), "a"),
+    ):  # fmt: skip
+        assert other != key
+
+
+def test_joints_that_are_not_named_keep_their_home(rng):
+    """Of drives; passive joints are free."""
+    robot = load_robot("five_bar")
+    drives = [f.name for f in robot.frames if f.actuated]
+    asked = joint_target(robot, {drives[1]: 0.25}).coordinates
+    assert asked.shape == (1, len(robot.frames))
+    for i, frame in enumerate(robot.frames):
+        if frame.name == drives[1]:
+            assert asked[0, i] == 0.25
+        elif frame.actuated:
+            assert asked[0, i] == robot.positions[i]
+        else:
+            assert np.isnan(asked[0, i])
+
+
+def test_coordinates_beyond_any_machine_are_refused():
+    with pytest.raises(BadInput, match=r"pose.tx: found 2e\+06, expected a number of"):
+        place_robot(four_bar(), pose={"tx": 2e6})
+    with pytest.raises(
+        BadInput, match=r"joint crank: found -2e\+06, .* at most 1e\+06"
+    ):
+        place_robot(four_bar(), joints={"crank": -2e6})
+
+
+def test_no_target_is_none():
+    assert len(Target()) == 0
+    assert len(pose_target({"tx": 0.1})) == 1
+    assert len(Target(pose=np.zeros((3, 6)))) == 3
+    assert len(Target(coordinates=np.zeros((2, 4)))) == 2
+
+
+def test_the_reference_length_is_that_of_the_longest_body():
+    assert size_of(four_bar()) == pytest.approx(GROUND)
+    assert size_of(load_robot("irsbot2")) > 0
+    assert size_of(Robot("point", "a", (Frame("a"),))) == 1.0
+
+
+def test_a_track_is_as_open_as_its_worst_closure():
+    track = Track(
+        np.zeros((2, 1)), np.zeros((2, 1, 4, 4)), np.array([1.0, 0.5]),
+        np.array([[1e-3, 2e-3], [4e-3, 3e-3]]),
+    )  # fmt: skip
+    assert track.mismatch.tolist() == [2e-3, 4e-3]
+    assert track.reached.tolist() == [True, False]
+    none = replace(track, closure_mismatch=np.zeros((2, 0)))
+    assert none.mismatch.tolist() == [0.0, 0.0]
+
+
+def test_the_posture_reports_the_worst_closure_that_rounding_leaves():
+    robot = Robot(
+        "gaps", "a",
+        (Frame("a"), Frame("b", translation=[3e-7, 0, 0]),
+         Frame("c", translation=[0, 5e-7, 0])),
+        (("a", "b"), ("a", "c")),
+    )  # fmt: skip
+    assert home_posture(robot).mismatch == pytest.approx(5e-7, rel=1e-6)
+
+
+def test_joints_at_and_beyond_a_closure_stay_where_they_are():
+    """Their motion comes after the frame that closes, and after the platform."""
+    robot = four_bar()
+    closed = {"end", "seat"}
+    frames = tuple(
+        replace(f, joint="revolute", position=0.3) if f.name in closed else f
+        for f in robot.frames
+    )
+    robot = replace(robot, frames=(*frames, Frame("far", "end", [0.1, 0, 0])))
+    posture = place_robot(robot, joints={"crank": 1.5})
+    assert posture.platform[:2, 3] == pytest.approx(four_bar_angles(1.5)[2], abs=1e-9)
+    for name in closed:
+        assert posture.coordinates[robot.index(name)] == 0.3
+    there = place_robot(robot, pose={"tx": posture.platform[0, 3]})
+    for name in closed:
+        assert there.coordinates[robot.index(name)] == 0.3
+
+
+def test_unit_joint_motions_move_as_differences_of_postures_say():
+    """[z, p x z] of a hinge, [0, z] of a slide, nothing of what is fixed."""
+    robot = Robot("arm", "tip", (
+        Frame("a", "base", [0.1, -0.2, 0.3], [0.4, 0.2, -0.5], joint="revolute",
+              actuated=True),
+        Frame("b", "a", [0.3, 0.1, 0.2], [1.0, -0.3, 0.4], joint="prismatic",
+              actuated=True),
+        Frame("tip", "b", [0.2, 0, 0]),
+    ))  # fmt: skip
+    here = home_posture(robot)
+    screws = motion_screws(robot, here.transforms)
+    h = 1e-6
+    for k, name in enumerate("ab"):
+        ends = [place_robot(robot, joints={name: s * h}).platform for s in (1, -1)]
+        slope = (ends[0] - ends[1]) @ np.linalg.inv(here.platform) / (2 * h)
+        turn = slope[[2, 0, 1], [1, 2, 0]]
+        assert screws[k] == pytest.approx([*turn, *slope[:3, 3]], abs=1e-9)
+    assert not screws[2].any()
+
+
+def test_many_are_placed_from_coordinates_as_each_alone():
+    robot = four_bar()
+    goals = np.full((2, len(robot.frames)), np.nan)
+    goals[:, robot.index("crank")] = [0.8, 1.3]
+    postures, reasons = place_many_joints(robot, goals)
+    assert reasons == ["", ""]
+    for posture, one in zip(postures, turned(0.8, 1.3), strict=True):
+        assert isinstance(posture, Posture)
+        assert posture.transforms == pytest.approx(one.transforms, abs=1e-9)
+        with pytest.raises(ValueError, match="read-only"):
+            posture.transforms[0, 0, 0] = 1.0
+        with pytest.raises(ValueError, match="read-only"):
+            posture.coordinates[0] = 1.0
+
+
+def test_what_is_not_actuated_may_be_held_too():
+    """Of a serial chain, any joints: the frames are the product of the motions."""
+    robot = Robot("chain", "end", (
+        Frame("a", joint="revolute", actuated=True),
+        Frame("b", "a", [CRANK, 0, 0], joint="prismatic"), Frame("end", "b"),
+    ))  # fmt: skip
+    held = np.array([[0.5, 0.2, 7.0]])  # the last is fixed: it has no coordinate
+    track = follow(robot, np.zeros(3), Target(coordinates=held))
+    R = rotation_matrix([0, 0, 0.5])
+    expected = transform([*(R @ [CRANK, 0, 0])[:2], 0.2], R)
+    assert track.reached[0]
+    assert track.transforms[0, 2] == pytest.approx(expected, abs=1e-14)
+    assert track.coordinates[0].tolist() == [0.5, 0.2, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "missing"),
+    [
+        ({"rx": 0.5}, "0.5 rad"), ({"ry": -0.25}, "0.25 rad"), ({"tz": 2.0}, "2 m"),
+        ({"tz": 2.0, "rx": 0.5}, "2 m and 0.5 rad"),
+        ({"ty": 0.0, "tz": 2.0}, "2 m"), ({"rx": 0.3, "ry": 0.4}, "0.5 rad"),
+    ],
+)  # fmt: skip
+def test_what_is_missing_has_the_units_of_what_was_asked(asked, missing):
+    """A slide along x neither rises nor tilts, wherever it stands."""
+    robot = Robot("slide", "car", (
+        Frame("rail", rotation=[0, np.pi / 2, 0], joint="prismatic", actuated=True),
+        Frame("car", "rail", rotation=[0, -np.pi / 2, 0]),
+    ))  # fmt: skip
+    with pytest.raises(BadInput) as caught:
+        place_robot(robot, pose=asked)
+    names = ", ".join(f"{name}={value:g}" for name, value in asked.items())
+    message = str(caught.value)
+    assert message.startswith(
+        f"slide: pose {names} cannot be reached: on the straight line from home the "
+        f"platform stops at {next(iter(asked))}="
+    )
+    assert message.endswith(
+        f", {missing} short; expected a configuration in which every closure holds"
+    )
