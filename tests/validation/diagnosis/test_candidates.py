@@ -6,6 +6,7 @@ import pytest
 from assembly.effects.forms import roughness
 from assembly.files.robot_file import read_robot
 from assembly.model.robot import BeamLink, Frame, Robot
+from tests.bar_for_tests import bar
 from tests.campaigns_for_tests import ARM
 from validation.campaign.campaign_file import read_commands
 from validation.diagnosis.candidates import (
@@ -59,6 +60,17 @@ def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities)
     columns, mixed = s.basis("q.two", CandidateShape("powers", ("1",)))
     assert not columns.any()
     assert mixed.tolist() == [[1.0]]
+
+
+@pytest.mark.parametrize(("width", "kept"), [(2e-9, 1), (5e-8, 2)])
+def test_a_power_that_is_the_one_below_it_but_for_rounding_is_left_out(width, kept):
+    """Of 1 + w and 1 - w, whose sine to a constant is w; a hundred millionth counts."""
+    campaign = bar(rows=36, temperature=1.0 + width * np.tile([-1.0, 1.0], 18))
+    conditions = conditions_of(campaign)
+    s = Sensitivities(conditions, campaign.robot, responses(conditions))
+    columns, mixed = s.basis("cov.temperature", LINE)
+    assert mixed.shape == (2, kept)
+    np.testing.assert_allclose(columns.T @ columns / 36, np.eye(kept), atol=1e-5)
 
 
 def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):

@@ -92,10 +92,11 @@ def test_three_points_off_one_line_are_enough(points):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-8)
 
 
+@pytest.mark.parametrize("length", [0.02, 1.0, 30.0])
 @pytest.mark.parametrize(("width", "off"), [(0.9e-3, False), (1.1e-3, True)])
-def test_points_lie_off_a_line_by_a_thousandth_of_their_length(width, off):
-    """A rectangle of length one anywhere: a plane's two sizes are its sides."""
-    corners = np.array([[x, y, 0] for x in (0, 1.0) for y in (0, width)])
+def test_points_lie_off_a_line_by_a_thousandth_of_their_length(width, off, length):
+    """A rectangle anywhere, of any size: a plane's two sizes are its sides."""
+    corners = length * np.array([[x, y, 0] for x in (0, 1.0) for y in (0, width)])
     turn = Rotation.from_rotvec([0.5, 0.2, -0.7])
     assert _spread(turn.apply(corners) + [3.0, -2.0, 5.0]) is off
     assert not _spread(corners[:2])
