@@ -9,6 +9,7 @@ from assembly.effects import apply_effects
 from assembly.effects.effect import Unknown
 from assembly.kinematics.posture import home_posture
 from assembly.measurement.predict import predict
+from assembly.model.robot import Clearance
 from tests.bar_for_tests import (
     BEAM,
     LENGTH,
@@ -101,6 +102,8 @@ def test_values_and_covariance_are_those_of_generalised_least_squares(
     size = np.sqrt(C.diagonal())
     np.testing.assert_allclose(fit.covariance / np.outer(size, size),
                                C / np.outer(size, size), atol=1e-3)  # fmt: skip
+    if not behind:
+        assert np.abs(fit.slopes - A).max() < 1e-3 * np.abs(A).max()
     left = z - A @ x
     assert fit.rss == pytest.approx(left @ np.linalg.solve(V, left), rel=1e-3)
     slopes = fit.slopes.T @ fit.slopes * np.outer(size, size)
@@ -181,12 +184,13 @@ def test_a_row_that_the_model_has_no_answer_for_has_no_say(members, rng, monkeyp
             np.testing.assert_allclose(left[rows].ravel(), other.residual, atol=1e-4)
 
 
-@pytest.mark.parametrize(("end", "seen"), [("upper", 5e-4), ("lower", -5e-4)])
+@pytest.mark.parametrize("seen", [5e-4, -5e-4])
+@pytest.mark.parametrize("lower", [0.0, -1e-4])
 @pytest.mark.parametrize("start", [-1e-4, 0.0, 1e-4, 1.0])
-def test_no_value_is_tried_beyond_its_bounds(end, seen, start, monkeypatch):
-    """A bar of 0.5 mm more than allowed; it ends at the bound, from anywhere."""
-    bound = 1e-4
-    one = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4, -bound, bound))
+def test_no_value_is_tried_beyond_its_bounds(seen, lower, start, monkeypatch):
+    """Half a millimetre more or less than allowed; it ends there, from anywhere."""
+    upper = 1e-4
+    one = hypothesis("link_length", "tip", "tip", Unknown("", 1e-4, lower, upper))
     campaign = bar(link=BEAM, measured=fit_of(bar(), seen))
     tried, apply = [], module.apply_effects
 
@@ -196,10 +200,23 @@ def test_no_value_is_tried_beyond_its_bounds(end, seen, start, monkeypatch):
 
     monkeypatch.setattr(module, "apply_effects", watched)
     fit = refit(campaign, conditions_of(campaign), [one], np.array([start]))
-    assert np.abs(tried).max() <= bound * (1 + 1e-12)
-    assert fit.values == pytest.approx([np.sign(seen) * bound], rel=1e-9)
+    assert lower * (1 + 1e-12) <= min(tried) <= max(tried) <= upper * (1 + 1e-12)
+    assert fit.values == pytest.approx([upper if seen > 0 else lower], abs=1e-13)
     # slopes are those at the bound nevertheless
     assert fit.parameters(0)[0][2] == pytest.approx(SIGMA[3] / np.sqrt(8), rel=1e-5)
+
+
+def test_an_angle_far_from_straight_is_found_whatever_else_is_read():
+    """0.4 rad by finite motions: rotations tell it at once, positions by and by."""
+    q, e = bar().coordinates[:, 0], 0.4
+    seen = np.zeros((8, 6))
+    seen[:, 2] = e
+    seen[:, 3] = LENGTH * (np.cos(q + e) - np.cos(q))
+    seen[:, 4] = LENGTH * (np.sin(q + e) - np.sin(q))
+    campaign = bar(measured=seen)
+    here = replace(conditions_of(campaign), exact=True)
+    fit = refit(campaign, here, [TURNED], np.zeros(1))
+    assert fit.values == pytest.approx([e], rel=1e-6)
 
 
 @pytest.mark.parametrize("kept", [0.0, 3e-4])
@@ -285,3 +302,22 @@ def test_clearance_held_where_it_rests_reads_as_it_does_in_full():
     tight = predict(conditions).deviation
     assert np.abs(there - tight)[0, 3:5].max() > 1e-5
     assert full.values is fit.values
+
+
+def test_only_an_open_chains_play_is_put_where_loads_take_it():
+    """Of a bar whose drive has play: a radius along the force on its tip."""
+    plain = bar([0, 0, 0, 3.0, 4.0, 0], rows=2)
+    play = replace(plain.robot.frames[0], clearance=Clearance(radial=1e-5))
+    loose = replace(plain.robot, frames=(play, plain.robot.frames[1]))
+    conditions = conditions_of(replace(plain, robot=loose))
+    found = module._with_clearance_at_rest(conditions)
+    expected = np.zeros((2, 2, 6))
+    expected[:, 0, 3:5] = 0.6e-5, 0.8e-5
+    assert found.errors == pytest.approx(expected, abs=1e-15)
+    _, closed = pushed([0, 20.0, 0])
+    for same in (
+        conditions_of(plain), closed, apply_effects(closed, {"joint_clearance": {
+            "right.elbow.radial": 1e-5}}),
+        replace(conditions, rest=np.zeros_like(conditions.errors)),
+    ):  # fmt: skip
+        assert module._with_clearance_at_rest(same) is same

@@ -7,7 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.measurement.conditions import as_declared
-from assembly.model.robot import Clearance
+from assembly.model.robot import Clearance, Frame, Robot
 from stiffness.screws import rotation_matrix, skew
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.linkages_for_tests import five_bar
@@ -124,3 +124,15 @@ def test_play_that_rests_changes_no_answer(held, closed):
     np.testing.assert_allclose(found.wrenches, tight.wrenches, atol=1e-8)
     np.testing.assert_allclose(found.reading, tight.reading, atol=1e-9)
     assert tight.wrenches.any()
+
+
+def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
+    """Each carries half: what closes is looked at as if all play were gone."""
+    spring = np.eye(6) * 1e6
+    robot = Robot("pair", "end_a", (
+        Frame("a", joint_stiffness=spring, clearance=Clearance(radial=1e-5)),
+        Frame("end_a", "a", [0.1, 0, 0]), Frame("b", joint_stiffness=spring),
+        Frame("end_b", "b", [0.1, 0, 0]),
+    ), (("end_a", "end_b"),))  # fmt: skip
+    found = responses(as_declared(home_posture(robot), [0, 0, 0, 30.0, 0, 0]))
+    assert found.wrenches[0, [0, 2], 3] == pytest.approx([15.0, 15.0], rel=1e-9)
