@@ -23,26 +23,28 @@ DEGREES = 4.0  # of freedom of Student's t
 class Known:
     """Two effects and four small unknowns, what is left of them, and what it costs."""
 
-    def __init__(self, rng, noise, signal, configuration=None):
+    def __init__(self, rng, noise, signal, configuration=None, scatter=None):
         axis = np.array([0, 1, 3, 4])
-        J, self.E = rng.normal(size=(CELLS, 4)), rng.normal(size=(CELLS, 2))
+        J, E = rng.normal(size=(CELLS, 4)), rng.normal(size=(CELLS, 2))
+        self.E = E / np.linalg.norm(E, axis=0)
         size = np.array(SCALES)[axis // 3]
         self.small, self.noise = J * size, noise
-        self.z = self.small @ rng.normal(size=4) + self.E @ [30.0, -20.0] + signal
-        self.z += noise * rng.normal(size=CELLS)
+        self.z = self.small @ rng.normal(size=4) + self.E @ [300.0, -200.0] + signal
+        self.z += (scatter or noise) * rng.normal(size=CELLS)
         term = SmallTerm(GEOMETRY, np.arange(4), axis, J, np.full(4, np.nan), -np.inf)
         prior = Prior((np.ones(4, bool),), {GEOMETRY: SCALES}, 0.0, 0.0)
         blocks = np.arange(ROWS) if configuration is None else configuration
         self.here = Remainder(
             campaign_of(self.z.reshape(ROWS, 6), repeat=blocks), AnyColumns(),
-            Unexplained([term], self.z, self.E), np.ones(CELLS, bool), prior, noise,
+            Unexplained([term], self.z, 1e-3 * self.E), np.ones(CELLS, bool), prior,
+            noise,
         )  # fmt: skip
         self.candidate = self.here.sensitivities.candidate
 
     def cost(self, further):
         """z' C^-1 z and ln det C, of the covariance with further columns (N, m)."""
         C = self.noise**2 * np.eye(CELLS) + self.small @ self.small.T
-        C += 1e7 * self.E @ self.E.T + further @ further.T
+        C += 1e9 * self.E @ self.E.T + further @ further.T
         return self.z @ np.linalg.solve(C, self.z), np.linalg.slogdet(C)[1]
 
     def worth(self, B):
@@ -66,8 +68,7 @@ class Known:
 
     def errors(self, blocks, *further):
         """(N,) squared errors in folds of blocks drawn once, with further columns."""
-        flat = self.E / np.linalg.norm(self.E, axis=0) * 1e4
-        X = np.hstack([self.small, flat, *further])
+        X = np.hstack([self.small, 1e4 * self.E, *further])
         of_cell, squares = np.repeat(blocks, 6), np.zeros(CELLS)
         names = np.random.default_rng(1).permutation(np.unique(blocks))
         for part in np.array_split(names, min(5, len(names))):
@@ -78,12 +79,14 @@ class Known:
         return squares
 
 
-@pytest.mark.parametrize("noise", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("noise", "scatter"), [(1.0, 1.0), (1.0, 0.5), (3.0, 4.0), (3.0, 2.0), (3.0, 0.5)]
+)
 @pytest.mark.parametrize("size", [0.0, 0.1, 3.0, 1e4])
-def test_worth_in_noise_beyond_sigma_is_that_of_its_formula(noise, size, rng):
+def test_worth_in_noise_beyond_sigma_is_that_of_its_formula(noise, scatter, size, rng):
     """What is left may turn out to be less than the noise, down to sigma."""
     B = rng.normal(size=(CELLS, 3))
-    known = Known(rng, noise, size * B @ [0.5, -0.4, 0.2])
+    known = Known(rng, noise, size * B @ [0.5, -0.4, 0.2], scatter=scatter)
     found = known.here.worths([known.candidate(B)])[0]
     assert found == pytest.approx(known.worth(B), rel=1e-4, abs=1e-3)
 
