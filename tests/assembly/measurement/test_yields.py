@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from assembly.kinematics.posture import home_posture
 from assembly.measurement.conditions import Yield, as_declared
-from assembly.measurement.yields import Yields
+from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.model.robot import Frame, Robot
+from assembly.solvers.conic import SolverFailed
 
 
 def test_slopes_are_those_of_the_laws_by_each_wrench_they_read(rng):
@@ -72,3 +74,67 @@ def test_springs_are_settled_in_one_step_and_then_left(rng, force):
     through = force * (w + np.einsum("rij,rj->ri", A, mixed))
     step = one.correction(mixed, through, force * A)
     assert step.any(axis=1).tolist() == [False, True, False]
+
+
+def test_springs_that_give_without_end_are_told():
+    """d = C (w + A d) with C A = 1: any load moves them ever farther."""
+    one = linear_springs(np.eye(2), 1)
+    with pytest.raises(SolverFailed, match="springs that give without end"):
+        one.correction(np.ones((1, 2)), np.zeros((1, 2)), np.eye(2)[None])
+
+
+def settled_by(law):
+    """Deflections of a place that gives by a law of 3 - 2 d, and how often it is
+    asked."""
+    robot = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
+    one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: law(w[:, 0]))
+    here = replace(as_declared(home_posture(robot), np.zeros(6)), yields=(one,))
+    asked = []
+
+    def solve(held):
+        assert held.yields == ()
+        give = held.errors[0, 0, 1]
+        asked.append(give)
+        wrenches = np.zeros((1, 12))
+        wrenches[0, 1] = 3.0 - 2.0 * give
+        return give, wrenches
+
+    return settle_yields(here, solve, lambda yields: np.full((1, 1, 1), -2.0)), asked
+
+
+@pytest.mark.parametrize("power", [1.0, 1.5, 3.0])
+def test_a_place_gives_by_its_law_under_what_is_left(power):
+    """d = (3 - 2 d)^p / 10, by bisection; Newton's method takes a few steps."""
+    give, asked = settled_by(lambda w: np.sign(w) * np.abs(w) ** power / 10)
+    expected = brentq(lambda d: d - (3.0 - 2.0 * d) ** power / 10, 0.0, 1.5, xtol=1e-15)
+    assert give == pytest.approx(expected, rel=1e-9)
+    assert len(asked) <= 9
+
+
+def test_laws_that_never_settle_are_told():
+    """It gives as soon as it is loaded, and then it is not: forty steps, no answer."""
+    with pytest.raises(SolverFailed, match="do not settle in 40 steps"):
+        settled_by(lambda w: np.where(w > 0, 2.0, 0.0))
+
+
+@pytest.mark.parametrize("compliance", [-1e-4, 0.0, 3e-4])
+def test_springs_are_put_into_their_joint_and_other_laws_stay(compliance):
+    """In series with what is declared; one that is not positive is no spring."""
+    K = np.diag([np.inf, 1e4] + [np.inf] * 4)
+    robot = Robot("post", "top", (
+        Frame("foot", joint_stiffness=K), Frame("top", "foot", [0, 0, 1.0]),
+    ))  # fmt: skip
+    given = np.array([[7.0], [compliance]])
+    spring = Yield(
+        "foot", 1, (("foot", 1),), given, lambda x, w: x[:, 0] * w[:, 0], True
+    )
+    bends = replace(spring, linear=False)
+    here = as_declared(home_posture(robot), np.zeros(6)).take(np.zeros(2, int))
+    one = with_springs(replace(here, yields=(bends, spring)), 1)
+    assert len(one) == 1
+    frame, (first, *rest) = one.robot.frames[0], one.yields
+    assert first.law is bends.law
+    assert not first.linear
+    assert len(rest) == (compliance <= 0)
+    series = 1e-4 + max(compliance, 0.0)
+    assert frame.joint_stiffness[1, 1] == pytest.approx(1 / series)
