@@ -83,11 +83,12 @@ def test_springs_that_give_without_end_are_told():
         one.correction(np.ones((1, 2)), np.zeros((1, 2)), np.eye(2)[None])
 
 
-def settled_by(law):
-    """Deflections of a place that gives by a law of 3 - 2 d, and how often it is
-    asked."""
+def settled_by(law, unit=1.0):
+    """Deflection of a place under 3 - 2 d in a unit, and how often it is asked."""
     robot = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
-    one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: law(w[:, 0]))
+    one = Yield(
+        "foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: unit * law(w[:, 0])
+    )
     here = replace(as_declared(home_posture(robot), np.zeros(6)), yields=(one,))
     asked = []
 
@@ -96,19 +97,32 @@ def settled_by(law):
         give = held.errors[0, 0, 1]
         asked.append(give)
         wrenches = np.zeros((1, 12))
-        wrenches[0, 1] = 3.0 - 2.0 * give
+        wrenches[0, 1] = 3.0 - 2.0 * give / unit
         return give, wrenches
 
-    return settle_yields(here, solve, lambda yields: np.full((1, 1, 1), -2.0)), asked
+    return settle_yields(
+        here, solve, lambda yields: np.full((1, 1, 1), -2.0 / unit)
+    ), asked
 
 
 @pytest.mark.parametrize("power", [1.0, 1.5, 3.0])
-def test_a_place_gives_by_its_law_under_what_is_left(power):
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1.0, 1e3])
+def test_a_place_gives_by_its_law_under_what_is_left(power, unit):
     """d = (3 - 2 d)^p / 10, by bisection; Newton's method takes a few steps."""
-    give, asked = settled_by(lambda w: np.sign(w) * np.abs(w) ** power / 10)
+    give, asked = settled_by(lambda w: np.sign(w) * np.abs(w) ** power / 10, unit)
     expected = brentq(lambda d: d - (3.0 - 2.0 * d) ** power / 10, 0.0, 1.5, xtol=1e-15)
-    assert give == pytest.approx(expected, rel=1e-9)
+    assert give / unit == pytest.approx(expected, rel=1e-9)
     assert len(asked) <= 9
+
+
+@pytest.mark.parametrize("force", [1e-6, 1e-3, 1.0, 1e4])
+def test_the_slope_of_a_cube_is_three_squares_at_any_load(force):
+    robot = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
+    one = Yield("foot", 1, (("top", 5),), np.zeros((3, 1)), lambda x, w: w[:, 0] ** 3)
+    here = as_declared(home_posture(robot), np.zeros(6)).take(np.zeros(3, int))
+    w = force * np.array([[1.0], [-0.5], [0.1]])
+    slope = Yields(replace(here, yields=(one,))).slope(w)[:, :, 0]
+    assert slope == pytest.approx(3 * w**2, rel=1e-5)
 
 
 def test_laws_that_never_settle_are_told():
