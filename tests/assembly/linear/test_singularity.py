@@ -263,3 +263,17 @@ def test_motions_told_are_of_drives_and_platform_together(name):
         np.testing.assert_allclose(
             rates[path] @ screws[path], found.parallel_screws[k], atol=1e-7
         )
+
+
+def test_a_platform_that_no_joint_moves_is_at_no_serial_singularity():
+    """Nothing could be lost; its drive moves, but nothing of the platform."""
+    turning = {"joint": "revolute", "actuated": True}
+    robot = Robot("still", "tip", (
+        Frame("tip"), Frame("one", **turning),
+        Frame("two", "one", [1, 0, 0], **turning),
+    ))  # fmt: skip
+    found = find_singularities(robot, home_posture(robot).transforms[None])
+    assert (found.serial[0], found.parallel[0], found.closure[0]) == (1.0, 1.0, 1.0)
+    assert found.serial_joints.tolist() == [[0.0, 0.0, 0.0]]
+    assert found.parallel_screws.tolist() == [[0.0] * 6]
+    assert found.names(robot, near=0.5) == [""]
