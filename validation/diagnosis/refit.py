@@ -101,9 +101,18 @@ class Fit:
                 moved_values[i] += sign * step
                 moved = h.public(robot, moved_values)
                 ends.append(np.array([moved.get(name, np.nan) for name in value]))
-            J[:, i] = (ends[0] - ends[1]) / (2 * step)
+            change = _difference(
+                ends[0], ends[1], [n.endswith(".phase") for n in value]
+            )
+            J[:, i] = change / (2 * step)
         std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
         return [(n, v, float(s)) for (n, v), s in zip(value.items(), std, strict=True)]
+
+
+def _difference(end: NDArray, begin: NDArray, phase: Sequence[bool]) -> NDArray:
+    """(p,) end minus begin; of phases the shorter way around."""
+    way = end - begin
+    return np.where(phase, np.remainder(way + np.pi, 2 * np.pi) - np.pi, way)
 
 
 def _public(

@@ -145,3 +145,16 @@ def test_a_joint_at_the_end_of_its_motion_carries_its_share_of_the_wrench():
             wrenches, answer.wrenches, atol=1e-9 * np.abs(answer.wrenches).max()
         )
     assert seen == 4
+
+
+def test_errors_that_nothing_closes_have_no_margin_and_ask_no_other_solver():
+    """A planar four-bar whose coupler is out of the plane, by any amount that shows."""
+    robot = load_robot("four_bar")
+    tight = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=tight)
+    errors = np.zeros((5, len(robot.frames), 6))
+    errors[1:, 2, 5] = 1e-9, 1e-6, 1e-3, -1.0
+    for compliant in ("rigid", "free"):
+        found = prepare_margins(place_robot(robot), compliant).solve(errors)
+        assert not found.fallback.any()
+        assert found.margin.tolist() == found.bound.tolist() == [0.0] + [np.inf] * 4

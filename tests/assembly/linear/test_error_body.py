@@ -92,3 +92,15 @@ def test_the_picture_shows_the_body_and_says_its_size():
     assert said.startswith("gold: translation errors possible (frozen), up to 0.38")
     gold = (pixels[..., 0] > 150) & (pixels[..., 1] > 110) & (pixels[..., 2] < 110)
     assert gold.sum() > 500
+
+
+@pytest.mark.parametrize("count", [50, 200, 1000])
+def test_directions_share_the_sphere_evenly(count):
+    """One in the middle of each slice of one area; none much nearer to another
+    than in the densest packing, sqrt(8 pi / (sqrt(3) n)) apart."""
+    directions = even_directions(count)
+    middles = np.linspace(1, -1, 2 * count + 1)[1::2]
+    np.testing.assert_allclose(directions[:, 2], middles, atol=1e-12)
+    apart = np.linalg.norm(directions[:, None] - directions, axis=2)
+    nearest = (apart + 9 * np.eye(count)).min()
+    assert nearest > 0.78 * np.sqrt(8 * np.pi / (np.sqrt(3) * count))

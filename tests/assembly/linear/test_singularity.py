@@ -204,3 +204,76 @@ def test_a_flat_parallelogram_is_a_closure_singularity_and_its_joint_is_named():
     (name,) = found[1].names(robot, near=0.02)
     assert name.startswith("closure: ")
     assert name.removeprefix("closure: ") in {f.name for f in robot.frames}
+
+
+def screws_by_hand(robot, T):
+    """(n, 6) what a unit of each joint does to the platform's origin if it is on the
+    way there; lengths, and slides, in the robot's size."""
+    size, screws = size_of(robot), np.zeros((len(robot.frames), 6))
+    last = robot.index(robot.platform)
+    for k, frame in enumerate(robot.frames):
+        if frame.joint == "fixed":
+            continue
+        z, arm = T[k, :3, 2], T[last, :3, 3] - T[k, :3, 3]
+        turning = np.concatenate([z, np.cross(z, arm) / size])
+        sliding = np.concatenate([0 * z, z])
+        screws[k] = sliding if frame.joint == "prismatic" else turning
+    return screws
+
+
+def way_to(robot, name):
+    """Places of frames from the base to one."""
+    way = []
+    while name != "base":
+        way.append(robot.index(name))
+        name = robot.frames[way[-1]].parent
+    return way
+
+
+@pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
+def test_motions_told_are_of_drives_and_platform_together(name):
+    """Of size one in all: the least share of the platform, or of the drives; joints
+    move with them, and closures stay closed."""
+    robot = load_robot(name)
+    driven = [k for k, f in enumerate(robot.frames) if f.actuated]
+    home = home_posture(robot)
+    goals = np.full((2, len(robot.frames)), np.nan)
+    goals[:, driven] = home.coordinates[driven]
+    goals[1, driven] += 0.02 * np.arange(1, len(driven) + 1)
+    postures, _ = place_many_joints(robot, goals)
+    T = np.array([p.transforms for p in postures])
+    found = find_singularities(robot, T)
+    for k in range(2):
+        screws = screws_by_hand(robot, T[k])
+        path = way_to(robot, robot.platform)
+        for rates, drives, platform in (
+            (found.serial_joints[k], math.sqrt(1 - found.serial[k] ** 2),
+             found.serial[k]),
+            (found.parallel_joints[k], found.parallel[k],
+             math.sqrt(1 - found.parallel[k] ** 2)),
+        ):  # fmt: skip
+            moved = rates[path] @ screws[path]
+            assert np.linalg.norm(rates[driven]) == pytest.approx(drives, abs=1e-7)
+            assert np.linalg.norm(moved) == pytest.approx(platform, abs=1e-7)
+            for first, second in robot.closures:
+                one, other = (way_to(robot, end) for end in (first, second))
+                apart = rates[one] @ screws[one] - rates[other] @ screws[other]
+                assert np.abs(apart).max() < 1e-7
+        rates = found.parallel_joints[k]
+        np.testing.assert_allclose(
+            rates[path] @ screws[path], found.parallel_screws[k], atol=1e-7
+        )
+
+
+def test_a_platform_that_no_joint_moves_is_at_no_serial_singularity():
+    """Nothing could be lost; its drive moves, but nothing of the platform."""
+    turning = {"joint": "revolute", "actuated": True}
+    robot = Robot("still", "tip", (
+        Frame("tip"), Frame("one", **turning),
+        Frame("two", "one", [1, 0, 0], **turning),
+    ))  # fmt: skip
+    found = find_singularities(robot, home_posture(robot).transforms[None])
+    assert (found.serial[0], found.parallel[0], found.closure[0]) == (1.0, 1.0, 1.0)
+    assert found.serial_joints.tolist() == [[0.0, 0.0, 0.0]]
+    assert found.parallel_screws.tolist() == [[0.0] * 6]
+    assert found.names(robot, near=0.5) == [""]

@@ -9,7 +9,11 @@ from scipy.optimize import brentq
 from assembly.kinematics.posture import home_posture
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.predict import _linear
-from assembly.measurement.settled_clearance import with_clearances_taken_up
+from assembly.measurement.settled_clearance import (
+    fractions,
+    with_clearances_at_rest,
+    with_clearances_taken_up,
+)
 from assembly.model.robot import Clearance, Frame, Robot
 
 RADIAL, AXIAL = 1e-5, 3e-5
@@ -85,3 +89,49 @@ def test_a_contact_in_one_of_two_springs_side_by_side_shifts_the_load(force):
     through = wrenches[0].reshape(-1, 6)[:, 5]
     assert through[[0, 2]] == pytest.approx([sign * own, sign * (F - own)], rel=1e-6)
     assert own < 0.45 * F
+
+
+def test_play_at_rest_is_a_share_of_its_bounds_and_no_play_is_none():
+    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no play."""
+    robot = Robot("two", "tip", (
+        Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
+        Frame("pin", "fixed", joint="revolute",
+              clearance=Clearance(radial=5e-5, spin=0.3)),
+        Frame("rail", "pin", joint="prismatic",
+              clearance=Clearance(radial=7e-5, axial=0.2)),
+        Frame("tip", "rail"),
+    ))  # fmt: skip
+    fixed = robot.frames[0].clearance
+    bounds = np.zeros((4, 6))
+    bounds[0] = np.repeat(
+        [fixed.tilt, fixed.spin, fixed.radial, fixed.axial], [2, 1, 2, 1]
+    )
+    bounds[1, 3:5], bounds[2, 3:5] = 5e-5, 7e-5
+    rng = np.random.default_rng(2)
+    rest, errors = rng.uniform(-1, 1, (1, 4, 6)), rng.normal(size=(1, 4, 6))
+    given = replace(at_home(robot, np.zeros(6)), rest=rest, errors=errors)
+    held = with_clearances_at_rest(given)
+    assert held.rest is None
+    assert held.errors - errors == pytest.approx(rest * bounds, rel=1e-9)
+    own = [(f.clearance.spin, f.clearance.axial) if f.clearance else None
+           for f in held.robot.frames]  # fmt: skip
+    assert own == [(None, None), (0.3, None), (None, 0.2), None]
+    assert not any(f.clearance and f.clearance.radial for f in held.robot.frames)
+    shares = fractions(robot, rest[0] * bounds)
+    assert shares == pytest.approx(np.where(bounds > 0, rest[0], 0.0), rel=1e-9)
+    assert not fractions(robot, np.ones((4, 6)))[bounds == 0].any()
+    with pytest.raises(ValueError, match="no rest positions of the clearances"):
+        with_clearances_at_rest(replace(given, rest=None))
+
+
+@pytest.mark.parametrize(("moment", "centred"), [(0.9e-9, True), (1.1e-9, False)])
+def test_a_joint_that_carries_a_billionth_is_unloaded(moment, centred):
+    """Of the largest moment there is, whichever joint that is at, in any row."""
+    robot = Robot("chain", "tip", (
+        Frame("foot", clearance=Clearance(tilt=1e-4)), Frame("tip", "foot"),
+    ))  # fmt: skip
+    one, other = at_home(robot, [1.0, 0, 0, 0, 0, 0]), [moment, 0, 0, 0, 0, 0]
+    both = replace(one.take([0, 0]), load=np.array([[1.0, 0, 0, 0, 0, 0], other]))
+    settled, undetermined = with_clearances_taken_up(both)
+    assert undetermined.tolist() == [False, centred]
+    assert settled.errors[:, 0, 0] == pytest.approx([1e-4, 0.0 if centred else 1e-4])

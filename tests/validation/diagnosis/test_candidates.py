@@ -1,11 +1,15 @@
 """Candidates: their columns, their numbers, and where they may act."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from assembly.effects.forms import roughness
+from assembly.effects.functions import AXES
 from assembly.files.robot_file import read_robot
 from assembly.model.robot import BeamLink, Frame, Robot
+from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.campaigns_for_tests import ARM
 from validation.campaign.campaign_file import read_commands
 from validation.diagnosis.candidates import (
@@ -13,6 +17,7 @@ from validation.diagnosis.candidates import (
     CandidatePart,
     Sensitivities,
     places_of,
+    variables_of,
 )
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.responses import responses
@@ -59,6 +64,17 @@ def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities)
     columns, mixed = s.basis("q.two", CandidateShape("powers", ("1",)))
     assert not columns.any()
     assert mixed.tolist() == [[1.0]]
+
+
+@pytest.mark.parametrize(("width", "kept"), [(2e-9, 1), (5e-8, 2)])
+def test_a_power_that_is_the_one_below_it_but_for_rounding_is_left_out(width, kept):
+    """Of 1 + w and 1 - w, whose sine to a constant is w; a hundred millionth counts."""
+    campaign = bar(rows=36, temperature=1.0 + width * np.tile([-1.0, 1.0], 18))
+    conditions = conditions_of(campaign)
+    s = Sensitivities(conditions, campaign.robot, responses(conditions))
+    columns, mixed = s.basis("cov.temperature", LINE)
+    assert mixed.shape == (2, kept)
+    np.testing.assert_allclose(columns.T @ columns / 36, np.eye(kept), atol=1e-5)
 
 
 def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):
@@ -138,3 +154,69 @@ def test_drives_and_beams_act_together_where_there_are_two(drives, beams):
     # shifts; the reading's six and all; turns and shifts of the base
     single = len(found) - len(together)
     assert single == 2 * (14 * len(robot.frames) + 7 + 2)
+
+
+def test_a_body_may_turn_or_shift_and_a_reading_be_off():
+    """Where a single frame and what carries all of them may do something."""
+    robot = Robot("one", "tip", (Frame("tip"),))
+    found = [(kind, parts[0]) for kind, parts in places_of(robot, ["time"])]
+    turns, shifts = ("rx", "ry", "rz"), ("tx", "ty", "tz")
+    own = [(axis,) for axis in (*turns, *shifts)]
+    assert {p.components for kind, p in found if p.where == "base"} == {turns, shifts}
+    at_tip = [p.components for kind, p in found if (kind, p.where) == ("screw", "tip")]
+    assert sorted(at_tip) == sorted([*own, turns, shifts])
+    softer = [p for kind, p in found if kind == "compliance"]
+    assert [(p.where, p.components) for p in softer] == [("tip", one) for one in own]
+    read = [p.components for kind, p in found if p.where == "reading"]
+    assert read == [*own, (*turns, *shifts)]
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_what_a_component_does_by_place(axis):
+    """A base swings the tip about its origin; a spring gives by its wrench."""
+    campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
+    conditions = conditions_of(campaign)
+    response = responses(conditions)
+    s = Sensitivities(conditions, campaign.robot, response)
+    place, name = LENGTH * along(campaign), AXES[axis]
+    unit = np.tile(np.eye(6)[axis], (8, 1))
+    unit[:, 3:] += np.cross(unit[:, :3], place)
+    np.testing.assert_allclose(s.sensitivity("base", name, "screw"), unit, atol=1e-8)
+    read = s.sensitivity("reading", name, "screw")
+    assert read.tolist() == np.tile(np.eye(6)[axis], (8, 1)).tolist()
+    # the drive stands at the base's origin, in its axes
+    np.testing.assert_allclose(s.sensitivity("drive", name, "screw"), unit, atol=1e-8)
+    load = np.tile(campaign.loads[0], (8, 1))
+    load[:, :3] += np.cross(place, load[:, 3:])
+    soft = s.sensitivity("drive", name, "compliance")
+    np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
+
+
+@pytest.mark.parametrize("units", [1e-6, 1.0, 1e6])
+def test_a_column_has_mean_square_one_in_any_unit(units):
+    heat = units * np.array([3.0, -1, 2, 0.5, 4, -2, 1, 0.1])
+    campaign = bar(temperature=heat)
+    conditions = conditions_of(campaign)
+    s = Sensitivities(conditions, campaign.robot, responses(conditions))
+    columns, _ = s.basis("cov.temperature", CandidateShape("powers", ("1",)))
+    expected = heat / np.sqrt(np.mean(heat**2))
+    np.testing.assert_allclose(columns[:, 0], expected, rtol=1e-12)
+
+
+def test_what_was_varied_and_is_known_in_every_row_may_count():
+    """A load that stays, a temperature that one row lacks, a time of zero do not."""
+    varying = np.linspace(-1.0, 0.5, 8)
+    lacking = np.where(np.arange(8) == 3, np.nan, varying)
+    conditions = conditions_of(bar(
+        [0, 0, 2.0, 0, 0, 0], time=np.zeros(8), approach=np.tile([-1.0, 1.0], 4),
+        speed=np.full(8, 7.0), dust=1e-9 * varying,
+    ))  # fmt: skip
+    found = variables_of(replace(conditions, temperature=lacking))
+    assert found == ["q.drive", "position.x", "position.y", "approach", "cov.dust"]
+    loads = np.zeros((8, 6))
+    loads[:, 4] = varying
+    campaign = replace(bar(temperature=varying, time=60.0 * np.arange(8)), loads=loads)
+    assert variables_of(conditions_of(campaign)) == [
+        "q.drive", "load.fy", "load.force", "position.x", "position.y",
+        "cov.temperature", "time",
+    ]  # fmt: skip

@@ -8,6 +8,7 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import LENGTH, along, bar
+from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis.background import background
 from validation.diagnosis.evidence import Prior
@@ -18,6 +19,7 @@ from validation.diagnosis.small_terms import (
     GEOMETRY,
     SPRINGS,
     SmallTerm,
+    _term,
     added,
     screws_of,
     small_terms,
@@ -190,3 +192,32 @@ def test_a_fitted_model_adds_functions_that_are_known(loaded):
     left = model.residual(campaign)
     expected = campaign.measured - predict(conditions).deviation - 6.0
     np.testing.assert_allclose(left, expected)
+
+
+@pytest.mark.parametrize("units", [1.0, 1e6])
+@pytest.mark.parametrize("kind", [0, 1])
+def test_an_unknown_shows_beside_the_largest_of_its_own_kind(kind, units):
+    """By a billionth of that, whatever those of the other kind show."""
+    largest = units * np.array([5e3, 3e-3])
+    shares = np.array([1.0, 1.1e-9, 0.9e-9])
+    changes = np.zeros((4, 6, 2, 6))
+    for each in (0, 1):
+        sizes = largest[each] * (shares if each == kind else np.ones(3))
+        changes[1, 2, 1, 3 * each + np.arange(3)] = sizes
+    campaign = campaign_of(np.zeros((4, 6)))
+    term = _term(campaign, "any", changes, np.full((2, 6), np.nan), -np.inf)
+    expected = [3 * kind, 3 * kind + 1, *(3 * (1 - kind) + np.arange(3))]
+    assert term.frame.tolist() == [1] * 5
+    assert term.axis.tolist() == sorted(expected)
+
+
+@pytest.mark.parametrize("most", [(0.2, 5.0), (1e-4, 3.0), (2.0, 1e-3)])
+def test_an_unknown_must_show_a_thousandth_of_sigma_at_its_largest(most):
+    """Of rotations and of translations as large as each may be."""
+    changes = np.zeros((4, 6, 1, 6))
+    for axis in range(6):
+        above = 1.01 if axis % 3 else 0.99
+        changes[2, 1, 0, axis] = above * 1e-3 / most[axis // 3]
+    campaign = campaign_of(np.zeros((4, 6)))
+    term = _term(campaign, "any", changes, np.full((1, 6), np.nan), 0.0, most)
+    assert term.axis.tolist() == [1, 2, 4, 5]

@@ -1,0 +1,134 @@
+"""What a fit looks for: units, bounds that physics sets, sizes that machines have."""
+
+import numpy as np
+import pytest
+
+from assembly.effects import LIBRARY
+from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
+from tests.assembly.effects.test_effects import arm
+
+SLIDES = Robot("slides", "tip", (
+    Frame("drive", joint="prismatic", actuated=True), Frame("tip", "drive"),
+))  # fmt: skip
+UNITS = {  # by effect and parameter: of an arm that turns, of one that slides
+    ("self_weight", "g.x"): ("m/s^2", "m/s^2"),
+    ("thermal_expansion", "tip"): ("1/K", "1/K"),
+    ("drive_compliance", "drive"): ("N m/rad", "N/m"),
+    ("encoder_offset", "drive"): ("rad", "m"),
+    ("encoder_eccentricity", "drive.amplitude"): ("rad", "rad"),
+    ("encoder_eccentricity", "drive.phase"): ("rad", "rad"),
+    ("link_length", "tip"): ("m", "m"),
+    ("registration", "base.ry"): ("rad", "rad"),
+    ("registration", "base.tz"): ("m", "m"),
+    ("registration", "tool.tx"): ("m", "m"),
+    ("modulus_scale", "tip"): ("1", "1"),
+    ("joint_clearance", "drive.radial"): ("m", "m"),
+    ("joint_clearance", "drive.axial"): ("m", "m"),
+    ("joint_clearance", "drive.tilt"): ("rad", "rad"),
+    ("friction_hysteresis", "drive"): ("N m", "N"),
+    ("contact_stiffening", "drive.coefficient"): ("N m/rad^n", "N/m^n"),
+    ("contact_stiffening", "drive.exponent"): ("1", "1"),
+    ("load_gain", "factor"): ("1", "1"),
+    ("load_gain", "offset.mz"): ("N m", "N m"),
+    ("load_gain", "offset.fx"): ("N", "N"),
+    ("drift", "amplitude.rz"): ("rad", "rad"),
+    ("drift", "amplitude.tx"): ("m", "m"),
+    ("drift", "time_constant"): ("s", "s"),
+    ("base_compliance", "stiffness.ry"): ("N m/rad", "N m/rad"),
+    ("base_compliance", "stiffness.tz"): ("N/m", "N/m"),
+}
+FREE = (-np.inf, np.inf)
+SIZES = {  # by effect and unknown: a plausible size, and bounds
+    ("self_weight", "g.x"): (9.81, (-20, 20)),  # a machine may hang either way
+    ("thermal_expansion", ""): (1e-5, (-5e-4, 5e-4)),  # steel, plastics far below
+    ("drive_compliance", "compliance"): (1e-6, (0, 1)),
+    ("base_compliance", "compliance.tx"): (1e-6, (0, 1)),
+    ("encoder_offset", ""): (1e-4, FREE),
+    ("encoder_eccentricity", "sine"): (1e-4, FREE),
+    ("encoder_eccentricity", "cosine"): (1e-4, FREE),
+    ("link_length", ""): (1e-4, FREE),
+    ("registration", "base.tx"): (1e-4, FREE),
+    ("registration", "base.rx"): (1e-4, (-np.pi, np.pi)),
+    ("registration", "tool.tx"): (1e-4, FREE),
+    ("joint_clearance", "radial"): (2e-5, (0, 1e-2)),
+    ("joint_clearance", "axial"): (2e-5, (0, 1e-2)),
+    ("joint_clearance", "tilt"): (2e-4, (0, 0.2)),
+    ("friction_hysteresis", ""): (1.0, FREE),
+    ("contact_stiffening", "give"): (1e-6, (0, 1)),
+    ("contact_stiffening", "exponent"): (0.5, (1.05, 6)),  # softer than any spring
+    ("modulus_scale", "softer"): (0.1, (-0.9, 20)),
+    ("load_gain", "factor"): (0.1, (0, 10)),
+    ("load_gain", "offset.fx"): (1.0, FREE),
+    ("drift", "amplitude.tx"): (1e-5, FREE),
+    ("drift", "time_constant"): (1e3, (1, 1e9)),  # a second to thirty years
+}
+
+
+@pytest.mark.parametrize(("effect", "name"), UNITS)
+def test_units_are_those_of_what_is_moved(effect, name):
+    unit = LIBRARY[effect].unit
+    assert (unit(arm(), name), unit(SLIDES, name)) == UNITS[effect, name]
+
+
+@pytest.mark.parametrize(("effect", "name"), SIZES)
+def test_unknowns_are_as_large_as_machines_have_them(effect, name):
+    """And as large at most as a machine could have them; zero, or one, without it."""
+    (one,) = [u for u in LIBRARY[effect].unknowns(arm()) if u.name == name]
+    size, bounds = SIZES[effect, name]
+    assert one.scale == pytest.approx(size)
+    assert (one.lower, one.upper) == pytest.approx(bounds)
+    assert one.start == float(name == "factor")
+    assert bool(one.scan) == (name in {"exponent", "time_constant"})
+
+
+def test_settling_is_looked_for_in_every_decade_of_a_campaign():
+    """From a thirtieth of its duration to three times that, three times a step."""
+    (one,) = [u for u in LIBRARY["drift"].unknowns(arm()) if u.scan]
+    assert (one.name, one.scan_by) == ("time_constant", "time")
+    assert one.scan[0] == pytest.approx(1 / 30, rel=0.11)
+    assert np.log10(np.divide(one.scan[1:], one.scan[:-1])) == pytest.approx(
+        0.5, abs=0.03
+    )
+    assert one.scan[-1] == pytest.approx(3.0)
+
+
+def test_contacts_of_spheres_cones_and_softer_ones_are_looked_for():
+    """Hertz's 1.5, Sneddon's 2 of a cone, and cubic."""
+    (one,) = [u for u in LIBRARY["contact_stiffening"].unknowns(arm()) if u.scan]
+    assert one.scan == (1.5, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(("effect", "before", "after"), [
+    ("drive_compliance", "{}.compliance", "{}"),
+    ("base_compliance", "compliance.{}", "stiffness.{}"),
+])  # fmt: skip
+def test_a_stiffness_is_one_over_its_compliance_and_none_if_rigid(
+    effect, before, after
+):
+    """A millionth of a micrometre under one newton counts as rigid."""
+    found = {"rx": 2e-6, "tz": 1.001e-12, "ty": 0.999e-12, "rz": 0.0, "tx": 1e-12}
+    values = {before.format(name): c for name, c in found.items()}
+    expected = {after.format("rx"): 5e5, after.format("tz"): 1 / 1.001e-12}
+    public = LIBRARY[effect].public(load_robot("arm6"), values)
+    assert public == pytest.approx(expected)
+
+
+def test_where_an_effect_can_act():
+    """Both drives, those that turn; beams, of which one has a body of its own."""
+    beam = arm().frames[1].link
+    robot = Robot("both", "tip", (
+        Frame("turn", joint="revolute", actuated=True), Frame("bar", "turn",
+              [0.2, 0, 0], link=beam),
+        Frame("slide", "bar", joint="prismatic", actuated=True),
+        Frame("pin", "slide", joint="revolute"), Frame("tip", "pin"),
+    ))  # fmt: skip
+    drives, turning, beams = ("turn", "slide"), ("turn",), ("bar",)
+    frames = {name: effect.frames for name, effect in LIBRARY.items() if effect.frames}
+    assert {name: where(robot) for name, where in frames.items()} == {
+        "thermal_expansion": beams, "drive_compliance": drives,
+        "encoder_offset": drives, "encoder_eccentricity": turning,
+        "link_length": beams, "modulus_scale": beams,
+        "joint_clearance": (*drives, "pin"), "friction_hysteresis": (),
+        "contact_stiffening": drives,
+    }  # fmt: skip

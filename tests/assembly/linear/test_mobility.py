@@ -1,0 +1,69 @@
+"""Freedoms and overconstraint of linkages that are counted by hand."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.nominal import size_of
+from assembly.kinematics.posture import home_posture
+from assembly.linear.mobility import mobility
+from assembly.model.robot import Frame, Robot
+from tests.linkages_for_tests import five_bar, four_bar
+
+TURNING = {"joint": "revolute", "actuated": True}
+
+
+def side_by_side(*joints):
+    """Joints at one place about or along z, of which the first is driven."""
+    frames, closures = [], []
+    for k, joint in enumerate(joints):
+        frames += [Frame(f"j{k}", joint=joint, actuated=k == 0),
+                   Frame(f"end{k}", f"j{k}", [0.1, 0, 0])]  # fmt: skip
+        closures += [("end0", f"end{k}")] if k else []
+    return Robot("bundle", "end0", tuple(frames), tuple(closures))
+
+
+@pytest.mark.parametrize(("robot", "counts"), [
+    # an arm closes nothing: its joints are its freedoms
+    (Robot("arm", "tip", (Frame("a", **TURNING), Frame("b", "a", [1, 0, 0], **TURNING),
+                          Frame("tip", "b"))), (2, 0, 0)),
+    # in a plane: three equations of a closure of six
+    (four_bar(), (1, 0, 3)), (four_bar(mode=-1.0), (1, 0, 3)),
+    # its tip turns by itself about the two pins it hangs from
+    (five_bar(), (3, 1, 3)),
+    # one motion in common, of twelve equations two
+    (side_by_side("prismatic", "prismatic", "prismatic"), (1, 0, 10)),
+    # nothing in common
+    (side_by_side("revolute", "prismatic"), (0, 0, 4)),
+    (side_by_side("revolute", "fixed"), (0, 0, 5)),
+])  # fmt: skip
+def test_freedoms_are_those_counted_by_hand(robot, counts):
+    """All, with drives locked, and equations that the others imply."""
+    found = mobility(home_posture(robot))
+    assert (found.freedoms, found.locked_freedoms, found.overconstraint) == counts
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+@pytest.mark.parametrize("joint", ["prismatic", "revolute"])
+def test_the_least_singular_value_of_parallel_joints(joint, count):
+    """Of n - 1 rows q1 - qk one, of a single row the root of two; shifts by size."""
+    robot = side_by_side(*[joint] * count)
+    least = np.sqrt(2.0) if count == 2 else 1.0
+    expected = least / size_of(robot) if joint == "prismatic" else least
+    found = mobility(home_posture(robot)).smallest_singular_value
+    assert found == pytest.approx(expected)
+
+
+def test_without_closures_no_singular_value_is_above_zero():
+    arm = Robot("arm", "tip", (Frame("a", **TURNING), Frame("tip", "a", [1, 0, 0])))
+    assert mobility(home_posture(arm)).smallest_singular_value == 0.0
+
+
+def test_what_counts_as_zero_is_relative_to_the_largest():
+    """Of joints whose rows have singular values sqrt(n) and one."""
+    at = home_posture(side_by_side("revolute", "revolute", "revolute"))
+    assert mobility(at, 0.99 / np.sqrt(3)).freedoms == 1
+    few = mobility(at, 1.01 / np.sqrt(3))
+    assert (few.freedoms, few.overconstraint) == (2, 11)
+    assert few.smallest_singular_value == pytest.approx(
+        np.sqrt(3) * mobility(at).smallest_singular_value
+    )

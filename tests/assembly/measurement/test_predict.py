@@ -1,0 +1,173 @@
+"""Finite motions, contacts and laws in a prediction, by closed forms and bisection."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from assembly.effects import apply_effects
+from assembly.kinematics.posture import home_posture, place_many_joints
+from assembly.measurement.conditions import ContactLaw, Yield, as_declared
+from assembly.measurement.predict import (
+    assemble_row,
+    predict,
+    with_finite_motions,
+    with_rest_positions,
+    with_second_order,
+)
+from assembly.model.robot import Clearance, Frame, Robot
+from tests.linkages_for_tests import four_bar
+
+LENGTH, STIFFNESS, FORCE = 0.8, 2e3, 150.0
+Q = np.array([0.2, 1.1, 0.2, -0.7])  # one command comes twice
+
+
+def arm(stiffness=STIFFNESS):
+    """A rigid bar on an elastic drive about z."""
+    K = np.diag([np.inf, np.inf, stiffness, np.inf, np.inf, np.inf])
+    return Robot("arm", "tip", (
+        Frame("drive", joint="revolute", actuated=True, joint_stiffness=K),
+        Frame("tip", "drive", [LENGTH, 0, 0]),
+    ))  # fmt: skip
+
+
+def rows(robot, force=FORCE, error=0.0):
+    """At four commands under a force along y, the drive off by an angle."""
+    placed, _ = place_many_joints(robot, np.column_stack([Q, 0 * Q]))
+    several = replace(
+        placed[0], coordinates=np.array([p.coordinates for p in placed]),
+        transforms=np.array([p.transforms for p in placed]),
+    )  # fmt: skip
+    errors = np.zeros((2, 6))
+    errors[0, 2] = error
+    several = replace(several, robot=robot.with_errors(errors))
+    return as_declared(several, np.tile([0, 0, 0, 0, force, 0], (4, 1)))
+
+
+def moved(turn):
+    """(4, 6) where turns (4,) put the tip: finitely, and to first order."""
+    there = np.stack([np.cos(Q + turn), np.sin(Q + turn)], axis=1)
+    slope = np.stack([-np.sin(Q), np.cos(Q)], axis=1) * np.reshape(turn, (-1, 1))
+    nominal = np.stack([np.cos(Q), np.sin(Q)], axis=1)
+    found = []
+    for shift in (there - nominal, slope):
+        screws = np.zeros((4, 6))
+        screws[:, 2], screws[:, 3:5] = turn, LENGTH * shift
+        found.append(screws)
+    return found
+
+
+def test_second_order_is_what_errors_do_without_any_load():
+    """L (cos(q + e) - cos q + e sin q) and likewise; the load stays linear."""
+    e = 0.03
+    here = rows(arm(), error=e)
+    finite, linear = moved(np.full(4, e))
+    found = with_second_order(here)
+    assert found.second_order == pytest.approx(finite - linear, abs=1e-9)
+    bent = moved(FORCE * LENGTH * np.cos(Q) / STIFFNESS)[1]
+    seen = predict(found).deviation
+    assert seen == pytest.approx(finite + bent, abs=1e-9)
+    loose = replace(arm().frames[0], clearance=Clearance(radial=1e-5))
+    same = rows(Robot("loose", "tip", (loose, arm().frames[1])), error=e)
+    assert with_second_order(same) is same
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_finite_motions_are_what_each_rows_load_makes_of_them(exact):
+    """K a = F L cos(q + e + a) in each row: the declared model is then exact."""
+    e = 0.03
+    here = replace(rows(arm(), error=e), exact=exact)
+    turn = np.array([
+        e + brentq(lambda a, b=b: STIFFNESS * a - FORCE * LENGTH * np.cos(b + e + a),
+                   -1, 1, xtol=1e-14)
+        for b in Q
+    ])  # fmt: skip
+    found = with_finite_motions(here)
+    assert not found.exact
+    linear = moved(e + FORCE * LENGTH * np.cos(Q) / STIFFNESS)[1]
+    assert found.second_order == pytest.approx(moved(turn)[0] - linear, abs=1e-8)
+    assert predict(found).deviation == pytest.approx(moved(turn)[0], abs=1e-8)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_one_row_with_a_contact_is_where_that_of_all_rows_is(exact):
+    """a = F L cos(q + a) / K + (M / c)^(1/n), the moment by finite motions or not."""
+    c, n, force = 5e4, 1.5, 20.0
+    here = replace(rows(arm(), force), laws=(ContactLaw("drive", c, n),), exact=exact)
+
+    def left(a, q):
+        M = force * LENGTH * np.cos(q + a * exact)
+        return M / STIFFNESS + np.sign(M) * (abs(M) / c) ** (1 / n) - a
+
+    for k, q in enumerate(Q):
+        turn = brentq(left, -1, 1, args=(q,), xtol=1e-14)
+        one = assemble_row(here, k)
+        # with finite motions a contact is settled to a hundred thousandth
+        rel = 2e-5 if exact else 1e-9
+        assert one.platform_screw[2] == pytest.approx(turn, rel=rel)
+        assert predict(here).deviation[k, 2] == pytest.approx(turn, rel=1e-6)
+
+
+def test_a_law_of_its_own_gives_under_the_moment_of_finite_motions():
+    """a = F L cos(q + a) / K + b M^2: each row by itself."""
+    b = 2e-6
+    one = Yield("drive", 2, (("drive", 2),), np.zeros((4, 1)),
+                lambda x, w: b * w[:, 0] ** 2)  # fmt: skip
+    here = replace(rows(arm()), yields=(one,))
+    for exact in (False, True):
+
+        def left(a, q, exact=exact):
+            M = FORCE * LENGTH * np.cos(q + a * exact)
+            return M / STIFFNESS + b * M**2 - a
+
+        turn = [brentq(left, -1, 1, args=(q,), xtol=1e-14) for q in Q]
+        seen = predict(replace(here, exact=exact))
+        assert list(seen.reason) == [""] * 4
+        assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
+
+
+def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
+    """A four-bar with a loose pin, of which one row's coupler is out of the plane."""
+    robot = four_bar()
+    frames = tuple(
+        replace(f, clearance=Clearance(radial=2e-5) if f.name == "wrist" else None)
+        for f in robot.frames
+    )
+    robot = replace(robot, frames=frames)
+    at = home_posture(robot)
+    three = replace(
+        at, coordinates=np.stack([at.coordinates] * 3),
+        transforms=np.stack([at.transforms] * 3),
+    )  # fmt: skip
+    here = as_declared(three, [0, 0, 0, 10.0, -20.0, 0])
+    errors = here.errors.copy()
+    errors[1, robot.index("elbow"), 5] = 1e-2
+    here = replace(here, errors=errors)
+    seen = predict(here)
+    assert np.isnan(seen.deviation).all(axis=1).tolist() == [False, True, False]
+    assert [bool(reason) for reason in seen.reason] == [False, True, False]
+    assert seen.deviation[0] == pytest.approx(seen.deviation[2])
+    rest = with_rest_positions(here).rest
+    assert not rest[1].any()
+    wrist = robot.index("wrist")
+    assert np.linalg.norm(rest[0, wrist]) == pytest.approx(1.0, abs=1e-6)
+    assert rest[0] == pytest.approx(rest[2])
+    assert not np.delete(rest[0], wrist, axis=0).any()
+    held = predict(replace(here, rest=rest).take([0]))
+    assert held.deviation[0] == pytest.approx(seen.deviation[0], abs=1e-9)
+
+
+def test_play_of_an_open_chain_is_taken_up_by_finite_motions_too():
+    """A radius along the force; a joint without load in that way is undetermined."""
+    c = 1e-4
+    rigid = Frame("drive", joint="revolute", actuated=True)
+    here = rows(Robot("rigid", "tip", (rigid, arm().frames[1])), 5.0)
+    loose = apply_effects(here, {"joint_clearance": {"drive.radial": c}})
+    for exact in (False, True):
+        seen = predict(replace(loose, exact=exact))
+        expected = np.tile([0, 0, 0, 0, c, 0], (4, 1))
+        assert seen.deviation == pytest.approx(expected, abs=1e-9)
+        assert not seen.undetermined.any()
+    free = replace(loose, load=0 * loose.load)
+    assert predict(free).undetermined.all()

@@ -1,0 +1,84 @@
+"""What effects may depend on, by public name, and what came before a row."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import Posture, place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.variables import past, variable, with_history
+from assembly.model.robot import Frame, Robot
+
+ROWS = 4
+
+
+@pytest.fixture
+def rows(rng):
+    """A drive that turns, and one that slides, under loads and covariates."""
+    robot = Robot("arm", "tip", (
+        Frame("turn", joint="revolute", actuated=True),
+        Frame("slide", "turn", [0.4, 0.1, 0.2], joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.1, 0, 0]),
+    ))  # fmt: skip
+    commands = rng.uniform(-1, 1, (ROWS, 2))
+    placed = [place_robot(robot, joints={"turn": a, "slide": z}) for a, z in commands]
+    postures = Posture(
+        robot, np.array([p.coordinates for p in placed]),
+        np.array([p.transforms for p in placed]), 0.0,
+    )  # fmt: skip
+    known = {
+        "temperature": rng.normal(size=ROWS), "time": [30.0, 10.0, 20.0, 5.0],
+        "dust": rng.normal(size=ROWS), "session": ["b", "a", "b", "a"],
+    }  # fmt: skip
+    here = as_declared(postures, rng.normal(size=(ROWS, 6)), covariates=known)
+    return here, commands, known
+
+
+def test_each_name_is_a_number_of_the_row(rows):
+    """Positions are those of the platform; covariates with their prefix or, three of
+    them, without; of what nobody gave nothing is known."""
+    here, commands, known = rows
+    expected = {"q.turn": commands[:, 0], "q.slide": commands[:, 1], "q.tip": [0.0] * 4}
+    for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):
+        expected[f"load.{name}"] = here.load[:, k]
+    expected["load.force"] = np.sqrt((here.load[:, 3:] ** 2).sum(axis=1))
+    c, s = np.cos(commands[:, 0]), np.sin(commands[:, 0])
+    expected["position.x"] = 0.5 * c - 0.1 * s
+    expected["position.y"] = 0.5 * s + 0.1 * c
+    expected["position.z"] = 0.2 + commands[:, 1]
+    for name in ("temperature", "time"):
+        expected[name] = expected[f"cov.{name}"] = known[name]
+    expected["cov.dust"] = known["dust"]
+    for name in ("approach", "cov.approach", "cov.wind"):
+        expected[name] = [np.nan] * ROWS
+    for name, values in expected.items():
+        np.testing.assert_allclose(variable(here, name), values, atol=1e-12)
+
+
+def test_a_campaigns_rows_remember_all_of_them_in_the_order_of_time(rows):
+    """Session b began first in the table; parts taken have the same past."""
+    whole = with_history(rows[0])
+    history, row = past(whole, ["q.turn"])
+    assert row.tolist() == [1, 3, 0, 2]
+    assert history.first.tolist() == [True, False, True, False]
+    names = ["q.turn", "q.slide", "load.my", "load.force", "position.z", "time",
+             "approach", "cov.temperature", "cov.time", "cov.dust"]  # fmt: skip
+    for name in names:
+        np.testing.assert_array_equal(history.values[name][row], variable(whole, name))
+    same, some = past(whole.take([2, 0]), [])
+    assert same is history
+    assert some.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("missing", ["history", "row", "both"])
+def test_rows_without_a_past_are_first_rows_of_sessions_of_their_own(rows, missing):
+    here = with_history(rows[0])
+    lost = ("history", "row") if missing == "both" else (missing,)
+    here = replace(here, **dict.fromkeys(lost))
+    history, row = past(here, ["q.slide"])
+    assert row.tolist() == [0, 1, 2, 3]
+    assert history.first.tolist() == [True] * 4
+    assert history.values.keys() == {"q.slide", "time", "approach"}
+    for name in ("q.slide", "time"):
+        np.testing.assert_array_equal(history.values[name], variable(here, name))

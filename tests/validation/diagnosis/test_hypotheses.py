@@ -1,0 +1,134 @@
+"""Which hypotheses a campaign can tell anything about, listed by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.effects import LIBRARY
+from assembly.model.robot import Frame, Robot
+from tests.bar_for_tests import BEAM, bar
+from validation.diagnosis.hypotheses import _groupings, hypotheses
+from validation.diagnosis.signatures import conditions_of
+
+TIME = 60.0 * np.arange(8)
+
+
+def named(conditions, loads=()):
+    """Hypotheses by effect: names that each slot sets."""
+    found: dict[str, list] = {}
+    for one in hypotheses(conditions, loads):
+        own = [slot.names for slot in one.slots]
+        found.setdefault(one.effect, []).append(own)
+    return found
+
+
+def test_frames_have_numbers_of_their_own_share_them_or_act_alone():
+    """Each its own; by kind; one for all; of one kind alone; one alone; none twice."""
+    a, b, c = "a.rod", "b.rod", "a.drive"
+    assert list(_groupings((a, b, c), 1)) == [
+        ((a,), (b,), (c,)), ((a, b), (c,)), ((a, b, c),), ((a, b),), ((c,),),
+        ((a,),), ((b,),),
+    ]  # fmt: skip
+    assert list(_groupings((a,), 1)) == [((a,),)]
+    assert list(_groupings((a, b), 1)) == [((a,), (b,)), ((a, b),), ((a,),), ((b,),)]
+    assert list(_groupings((), 1)) == []
+
+
+@pytest.mark.parametrize(("frames", "each", "few"), [
+    (24, 1, True), (25, 1, False), (12, 2, True), (13, 2, False), (8, 3, True),
+    (9, 3, False),
+])  # fmt: skip
+def test_more_than_two_dozen_unknowns_are_shared(frames, each, few):
+    """Then no frame has a number of its own, alone or beside the others."""
+    places = tuple(f"leg{k}.rod" for k in range(frames))
+    found = list(_groupings(places, each))
+    assert found[-1] == (((places[-1],),) if few else (places,))
+    assert len(found) == (frames + 2 if few else 1)
+    assert (places,) in found
+
+
+@pytest.mark.parametrize(("covariate", "effect", "values", "told"), [
+    ("temperature", "thermal_expansion", np.linspace(0, 4, 8), True),
+    ("temperature", "thermal_expansion", np.full(8, 3.0), True),
+    ("temperature", "thermal_expansion", np.zeros(8), False),
+    ("temperature", "thermal_expansion", np.full(8, np.nan), False),
+    ("temperature", "thermal_expansion", np.append(np.ones(7), np.nan), False),
+    ("time", "drift", TIME, True), ("time", "drift", np.full(8, 60.0), False),
+    ("time", "drift", np.zeros(8), False),
+])  # fmt: skip
+def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
+    covariate, effect, values, told
+):
+    """One that settles needs time that passes, too."""
+    conditions = conditions_of(bar(link=BEAM))
+    given = replace(conditions, **{covariate: values})
+    assert (effect in named(given)) is told
+    others = set(named(given)) ^ set(named(conditions))
+    assert others == ({effect} if told else set())
+
+
+def test_settling_is_looked_for_in_parts_of_the_time_that_passed():
+    """All six amplitudes and a time constant, which alone bends the model."""
+    conditions = replace(conditions_of(bar()), time=1000.0 + TIME)
+    found = [h for h in hypotheses(conditions, []) if h.effect == "drift"]
+    scan = LIBRARY["drift"].unknowns(conditions.robot)[-1].scan
+    assert [h.slots[-1].start for h in found] == pytest.approx([
+        part * 420.0 for part in scan
+    ])
+    for one in found:
+        assert [slot.shape for slot in one.slots] == [False] * 6 + [True]
+        assert one.start[:6].tolist() == [0.0] * 6
+        lower, upper = one.bounds
+        assert (lower[-1], upper[-1]) == (1.0, 1e9)
+        assert np.isinf([lower[:6], upper[:6]]).all()
+
+
+def test_a_load_is_off_in_directions_in_which_it_was_recorded():
+    """The factor and those offsets; either by itself; none of another direction."""
+    found = named(conditions_of(bar(link=BEAM)), ["fy", "mz"])["load_gain"]
+    assert found == [
+        [("factor",), ("offset.mz",), ("offset.fy",)], [("factor",)],
+        [("offset.mz",), ("offset.fy",)],
+    ]  # fmt: skip
+    assert named(conditions_of(bar(link=BEAM)))["load_gain"] == [[("factor",)]]
+
+
+def test_components_of_weight_and_of_a_foundation_act_together_or_one_by_one():
+    found = named(conditions_of(bar(link=BEAM)))
+    axes = [("g.x",), ("g.y",), ("g.z",)]
+    assert found["self_weight"] == [axes, *([axis] for axis in axes)]
+    base = [(f"compliance.{axis}",) for axis in ("rx", "ry", "rz", "tx", "ty", "tz")]
+    assert found["base_compliance"] == [base, *([one] for one in base)]
+    assert found["geometric_stiffening"] == [[]]
+
+
+def test_an_exponent_is_shared_by_all_contacts_of_a_hypothesis():
+    """Two drives: each its own stiffness, or one; at three exponents."""
+    turning = {"joint": "revolute", "actuated": True}
+    robot = Robot("arm", "tip", (
+        Frame("one", **turning), Frame("two", "one", [0.3, 0, 0], **turning),
+        Frame("tip", "two", [0.2, 0, 0]),
+    ))  # fmt: skip
+    plain = conditions_of(bar())
+    T = np.tile(robot.fixed_transforms, (8, 1, 1, 1))
+    conditions = replace(
+        plain, robot=robot, coordinates=np.zeros((8, 3)), transforms=T,
+        errors=np.zeros((8, 3, 6)),
+    )  # fmt: skip
+    found = [h for h in hypotheses(conditions, []) if h.effect == "contact_stiffening"]
+    shapes = [(h.where, [slot.names for slot in h.slots]) for h in found]
+    one, two = ("one.give",), ("two.give",)
+    both, exponents = ("one", "two"), ("one.exponent", "two.exponent")
+    ways = [
+        (both, [one, two, exponents]), (both, [(*one, *two), exponents]),
+        (("one",), [one, ("one.exponent",)]), (("two",), [two, ("two.exponent",)]),
+    ]  # fmt: skip
+    assert shapes == [way for way in ways for _ in range(3)]
+    assert [h.slots[-1].start for h in found] == [1.5, 2.0, 3.0] * 4
+    assert [h.slots[-1].shape for h in found] == [True] * 12
+    shared = found[3].public(robot, [1e-6, 2.0])
+    assert shared == pytest.approx({
+        "one.coefficient": 1e12, "one.exponent": 2.0,
+        "two.coefficient": 1e12, "two.exponent": 2.0,
+    })  # fmt: skip
