@@ -271,3 +271,57 @@ def test_many_wrenches_at_once_are_one_after_the_other(section, rng):
 def test_what_cannot_be_answered_is_refused(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
+
+
+@pytest.mark.parametrize("section", [
+    {"width": 0.03, "height": 0.05}, {"width": 0.05, "height": 0.03},
+    {"width": 0.03, "height": 0.05, "wall": 0.004},
+    {"width": 0.05, "height": 0.03, "wall": 0.002},
+])  # fmt: skip
+@pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
+def test_a_quarter_turn_of_section_and_wrench_turns_the_peak(section, length):
+    """y becomes z and z becomes -y; short beams, whose shear and torsion count, too."""
+    rng = np.random.default_rng(9)
+    turned = section | {"width": section["height"], "height": section["width"]}
+    quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    wrenches = rng.normal(size=(200, 6)) * [0.02, 0.01, 0.01, 0.3, 1, 1]
+    stress, where = peak_beam_stress(section, length, wrenches)
+    moved = wrenches @ np.kron(np.eye(2), quarter).T
+    same, there = peak_beam_stress(turned, length, moved)
+    np.testing.assert_allclose(same, stress, rtol=1e-9)
+    # where two fibres are as good, either may be named
+    alike = np.linalg.norm(there - where @ quarter.T, axis=1) < 1e-9
+    assert alike.mean() > 0.9
+    sides = {tuple(np.sign(np.round(place[1:], 9))) for place in where}
+    assert len(sides) >= 4
+
+
+@pytest.mark.parametrize("size", [(0.03, 0.05, 0.004), (0.05, 0.03, 0.001)])
+def test_a_boxs_shear_flows_on_around_its_corners(size):
+    """What leaves one side enters the next, counterclockwise, of torsion and of both
+    forces; a force's flow is nothing at the middles of the sides across it."""
+    width, height, wall = size
+    section = {"width": width, "height": height, "wall": wall}
+    fibres, influence = section_stress(section)
+    sides = fibres.reshape(4, -1, 2)
+    middles = sides.mean(axis=1)
+    outward = middles / np.linalg.norm(middles, axis=1)[:, None]
+    around = outward @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    tau = influence[:, 1:].reshape(4, sides.shape[1], 2, 6)
+    flow = np.einsum("ki,kpil->kpl", around, tau)[..., [0, 4, 5]]
+    across = np.einsum("ki,kpil->kpl", outward, tau)
+    assert np.abs(across).max() < 1e-9 * np.abs(flow).max()
+    found = 0
+    for k in range(4):
+        for j in range(k):
+            apart = np.linalg.norm(sides[k][:, None] - sides[j][None], axis=2)
+            for p, q in np.argwhere(apart < 1e-12):
+                steps = (flow[k, p] - flow[j, q]) / np.abs(flow).max(axis=(0, 1))
+                np.testing.assert_allclose(steps, 0, atol=1e-9)
+                found += 1
+    assert found == 4
+    for k, direction in enumerate(outward):
+        middle = np.linalg.norm(sides[k] - middles[k], axis=1).argmin()
+        for force in (0, 1):
+            if abs(direction[force]) > 0.5:
+                assert abs(flow[k, middle, 1 + force]) < 1e-9 * np.abs(flow).max()
