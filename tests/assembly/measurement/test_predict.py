@@ -171,3 +171,28 @@ def test_play_of_an_open_chain_is_taken_up_by_finite_motions_too():
         assert not seen.undetermined.any()
     free = replace(loose, load=0 * loose.load)
     assert predict(free).undetermined.all()
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_a_contact_beside_a_spring_takes_its_share_by_finite_motions_too(exact):
+    """x = f / K + (f / c)^(2/3) = (F - f) / K along two sliders that end together."""
+    K, c, forces = 1e6, 3e8, [500.0, -2.0, 40.0]
+    spring = np.diag([np.inf] * 5 + [K])
+    slides = {"joint": "prismatic", "actuated": True, "joint_stiffness": spring}
+    robot = Robot("pair", "end_a", (
+        Frame("a", **slides), Frame("end_a", "a", [0.1, 0, 0]),
+        Frame("b", **slides), Frame("end_b", "b", [0.1, 0, 0]),
+    ), (("end_a", "end_b"),))  # fmt: skip
+    at = home_posture(robot)
+    three = replace(
+        at, coordinates=np.stack([at.coordinates] * 3),
+        transforms=np.stack([at.transforms] * 3),
+    )  # fmt: skip
+    load = np.zeros((3, 6))
+    load[:, 5] = forces
+    here = replace(as_declared(three, load), laws=(ContactLaw("a", c, 1.5),))
+    seen = predict(replace(here, exact=exact)).deviation
+    for F, shift in zip(forces, seen[:, 5], strict=True):
+        own = brentq(lambda f, F=F: f / K + (f / c) ** (2 / 3) - (abs(F) - f) / K,
+                     0.0, abs(F), xtol=1e-13)  # fmt: skip
+        assert shift == pytest.approx(np.sign(F) * (abs(F) - own) / K, rel=1e-6)
