@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from assembly.effects import apply_effects
 from assembly.kinematics.posture import home_posture, place_many_joints
 from assembly.measurement.conditions import ContactLaw, Yield, as_declared
+from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import (
     assemble_row,
     predict,
@@ -192,7 +193,13 @@ def test_a_contact_beside_a_spring_takes_its_share_by_finite_motions_too(exact):
     load[:, 5] = forces
     here = replace(as_declared(three, load), laws=(ContactLaw("a", c, 1.5),))
     seen = predict(replace(here, exact=exact)).deviation
-    for F, shift in zip(forces, seen[:, 5], strict=True):
+    give = np.zeros((3, 1))
+    for k, (F, shift) in enumerate(zip(forces, seen[:, 5], strict=True)):
         own = brentq(lambda f, F=F: f / K + (f / c) ** (2 / 3) - (abs(F) - f) / K,
                      0.0, abs(F), xtol=1e-13)  # fmt: skip
         assert shift == pytest.approx(np.sign(F) * (abs(F) - own) / K, rel=1e-6)
+        give[k] = np.sign(F) * (own / c) ** (2 / 3)
+    # all rows together, none by itself
+    screws, converged = solve_rows(replace(here, exact=True), give)
+    assert converged.all()
+    assert screws == pytest.approx(seen, abs=1e-12)
