@@ -103,11 +103,13 @@ def box_of_stress(tip_scale=1.0):
     field = np.zeros((len(mesh.nodes), 3, 6))
     field[:, 2, 5] = mesh.nodes[:, 2]
     level = SimpleNamespace(
-        mesh=mesh, solid=solid, solution=SimpleNamespace(fields=field),
+        mesh=mesh, solid=solid,
+        solution=SimpleNamespace(
+            fields=field, stiffness=np.diag([1.0, 1, 1, 1, 1, 0.2])
+        ),
         material=np.tile([lam, mu, 0.0], (len(mesh.cells), 1)),
     )  # fmt: skip
-    link = SimpleNamespace(compliance=np.diag([1.0, 1, 1, 1, 1, 5.0]))
-    return SimpleNamespace(level=level, link=link)
+    return SimpleNamespace(level=level)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 0.5])
