@@ -30,7 +30,7 @@ from assembly.linear.fallback import (
     without_own_springs,
 )
 from assembly.linear.lanes import assemble_side_by_side
-from assembly.linear.load import FrameLoads
+from assembly.linear.load import FrameLoads, no_loads
 from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
@@ -169,7 +169,7 @@ def _compiled_assembly(
         linearisation=linearise(posture),
         joints=joints,
         load=np.zeros(6) if load is None else np.array(load, dtype=float),
-        frame_loads=frame_loads or _no_loads(robot.errors.size),
+        frame_loads=frame_loads or no_loads(robot.errors.size),
         elastic=out.elastic[0] if bent else np.zeros(len(joints.links)),
         clearances=out.clearances[0],
         motions=out.motions[0],
@@ -181,14 +181,6 @@ def _compiled_assembly(
         energy=float(out.energy[0]), platform_screw=out.platform_screw[0]
     )
     return assembly
-
-
-@lru_cache(maxsize=32)
-def _no_loads(size: int) -> FrameLoads:
-    """Of a robot with so many small screws' components; nobody may write them."""
-    none = np.zeros((2, size))
-    none.setflags(write=False)
-    return FrameLoads(*none)
 
 
 @lru_cache(maxsize=32)  # of one robot at many postures

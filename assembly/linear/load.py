@@ -63,6 +63,21 @@ class FrameLoads:
         return np.require(every, requirements=["C", "W"])
 
 
+@lru_cache(maxsize=32)
+def no_loads(size: int) -> FrameLoads:
+    """No loads at all; one object for all who ask, which nobody may write.
+
+    Args:
+        size: 6n, of a robot of n frames.
+
+    Returns:
+        Zeros.
+    """
+    none = np.zeros((2, size))
+    none.setflags(write=False)
+    return FrameLoads(*none)
+
+
 def loads_on_frames(
     posture: Posture,
     load: ArrayLike | None = None,
