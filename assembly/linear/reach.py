@@ -201,11 +201,11 @@ class ReachableSet:
         """
         if self.unbounded(part):
             return (np.inf, np.inf), self.centre, 0
-        found = one_problem.farthest(
+        solved = one_problem.farthest(
             self.centre, self.map, self.rows, self.start, self._starts, part, tolerance
         )
-        if found is not None:
-            (low, high), screw, supports = found
+        if solved is not None:
+            (low, high), screw, supports = solved
             return (float(low), float(high)), screw, supports
         from assembly.solvers.farthest import NEEDED, begin_search, search_on
 

@@ -231,7 +231,7 @@ def _certified(
     u, y, starts = u.copy(), np.concatenate([h, -rigid]), cone_starts(group)
     relative = _STOP * GAP
     absolute = _STOP * GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
-    limits = one_problem.Limits(relative, absolute, _FIRST_SIGMA, _STEPS)
+    limits = one_problem.SolverLimits(relative, absolute, _FIRST_SIGMA, _STEPS)
     if not one_problem.newton((G, h, d, H, k), starts, limits, u, y):
         from assembly.solvers.cone_solvers import newton
         from assembly.solvers.dual_newton import Dual

@@ -25,7 +25,7 @@ class _Given(ctypes.Structure):
     )
 
 
-class Limits(ctypes.Structure):
+class SolverLimits(ctypes.Structure):
     """How far a method goes: ``Limits`` of one_problem.cpp.
 
     Attributes:
@@ -67,14 +67,14 @@ def interior_point(
     """
     _, h, d, _, k = problem
     u, y = np.zeros(len(d)), np.zeros(len(h) + len(k))
-    limits = Limits(absolute=tolerance)
+    limits = SolverLimits(absolute=tolerance)
     if not _solve("interior_point", problem, starts, limits, u, y):
         return None
     return u, y[len(h) :]
 
 
 def newton(
-    problem: Problem, starts: NDArray, limits: Limits, u: NDArray, y: NDArray
+    problem: Problem, starts: NDArray, limits: SolverLimits, u: NDArray, y: NDArray
 ) -> bool:
     """The same by Newton's method on the dual.
 
@@ -93,7 +93,12 @@ def newton(
 
 
 def _solve(
-    name: str, problem: Problem, starts: NDArray, limits: Limits, u: NDArray, y: NDArray
+    name: str,
+    problem: Problem,
+    starts: NDArray,
+    limits: SolverLimits,
+    u: NDArray,
+    y: NDArray,
 ) -> bool:
     """Call a function of the library; whether it did."""
     library = load_library(SOURCE)

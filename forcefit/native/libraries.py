@@ -173,12 +173,12 @@ def announce() -> None:
 
 def _processor() -> str:
     """Which processor this is, with all that it can do, as far as the system says."""
-    said = [platform.machine()]
+    features = [platform.machine()]
     with suppress(OSError):
         first = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0]
         lines = (line.partition(":") for line in first.splitlines())
-        said += [text for name, _, text in lines if name.strip() in _NAMED]
-    return " ".join(said)
+        features += [text for name, _, text in lines if name.strip() in _NAMED]
+    return " ".join(features)
 
 
 def digest_of(source: str) -> str:

@@ -1,13 +1,13 @@
-"""The platform's stiffness against two roads of the multibody simulation.
+"""The platform's stiffness by two methods of the multibody simulation.
 
 At the equilibrium with the robot's errors, its load and its weight the simulation's own
 residual is differentiated, and it is loaded a little along each axis, both ways; either
-road has an uncertainty of its own (:mod:`validation.multibody.tangent`).  One whose
+method has an uncertainty of its own (:mod:`validation.multibody.tangent`).  One whose
 uncertainty is above what is asked for decides nothing.
 
 Clearances are left out on both sides unless asked for; where they are pressed there is
-the linearised road alone, through contacts that are smoothed.  A load's force is dead,
-its moment a couple of dead forces: a moment of fixed axes has no potential
+the linearised method alone, through contacts that are smoothed.  A load's force is
+dead, its moment a couple of dead forces: a moment of fixed axes has no potential
 (``docs/exact.md``).
 """
 
@@ -133,12 +133,12 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether every road that decides agrees, and one decides."""
+        """Whether every method that decides agrees, and one decides."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
     def _decided(self) -> list[bool]:
-        """Whether they agree, of the roads that are known well enough."""
+        """Whether they agree, of the methods whose results are known well enough."""
         return [
             self.differences[name] <= self.tolerance
             for name, own in self.uncertainties.items() if own <= self.tolerance

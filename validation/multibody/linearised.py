@@ -137,10 +137,10 @@ def _compliance(
         q = q - Z @ _solve(K, Z.T @ forces(q))
     K = without_squares(steps, [stiffness(q, Z, step) for step in steps])
     V = without_squares(steps, [motion(q, Z, step)[gaps.stop :] for step in steps])
-    found = [_by_modes(model, *pair) for pair in zip(K, V, strict=True)]
-    size = np.sqrt(np.abs(np.diag(found[-1])))
+    compliances = [_by_modes(model, *pair) for pair in zip(K, V, strict=True)]
+    size = np.sqrt(np.abs(np.diag(compliances[-1])))
     units = np.outer(size, size)
-    C, change = steadiest(found, lambda change: float((change / units).max()))
+    C, change = steadiest(compliances, lambda change: float((change / units).max()))
     return C, float((change / units).max()), _is_stable(model, K[-1], V[-1])
 
 
