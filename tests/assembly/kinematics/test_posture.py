@@ -230,6 +230,7 @@ def test_what_is_not_actuated_may_be_held_too():
         ({"rx": 0.5}, "0.5 rad"), ({"ry": -0.25}, "0.25 rad"), ({"tz": 2.0}, "2 m"),
         ({"tz": 2.0, "rx": 0.5}, "2 m and 0.5 rad"),
         ({"ty": 0.0, "tz": 2.0}, "2 m"), ({"rx": 0.3, "ry": 0.4}, "0.5 rad"),
+        ({"ry": 0.3, "rz": 0.4}, "0.5 rad"),
     ],
 )  # fmt: skip
 def test_what_is_missing_has_the_units_of_what_was_asked(asked, missing):

@@ -289,6 +289,16 @@ def test_how_far_an_interval_goes_both_ways(start):
     assert not _moves(shift_along_x(start, [1.0]))
 
 
+def test_nearest_is_counted_at_the_platforms_origin_where_no_point_is_given():
+    answer = solve_assembly(erring("delta", 1))
+    near, origin, elsewhere = (
+        nearest_pose(answer, *point)[0].platform_screw
+        for point in ((), (np.zeros(3),), ([0.0, 1.0, 0.0],))
+    )
+    np.testing.assert_array_equal(near, origin)
+    assert np.abs(near - elsewhere).max() > 1e-5
+
+
 def test_the_nearest_pose_closes_what_springs_and_plays_closed():
     """Springs stay bent, free motions follow, nothing opens, nothing is farther."""
     moved = 0

@@ -1,5 +1,6 @@
 """Whole links from their surfaces, to an asked accuracy within a budget."""
 
+import itertools
 import time
 
 import numpy as np
@@ -183,6 +184,26 @@ def test_a_refined_mesh_is_as_large_as_wanted_or_as_can_be_paid():
     assert _affordable_mesh(level, 3.0, Budget(unknowns=1), now) is None
     late = now - Budget().seconds
     assert _affordable_mesh(level, 3.0, Budget(), late) is None
+
+
+@pytest.mark.parametrize("thickness", [0.0005, 0.001, 0.02])
+def test_a_first_mesh_follows_the_surface_as_closely_as_its_walls_are_thin(
+    thickness, monkeypatch
+):
+    """To an eighth of a wall of 2 V / A; 0.2 % of the part is always close enough."""
+    a, b = 0.06, 0.1
+    points = np.array(list(itertools.product((0, a), (0, thickness), (0, b))))
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
+             [1, 5, 7, 3]]  # fmt: skip
+    triangles = [[s[i] for i in turn] for s in sides for turn in ([0, 1, 2], [0, 2, 3])]
+    plate, asked = check_surface(points, np.array(triangles), "plate"), {}
+    monkeypatch.setattr(fea, "mesh_solid", lambda *_, **given: asked.update(given))
+    fea.first_mesh(plate, *PLANES, Budget())
+    V, A = a * b * thickness, 2 * (a * b + (a + b) * thickness)
+    diagonal = np.sqrt(a**2 + b**2 + thickness**2)
+    expected = min(2e-3, 2 * V / A / 8 / diagonal)
+    assert asked["envelope"] == pytest.approx(expected, rel=1e-9)
+    assert asked["edge"] == pytest.approx(diagonal / 10, rel=1e-9)
 
 
 def test_expected_costs_are_those_measured_and_grow_faster_than_the_mesh(monkeypatch):
