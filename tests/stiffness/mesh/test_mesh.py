@@ -206,6 +206,7 @@ def test_the_mesher_is_ended_when_its_time_is_up(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     load_library(mesh_module._SAME_NUMBERS) is None, reason="no C++ compiler"
 )
