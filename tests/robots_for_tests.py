@@ -37,6 +37,15 @@ def irsbot2_over(x, z):
     return robot, place_many(robot, poses)[0]
 
 
+def with_bodies(robot, rng, heaviest=5.0, off=0.2):
+    """The robot with a body of a kilogram and more [kg] on each frame, ``off`` [m]."""
+    return replace(robot, frames=tuple(
+        replace(f, mass=rng.uniform(1, heaviest),
+                centre_of_mass=rng.normal(size=3) * off)
+        for f in robot.frames
+    ))  # fmt: skip
+
+
 def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):
     """Two links on the x axis that meet end to end, ``gap`` [6] apart.
 

@@ -3,11 +3,17 @@
 import numpy as np
 from scipy.spatial import Delaunay
 
+from stiffness.fem.elements import lame
 from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import check_surface
 
 Z = np.array([0.0, 0.0, 1.0])
+
+
+def constants(mesh, young=60e9, poisson=0.3):
+    """(t,) [Pa] Lame's constants of a mesh of one material."""
+    return tuple(np.full(len(mesh.cells), one) for one in lame(young, poisson))
 
 
 def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):

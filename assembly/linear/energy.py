@@ -35,7 +35,6 @@ from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
-    differs_from_zero,
     drop_zeros,
     stiffness_spread,
 )
@@ -159,10 +158,10 @@ def _compiled_assembly(
     )  # fmt: skip
     if out.outcome[0] >= COMPILED:
         return None
-    multipliers, loaded = out.multipliers[0], frame_loads is not None
-    gap, residual = out.energy - out.bound, out.residual + rounding
-    if not differs_from_zero(out.energy[0], gap[0], multipliers, residual[0]):
-        drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
+    residual = out.residual + rounding
+    loaded = frame_loads is not None
+    drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
+    multipliers = out.multipliers[0]
     # without loads no wrenches mean no deformation but rounding
     bent = len(out.elastic) > 0 and (loaded or np.count_nonzero(multipliers) > 0)
     assembly = Assembly(

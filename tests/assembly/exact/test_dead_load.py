@@ -24,7 +24,7 @@ from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns
-from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
+from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
 from validation.multibody.simulation import (
     SimulationModel,
     simulate_assembly,
@@ -185,11 +185,7 @@ def test_a_force_on_the_platforms_body_is_the_platforms_load():
 def test_the_base_carries_all_weight_where_it_hangs():
     """Forces and moments of a closed loop on its base, in the deformed posture."""
     rng = np.random.default_rng(3)
-    robot = random_robot(rng, legs=3)
-    robot = replace(robot, frames=tuple(
-        replace(f, mass=rng.uniform(1, 5), centre_of_mass=rng.normal(size=3) * 0.2)
-        for f in robot.frames
-    ))  # fmt: skip
+    robot = with_bodies(random_robot(rng, legs=3), rng)
     g = np.array([1.0, -2.0, -G])
     answer = solve_exact(home_posture(robot), gravity=g)
     total, balance = np.zeros(6), np.zeros(6)
@@ -271,11 +267,7 @@ def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
     least under a load: it differs by the weight's work on what the poses differ.
     """
     robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
-    rng = np.random.default_rng(4)
-    robot = replace(robot, frames=tuple(
-        replace(f, mass=rng.uniform(1, 2), centre_of_mass=rng.normal(size=3) * 0.05)
-        for f in robot.frames
-    ))  # fmt: skip
+    robot = with_bodies(robot, np.random.default_rng(4), heaviest=2, off=0.05)
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
     stiffness = {
         frame.name: np.linalg.inv(link_compliance(frame))

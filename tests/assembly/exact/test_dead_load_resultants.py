@@ -20,7 +20,7 @@ from assembly.linear.closure import virtual_joints
 from assembly.model.robot import Frame
 from tests.assembly.exact.test_dead_load import heavy, on_a_hinge, some_loads
 from tests.assembly.exact.test_placement import moved_unknowns
-from tests.robots_for_tests import random_robot
+from tests.robots_for_tests import random_robot, with_bodies
 
 
 def arm_of_one_body():
@@ -81,11 +81,7 @@ def test_loads_are_no_larger_than_their_magnitudes(seed):
 def test_what_a_frame_holds_is_all_that_hangs_on_it():
     """Moments and forces at points, summed up the tree; joints hold no own body."""
     rng = np.random.default_rng(4)
-    robot = random_robot(rng, legs=2)
-    robot = replace(robot, frames=tuple(
-        replace(f, mass=rng.uniform(1, 5), centre_of_mass=rng.normal(size=3) * 0.2)
-        for f in robot.frames
-    ))  # fmt: skip
+    robot = with_bodies(random_robot(rng, legs=2), rng)
     posture = home_posture(robot)
     model, x, _ = moved_unknowns(posture, rng, 0.1)
     there, load = place(model, x), np.r_[np.zeros(3), rng.normal(size=3)]

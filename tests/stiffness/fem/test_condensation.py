@@ -13,20 +13,14 @@ from stiffness.fem.condensation import (
     condense,
     rigid_motions,
 )
-from stiffness.fem.elements import assemble, isoparametric, lame, triangle_areas
+from stiffness.fem.elements import assemble, isoparametric, triangle_areas
 from stiffness.link import scaled
 from stiffness.mesh.mesh import Solid
 from stiffness.screws import rotation_matrix
-from tests.solids_for_tests import bar_solid, box_solid
+from tests.solids_for_tests import bar_solid, box_solid, constants
 
-LAM, MU = lame(60e9, 0.3)
 SIZE = np.array([0.05, 0.08, 0.2])
 CENTERS = np.array([[0.02, 0.05, 0.01], [0.03, 0.02, 0.23]])
-
-
-def constants(mesh):
-    ones = np.ones(len(mesh.cells))
-    return LAM * ones, MU * ones
 
 
 def test_a_screw_moves_a_point_by_its_shift_and_its_turn_about_the_centre(rng):

@@ -22,7 +22,7 @@ from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import face_nodes, lattice
 from stiffness.mesh.mesh import Solid
 from stiffness.screws import rotation_matrix, screw_map
-from tests.solids_for_tests import bar_solid, box_solid, outward
+from tests.solids_for_tests import bar_solid, box_solid, constants, outward
 
 E, NU = 60e9, 0.3
 LAM, MU = lame(E, NU)
@@ -30,11 +30,6 @@ MESHES = [  # order, and whether edges are cut into layers
     (2, False), (3, False), (2, True),
     pytest.param(3, True, marks=pytest.mark.slow),
 ]  # fmt: skip
-
-
-def constants(mesh):
-    ones = np.ones(len(mesh.cells))
-    return LAM * ones, MU * ones
 
 
 def full(upper):

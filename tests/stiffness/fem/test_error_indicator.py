@@ -26,18 +26,13 @@ from stiffness.link import inverted, scaled
 from stiffness.mesh.edge_grading import split_joining_edges
 from stiffness.mesh.lagrange import lattice, quadrature
 from stiffness.surface.primitives import Cone
-from tests.solids_for_tests import Z, bar_solid, box_solid, with_plane_sides
+from tests.solids_for_tests import Z, bar_solid, box_solid, constants, with_plane_sides
 
 E, NU = 60e9, 0.3
 LAM, MU = lame(E, NU)
 R, L = 0.04, 0.452
 BENDING = 1032277.0  # N m/rad, the paper's bar, converged
 TORSION = E / (2 + 2 * NU) * np.pi / 2 * R**4 / L
-
-
-def constants(mesh):
-    ones = np.ones(len(mesh.cells))
-    return LAM * ones, MU * ones
 
 
 @cache

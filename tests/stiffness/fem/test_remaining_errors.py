@@ -15,15 +15,10 @@ from stiffness.fem.error_indicator import (
     traction_errors,
 )
 from stiffness.mesh.lagrange import quadrature
-from tests.solids_for_tests import box_solid
+from tests.solids_for_tests import box_solid, constants
 
 E = 60e9
 LAM, MU = lame(E, 0.3)
-
-
-def constants(mesh):
-    ones = np.ones(len(mesh.cells))
-    return LAM * ones, MU * ones
 
 
 def split_energies(mesh, stress):
