@@ -1,7 +1,7 @@
 """The command ``forcefit validation diagnose``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,9 @@ from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
 from forcefit.inputs.writing import ROBOT, check_writable, write_json
+
+if TYPE_CHECKING:
+    from validation.diagnosis.diagnosis import Diagnosis
 
 
 def diagnose(
@@ -42,6 +45,7 @@ def diagnose(
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
+    from validation.diagnosis.saving import save as save_robot
 
     if save is not None:
         check_writable(save, ROBOT)
@@ -53,8 +57,9 @@ def diagnose(
         from validation.diagnosis.verdict import calibrate as simulate
 
         with progress_bars() as update:
+            selection = diagnosis.traced.selection
             tally = simulate(
-                diagnosis.screen, diagnosis.best, calibrate,
+                selection.screen, selection.sets[0], calibrate,
                 lambda done, n: update("simulated campaigns", done, n),
             )  # fmt: skip
     write_json(results.table(diagnosis, tally), json)
@@ -68,11 +73,17 @@ def diagnose(
         folder = campaign if campaign.is_dir() else campaign.parent
         write_report(diagnosis, report, tally, provenance(folder))
     if save is not None:
-        if not diagnosis.foretells:
-            typer.echo(
-                f"{save}: not written, the verdict is {diagnosis.verdict}", err=True
-            )
+        if not diagnosis.better:
+            typer.echo(f"{save}: not written, {_worse(diagnosis)}", err=True)
             raise typer.Exit(1)
-        from assembly.files.robot_file import write_robot
+        save_robot(diagnosis, save)
 
-        write_robot(results.corrected(diagnosis), save)
+
+def _worse(diagnosis: "Diagnosis") -> str:
+    """Why the machine found is not saved."""
+    if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
+        return "nothing was found that the declared robot lacks"
+    return (
+        "the machine found predicts the held-out rows no better than the declared robot "
+        f"({diagnosis.after.normalised:.3g} and {diagnosis.before.normalised:.3g} sigma)"
+    )

@@ -36,8 +36,8 @@ from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
-from validation.correction.prediction import finite_conditions
 from validation.correction.spread import deviation_spread
+from validation.diagnosis.prediction import finite_conditions
 
 _STEPS = 25
 _HALVINGS = 8

@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import virtual_joints
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import Prediction, predict, with_finite_motions
+from assembly.measurement.predict import Prediction, predict
 from forcefit.inputs.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
+from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import register
-from validation.diagnosis.signatures import conditions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +70,6 @@ def foretell(commands: Campaign) -> Foretold:
         conditions = register(commands.take(measured), conditions)
     prediction = predict(conditions)
     return Foretold(commands, prediction, error_of(commands, prediction.deviation))
-
-
-def finite_conditions(campaign: Campaign) -> Conditions:
-    """What acts in a campaign, motions finite as those of a machine are.
-
-    Args:
-        campaign: of R rows.
-
-    Returns:
-        R conditions; of a robot with clearance the linear model's, since where it
-        rests without a load is open.
-    """
-    conditions = conditions_of(campaign)
-    if conditions.exact or virtual_joints(conditions.robot).cones.shape[1]:
-        return conditions
-    return with_finite_motions(conditions)
 
 
 def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:

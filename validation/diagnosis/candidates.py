@@ -115,6 +115,20 @@ class Sensitivities:
         other._response = Responses(r.reading[rows], r.screws[rows], r.wrenches[rows])
         return other
 
+    def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
+        """The same functions where effects have changed the conditions.
+
+        Args:
+            conditions: of the same rows.
+            response: of the readings there.
+
+        Returns:
+            Sensitivities there; forms are normalised as before.
+        """
+        other = copy(self)
+        other.conditions, other._response = conditions, response
+        return other
+
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         axis = AXES.index(component)

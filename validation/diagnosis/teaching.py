@@ -13,22 +13,17 @@ from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
 from assembly.measurement.conditions import Conditions
-from assembly.model.function import Function
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.background import background
 from validation.diagnosis.candidates import Sensitivities
-from validation.diagnosis.holdout import SPANS, blocks_of, gain_over_blocks
-from validation.diagnosis.kept_aside import FittedModel
+from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit
-from validation.diagnosis.learning import Learned, Lesson, cost, learn, term_name
+from validation.diagnosis.learning import Learned, Lesson, cost, learn
 from validation.diagnosis.refit import Fit, refit, with_clearance_held
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.remainder import Unexplained
 from validation.diagnosis.responses import responses
 from validation.diagnosis.selection import Selection, Update
-from validation.diagnosis.signatures import whiten
-
-_ERROR = 1.0  # standard errors by which rows kept aside must be foretold better
 
 
 def taught(
@@ -87,11 +82,6 @@ def taught(
         own = selection.screen.fit(story.members)
         device = selection.unknowns - selection.sets[0].rank
         told = replace(told, sets=[own, *selection.sets], unknowns=own.rank + device)
-    held = with_clearance_held(conditions, selection.fit)
-    before = FittedModel(held, response, selection.fit, selection.behind)
-    after = FittedModel(conditions, response, fit, behind, lesson.learned)
-    if not _foretells(campaign, ~used, before, after):
-        return selection, NOTHING
     return told, Taught(lesson.learned, story.kind)
 
 
@@ -175,39 +165,3 @@ def cost_of(selection: Selection) -> float:
     left = selection.behind.left(selection.fit.residual)
     unknowns = selection.unknowns + selection.behind.unknowns
     return cost(len(left), float(left @ left), unknowns)
-
-
-def _foretells(
-    campaign: Campaign, held: NDArray, before: FittedModel, after: FittedModel
-) -> bool:
-    """Whether rows kept aside are foretold better, by more than its own uncertainty."""
-    if not held.any():
-        return True
-    judged = campaign.take(held)
-    squares = [
-        whiten(judged, model.residual(campaign)[held]) ** 2 for model in (before, after)
-    ]
-    rows = np.nonzero(judged.cells)[0]
-    where = blocks_of(campaign)[0][held][rows]
-    gain, error = gain_over_blocks(squares[0], squares[1], where)
-    return gain > _ERROR * error
-
-
-def functions_of(campaign: Campaign, model: FittedModel) -> list[list[Function]]:
-    """The functions of a robot file that were learned, with their numbers.
-
-    Args:
-        campaign: whose robot.
-        model: with what was learned.
-
-    Returns:
-        For every effect learned one function, or several of one kind.
-    """
-    behind = model.behind
-    values = behind.values(model.fit.residual)
-    terms = zip(behind.terms, values, behind.deviations(), strict=True)
-    known = {term.name: (x, std) for term, x, std in terms}
-    return [
-        model.sensitivities.fitted(one.candidate, *known[term_name(k + 1)])
-        for k, one in enumerate(model.learned)
-    ]

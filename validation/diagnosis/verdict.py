@@ -18,6 +18,7 @@ from validation.diagnosis.scoring import (
     posterior,
 )
 
+NOT_ENOUGH = "not_enough_rows"
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one stands against it
 _LISTED = 0.02  # probability from which an alternative is listed
