@@ -127,7 +127,7 @@ def covariance_of(
                 J[springs[one], own.start + k] = 1.0
     middle = np.array([n.of(robot) for n in numbers])
     std = np.sqrt(np.maximum(np.diag(C), 0.0))
-    for k in np.flatnonzero(~small & (std > 0.0)):
+    for k in np.flatnonzero(~small & (std > 0.0)).tolist():
         moved = x.copy()
         moved[k] += _STEP * std[k]
         other = unknowns.robot_at(moved)
@@ -212,3 +212,43 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(f"{path}: found shape {C.shape}, expected {len(values)} squared")
     return SavedCovariance(numbers, C)
+
+
+def known_covariance(robot: Robot) -> SavedCovariance:
+    """All that a robot file says of the uncertainty of its numbers.
+
+    Args:
+        robot: of the file.
+
+    Returns:
+        The covariance that the file names; of numbers that it lacks, ``tolerance`` of
+        frames and ``std`` of functions, as independent.
+
+    Raises:
+        BadInput: as :func:`read_covariance`.
+    """
+    saved = read_covariance(robot)
+    numbers = [] if saved is None else list(saved.numbers)
+    variance: list[float] = []
+    further = []
+    for frame in robot.frames:
+        for axis, sigma in zip(_AXES, _sigmas(frame.tolerance), strict=True):
+            further.append((Number(ERROR, frame.name, axis), sigma))
+    for k, function in enumerate(robot.functions):
+        further += [(Number(FUNCTION, str(k), n), s) for n, s in function.std.items()]
+    known = set(numbers)
+    for number, sigma in further:
+        if sigma > 0.0 and number not in known:
+            numbers.append(number)
+            variance.append(sigma**2)
+    first = len(numbers) - len(variance)
+    C = np.zeros((len(numbers), len(numbers)))
+    if saved is not None:
+        C[:first, :first] = saved.covariance
+    C[first:, first:] = np.diag(variance)
+    return SavedCovariance(tuple(numbers), C)
+
+
+def _sigmas(tolerance: NDArray | None) -> list[float]:
+    """Six standard deviations, 0 where nothing is said."""
+    return [0.0] * 6 if tolerance is None else tolerance.tolist()

@@ -118,6 +118,9 @@ def _record(diagnosis: Diagnosis) -> dict[str, Any]:
             value = getattr(errors, kind)
             if np.isfinite(value):
                 record[f"{name}{kind}"] = value
+    for kind in ("position", "rotation"):
+        if np.isfinite(getattr(diagnosis.noise, kind)):
+            record[f"noise_{kind}"] = getattr(diagnosis.noise, kind)
     missing = not_measured(campaign)
     if missing:
         record["not_measured"] = missing
