@@ -188,7 +188,7 @@ class Fitting:
         element = np.repeat(np.arange(len(elements)), counts)
         given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
         most = np.repeat([e.most for e in elements], counts)
-        for _ in range(3):
+        while True:
             beside = across[used]
             gram = np.block([[self._gram[np.ix_(used, used)], beside], [beside.T, inner]])
             sizes = best_sizes(
