@@ -94,7 +94,7 @@ def _variables(function: Function) -> tuple[str, str]:
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
-    if function.form == "reversal":
+    if function.form in {"reversal", "reversal_waves"}:
         return (rest or [first])[0], ""
     return first, (rest or [""])[0]
 
@@ -150,6 +150,10 @@ def _values(
     if function.form in {"lag", "creep"}:
         left = np.exp(-x / own["time_constant"])
         inputs = [1.0 - left, left]
+    elif function.form == "play":
+        inputs = [np.ones_like(x)]
+    elif function.form == "reversal_waves":
+        inputs = [np.ones_like(x), x]
     elif function.form == "reversal":
         sized = function.variables[-1].startswith(("load.", "wrench."))
         inputs = [np.ones_like(x), np.abs(x) if sized else x][: len(function.variables)]

@@ -62,7 +62,7 @@ class _Forms:
         columns: list[NDArray] = []
         taken: dict[CandidateShape, list[int]] = {}
         for shape in sorted(shapes, key=lambda shape: -len(shape.names)):
-            own = sensitivities.basis(variable, shape)[0][sensitivities.rows].T
+            own = sensitivities.basis((variable,), shape)[0][sensitivities.rows].T
             # a wave of one order is the same in every form that has it
             keys: Sequence[object] = shape.names
             if shape.form != "waves":

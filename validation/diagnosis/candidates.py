@@ -21,11 +21,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.forms import roughness
+from assembly.effects.forms import FORMS, roughness
 from assembly.effects.functions import AXES, basis
 from assembly.effects.places import beams, drives
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import variable
+from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.diagnosis.forms_tried import CandidateShape
@@ -45,11 +45,18 @@ class CandidatePart:
         where: a frame, ``"base"`` or ``"reading"``.
         components: of the screw there.
         variable: its public name.
+        beside: that of a second variable, if it depends on two.
     """
 
     where: str
     components: tuple[str, ...]
     variable: str
+    beside: str = ""
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """One or two public names."""
+        return (self.variable, self.beside) if self.beside else (self.variable,)
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,7 @@ class Candidate:
             Function(
                 p.where,
                 p.components,
-                (p.variable,),
+                p.variables,
                 self.shape.form,
                 numbers,
                 self.kind,
@@ -129,6 +136,11 @@ class Sensitivities:
         other.conditions, other._response = conditions, response
         return other
 
+    @property
+    def wrenches(self) -> NDArray:
+        """(R, n, 6) [N m, N] through every joint as declared, in its axes."""
+        return self._response.wrenches
+
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         axis = AXES.index(component)
@@ -145,11 +157,16 @@ class Sensitivities:
             return sensitivity * self._response.wrenches[:, row, axis, None]
         return sensitivity
 
-    def _basis(self, name: str, shape: CandidateShape) -> tuple[NDArray, NDArray]:
-        """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
-        anywhere = CandidatePart("reading", ("tx",), name)
+    def _basis(
+        self, variables: tuple[str, ...], shape: CandidateShape
+    ) -> tuple[NDArray, NDArray]:
+        """(R, q) columns of a form of variables, of order one, and T (p, q)."""
+        anywhere = CandidatePart("reading", ("tx",), *variables)
         (function,) = Candidate((anywhere,), "screw", shape).functions()
-        raw = np.nan_to_num(basis(self.conditions, function, shape.names))
+        if variables[0].startswith("wrench."):
+            raw = FORMS[shape.form].basis(shape.names, [self._wrench(*variables)], {})
+        else:
+            raw = np.nan_to_num(basis(self.conditions, function, shape.names))
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -163,9 +180,15 @@ class Sensitivities:
             stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
             mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
             mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
-        elif shape.form in {"waves", "slow_wave"}:
+        elif shape.form.endswith(("waves", "slow_wave")) and len(variables) == 1:
             mixed = np.eye(len(shape.names))
         return raw @ mixed, mixed
+
+    def _wrench(self, name: str) -> NDArray:
+        """(R,) [N m or N] what a joint carries as declared."""
+        frame, _, component = name.removeprefix("wrench.").rpartition(".")
+        row = self.conditions.robot.index(frame)
+        return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate) -> NDArray:
         """What a candidate adds to the readings.
@@ -206,7 +229,7 @@ class Sensitivities:
     def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:
         """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
         for part in one.parts:
-            columns = self.basis(part.variable, one.shape)[0][self.rows]
+            columns = self.basis(part.variables, one.shape)[0][self.rows]
             for component in part.components:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
@@ -224,7 +247,7 @@ class Sensitivities:
         functions, at = [], 0
         least = _NOTHING * np.abs(x).max(initial=0.0)
         for part, function in zip(one.parts, one.functions(), strict=True):
-            _, mixed = self.basis(part.variable, one.shape)
+            _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(one.shape.given), {}
             shown = []  # components that the readings see
             alone = len(part.components) == 1

@@ -1,0 +1,145 @@
+"""Everything a search may use, of a campaign's design alone: no reading is looked at."""
+
+from collections import Counter
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY
+from assembly.measurement.conditions import Conditions
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.candidates import Sensitivities
+from validation.diagnosis.elements import Element, effect_element, effect_prior
+from validation.diagnosis.functions import Functions
+from validation.diagnosis.holdout import blocks_of
+from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.nuisance import Nuisance, nuisance
+from validation.diagnosis.registration import device_frame
+from validation.diagnosis.responses import responses
+from validation.diagnosis.signatures import Signature, Tangents, loaded_components
+from validation.diagnosis.small_terms import small_terms
+
+_VISIBLE = 4.0  # squared whitened change of the readings
+
+
+class Columns:
+    """Columns of the N measured cells of a campaign.
+
+    Attributes:
+        campaign, conditions: of R rows.
+        row: (N,) of every cell.
+        block: (N,) its configuration, or span of time.
+        device: the measuring frame, where it is not known; else None.
+        flat: (N, f) whitened change per unknown of it, session by session.
+        library: ways in which the library's effects may act.
+        nuisance: geometry and springs.
+        functions: what may act beside them.
+        explicit: further functions with their columns.
+    """
+
+    def __init__(
+        self, campaign: Campaign, conditions: Conditions,
+        update: Callable[[str, int, int], None] = lambda what, done, total: None,
+    ) -> None:  # fmt: skip
+        """Take all derivatives.
+
+        Args:
+            campaign: of which ``measured`` says what was measured, and nothing else.
+            conditions: of its rows, with the registration if that was found and with
+                what finite geometric errors add.
+            update: told what is done, how much of it and of how much.
+        """
+        self.campaign, self.conditions = campaign, conditions
+        self.row = np.nonzero(campaign.cells)[0]
+        self.block = blocks_of(campaign)[0][self.row]
+        self.tangents = Tangents(campaign, conditions)
+        unknown = campaign.registration == "unknown"
+        self.device: Hypothesis | None = device_frame(conditions) if unknown else None
+        self.library = self._library(update)
+        self.response = responses(conditions)
+        self.nuisance: Nuisance = nuisance(
+            small_terms(campaign, conditions, self.response), self._named()
+        )
+        self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
+        self.functions = Functions(campaign, self.sensitivities)
+        self.explicit = self.functions.explicit()
+
+    def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
+        """Hypotheses that show; of those that do the same, the first."""
+        listed = hypotheses(self.conditions, loaded_components(self.campaign))
+        shown: dict[object, Signature] = {}
+        for k, h in enumerate(listed):
+            if not (self.device and _moves_base(h)):
+                signature = self.tangents.at_start(h)
+                if _shows(signature):
+                    shown.setdefault(_print(signature), signature)
+            update("signatures", k + 1, len(listed))
+        ways = Counter(s.hypothesis.effect for s in shown.values())
+        robot = self.campaign.robot
+        made = [
+            effect_element(s, robot, effect_prior(len(ways), ways[s.hypothesis.effect]))
+            for s in shown.values()
+        ]
+        return [e for e in made if e.columns.shape[1] or e.offset is not None]
+
+    def _named(self) -> NDArray:
+        """(N, c) columns of single unknowns of springs that have a name."""
+        alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
+        return np.hstack([np.zeros((len(self.row), 0)), *alone])
+
+    @cached_property
+    def flat(self) -> NDArray:
+        """(N, f) the measuring frame's columns, each session's by themselves."""
+        if self.device is None:
+            return np.zeros((len(self.row), 0))
+        columns = self.tangents.at_start(self.device).columns
+        if self.campaign.session is None:
+            return columns
+        own = [
+            columns * (self.campaign.session[self.row] == name)[:, None]
+            for name in self.campaign.sessions
+        ]
+        return np.hstack(own)
+
+    def about(self, element: Element, x: NDArray) -> Element | None:
+        """An effect's element about values of its unknowns; None without an answer."""
+        signature = self.tangents.about(element.hypothesis, x, {})
+        if not _finite(signature):
+            return None
+        robot = self.campaign.robot
+        return effect_element(signature, robot, element.log_prior, x)
+
+
+def _finite(signature: Signature) -> bool:
+    """Whether the model had answers for a hypothesis."""
+    return bool(
+        np.isfinite(signature.columns).all() and np.isfinite(signature.offset).all()
+    )
+
+
+def _shows(signature: Signature) -> bool:
+    """Whether a hypothesis changes the readings; enough, without unknowns."""
+    if not _finite(signature):
+        return False
+    squares = float(signature.offset @ signature.offset)
+    return bool(signature.columns.any()) or squares > _VISIBLE
+
+
+def _print(signature: Signature) -> object:
+    """By which equal ways of one effect are known."""
+    rng = np.random.default_rng(0)
+    probe = rng.normal(size=len(signature.offset))
+    size = np.maximum(np.linalg.norm(signature.columns, axis=0), 1e-300)
+    seen = np.abs(probe @ signature.columns) / size
+    shown = signature.columns.any(axis=0)
+    key = tuple(np.round(np.sort(seen[shown]), 6))
+    starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
+    return signature.hypothesis.effect, key, starts
+
+
+def _moves_base(h: Hypothesis) -> bool:
+    """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
+    device = LIBRARY[h.effect].device
+    return any(name in device for slot in h.slots for name in slot.names)

@@ -1,0 +1,66 @@
+"""Noise: its scale beside the stated sigma, and blunders.
+
+A reading is good, with N(0, tau^2), or with a probability of one in a hundred a
+blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
+
+Sources:
+    Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
+_BLUNDERS = 0.01  # of the readings, before they are looked at
+_WIDTH = 30.0  # times tau
+_MANY = 0.05  # more far off than this share are no blunders but an effect
+_MEDIAN = 0.4549  # of the chi-square of one degree of freedom
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What is left, beside what was stated.
+
+    Attributes:
+        tau: true over stated sigma.
+        tau_std: its standard deviation.
+        findings: what else is to be said of it, in words.
+    """
+
+    tau: float
+    tau_std: float
+    findings: tuple[str, ...] = ()
+
+
+def good_readings(squares: NDArray) -> NDArray:
+    """Probability of every reading that it is no blunder.
+
+    Args:
+        squares: (n,) expected squared residuals, with what the fit does not know.
+
+    Returns:
+        (n,) ones where so many are far off that it is no matter of blunders.
+    """
+    v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
+    with np.errstate(over="ignore", under="ignore"):
+        good = (1 - _BLUNDERS) * np.exp(-squares / (2 * v))
+        bad = _BLUNDERS / _WIDTH * np.exp(-squares / (2 * v * _WIDTH**2))
+        share = np.where(bad + good > 0, good / np.maximum(bad + good, 1e-300), 0.0)
+    share = np.where(share > 0.5, 1.0, share)
+    if np.mean(share < 0.5) > _MANY:
+        return np.ones(len(squares))
+    return share
+
+
+def weights_of(good: NDArray) -> NDArray:
+    """(n,) precision of readings, of one that is good."""
+    return good + (1 - good) / _WIDTH**2
+
+
+def scale(squares: float, count: int) -> tuple[float, float]:
+    """Posterior mean of tau, and its standard deviation."""
+    freedom = FREEDOM + count
+    tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
+    return float(tau), float(tau / np.sqrt(2 * freedom))

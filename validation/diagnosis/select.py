@@ -1,0 +1,504 @@
+"""The search of a diagnosis: effects and functions together, in one currency.
+
+A model is a set of elements beside geometry and springs (:mod:`.states`).  From the
+empty one, every effect of the library and every function is scored given the models
+kept so far; the best are taken in, their sizes found anew, functions tried in all
+forms, nonlinear effects taken again about what was found.  It ends where one more
+element makes nothing likelier, and every model that was seen has its weight.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from assembly.effects import LIBRARY
+from validation.diagnosis.candidates import Candidate, CandidatePart
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.elements import Dense, Element
+from validation.diagnosis.functions import Found, Weighted
+from validation.diagnosis.gaussian import leave_block_out
+from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.noise import (
+    FREEDOM,
+    Noise,
+    good_readings,
+    scale,
+    weights_of,
+)
+from validation.diagnosis.states import MORE, Fitting, State
+
+Update = Callable[[str, int, int], None]
+
+MOST = 5  # elements
+_BEAM = 6  # models that are refined at a time
+_KEPT = 3  # models from which the search goes on
+_OF_NAME = 2  # of them with the same effects
+_FORMS = 4  # models whose function is tried in other forms
+_DROP = 1.0  # log posterior by which a larger model may be behind
+_ROUNDS = 3  # of taking nonlinear effects again
+_MOVED = 0.3  # log posterior
+_EQUAL = 3.0  # log posterior: functions that do as well
+_SAME = 1.0  # squared whitened difference of models that say the same
+_SHIFT = 3.0  # times that a shape may change in a round
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """A function that was found.
+
+    Attributes:
+        candidate: where, of what, in which form.
+        equivalent: places and variables that do as well.
+        gain: logarithm of how much likelier it makes the readings.
+        std: (m,) prior size of its unknowns, as :class:`.Sensitivities` counts them.
+        probability: that some function of this variable acts.
+    """
+
+    candidate: Candidate
+    equivalent: tuple[tuple[CandidatePart, ...], ...]
+    gain: float
+    std: NDArray
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class SmallPrior:
+    """Geometry and springs in use.
+
+    Attributes:
+        spring: (k,) bool.
+        frame, axis: (k,) row of the frame in the campaign's robot, component there.
+        std: (k,) [rad, m, or per wrench] prior standard deviation.
+    """
+
+    spring: NDArray
+    frame: NDArray
+    axis: NDArray
+    std: NDArray
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model by its names.
+
+    Attributes:
+        effects: of the library.
+        functions: each in words.
+        probability: after the readings were looked at.
+    """
+
+    effects: tuple[str, ...]
+    functions: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Selected:
+    """What a search found.
+
+    Attributes:
+        hypotheses: of the best model, the measuring frame first where it is not known.
+        values: (k,) of their unknowns, one hypothesis after the other.
+        functions: of the best model.
+        prior: geometry and springs in use.
+        noise: its scale.
+        weights: (n,) probability of every cell that it is no blunder.
+        models: the likely ones, best first.
+        probability: of every effect of the library that some model has.
+        unknowns: [-] well determined, the measuring frame's among them.
+        blocks: configurations, or spans of time.
+        gain: log posterior of the best model over the model without elements.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    values: NDArray
+    functions: tuple[Learned, ...]
+    prior: SmallPrior
+    noise: Noise
+    weights: NDArray
+    models: tuple[Model, ...]
+    probability: dict[str, float]
+    unknowns: float
+    blocks: int
+    gain: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are more blocks of rows than a model needs unknowns."""
+        return self.blocks >= self.unknowns + 2
+
+
+def select(
+    columns: Columns, z: NDArray, cells: NDArray,
+    update: Update = lambda what, done, total: None,
+) -> Selected:  # fmt: skip
+    """Find what the declared model lacks.
+
+    Args:
+        columns: of all N measured cells.
+        z: (n,) whitened residual of the cells fitted.
+        cells: (N,) mask of these; no other readings are known here.
+        update: told what is done, how much of it and of how much.
+
+    Returns:
+        The best model, and how likely it and the others are.
+    """
+    good = np.ones(len(z))
+    search = Search(columns, z, cells, good)
+    begin = good_readings(search.begin.expected_squares())
+    if (begin < 1).any():
+        good, search = begin, Search(columns, z, cells, begin)
+    states = search.run(update)
+    again = good_readings(states[0].expected_squares())
+    if not np.array_equal(again < 0.5, good < 0.5):
+        good, search = again, Search(columns, z, cells, again)
+        states = search.run(update)
+    return _selected(search, states, good)
+
+
+class Search:
+    """States seen of one set of readings and weights."""
+
+    def __init__(
+        self, columns: Columns, z: NDArray, cells: NDArray, good: NDArray
+    ) -> None:
+        """Weight readings, and fit the model without elements.
+
+        Args:
+            columns: of all N cells.
+            z: (n,) whitened residual of those fitted.
+            cells: (N,) mask of these.
+            good: (n,) probability that each is no blunder.
+        """
+        self.columns, self.functions = columns, columns.functions
+        self.fit = Fitting(columns, z, cells, weights_of(good))
+        self.empty = [self.fit.state((), mode) for mode in self.fit.modes()]
+        self.begin = max(self.empty, key=lambda s: s.score)
+        self.seen: dict[object, State] = {}
+        self._about: dict[object, Element | None] = {}
+        self._made: dict[object, Element | None] = {}
+
+    def run(self, update: Update) -> list[State]:
+        """All models seen, best first."""
+        self.weighted: Weighted = self.functions.weighted(self.fit.cells, self.fit.root)
+        pool = [*self.columns.library, *self.columns.explicit]
+        self.dense = Dense(pool, self.fit.cells, self.fit.root)
+        self._keep(self.empty)
+        front = [self.begin]
+        for level in range(MOST):
+            update("elements", level, MOST)
+            sources = list(front)
+            if level == 0:  # springs or geometry may stand for what is looked for
+                sources += [s for s in self.empty if s is not self.begin]
+            new = self._grown(sources, products=level == 0 or not front[0].elements)
+            best = max(self.seen.values(), key=lambda s: s.score)
+            if not new or new[0].score < best.score - _DROP:
+                break
+            front = new
+        self._rivals()
+        return sorted(self.seen.values(), key=lambda s: -s.score)
+
+    def _keep(self, states: Iterable[State]) -> None:
+        """Remember models that support what they claim."""
+        for state in states:
+            if _supported(state):
+                self.seen[frozenset(state.elements), state.mode] = state
+
+    def _grown(self, sources: Sequence[State], *, products: bool) -> list[State]:
+        """The best models with one element more, kept and in order."""
+        tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
+        for state in sources:
+            for worth, element in self._candidates(state, products=products):
+                elements = (*state.elements, element)
+                key = frozenset(elements)
+                if key not in tried or tried[key][0] < worth:
+                    tried[key] = worth, elements, state
+        ordered = sorted(tried.values(), key=lambda one: -one[0])
+        most = _BEAM + 2 * (len(sources) - 1)
+        new = [self.fit.best(e, state) for _, e, state in ordered[:most]]
+        new = self._retaken(sorted(new, key=lambda s: -s.score)[: 2 * _KEPT])
+        for state in sorted(new, key=lambda s: -s.score)[:_FORMS]:
+            new += self._reformed(state)
+        self._keep(new)
+        kept: list[State] = []
+        for state in sorted(new, key=lambda s: -s.score):
+            alike = [s for s in kept if _names(s) == _names(state)]
+            if len(alike) < _OF_NAME and len(kept) < _KEPT and _supported(state):
+                kept.append(state)
+        for state in kept[:1]:
+            self._keep(self._reduced(state))
+        return kept
+
+    def _candidates(
+        self, state: State, *, products: bool
+    ) -> list[tuple[float, Element]]:
+        """The best elements beside a model, with what it is then worth about."""
+        gains = self.dense.gains(state.taken, FREEDOM)
+        priors = np.array([e.log_prior for e in self.dense.elements])
+        worth = gains + priors
+        have = {e.name for e in state.elements if e.name}
+        counts: dict[str, int] = {}
+        best: list[tuple[float, Element]] = []
+        for i in np.argsort(-worth).tolist():
+            e = self.dense.elements[i]
+            if not np.isfinite(worth[i]) or (e.name and e.name in have):
+                continue
+            counts[e.name] = counts.get(e.name, 0) + 1
+            if counts[e.name] <= _OF_NAME:
+                best.append((float(worth[i]), e))
+            if len(best) >= _BEAM:
+                break
+        found = self._look(state, self.functions.first_look())
+        if products:
+            found += self._look(state, self._products(found))
+        found.sort(key=lambda one: -one.worth)
+        made = [(one.worth, self._element(one)) for one in found[:_BEAM]]
+        best += [(w, e) for w, e in made if e is not None and e not in state.elements]
+        best.sort(key=lambda one: -one[0])
+        begin = state.score - MORE
+        return [(begin + w, e) for w, e in best[: _BEAM + 2]]
+
+    def _products(self, found: Sequence[Found]) -> list:
+        """Products of the variables of the best functions, and of directions."""
+        names = list(dict.fromkeys(one.variables[0] for one in found))[:4]
+        if "approach" in self.functions.variables:
+            names.append("approach")
+        return self.functions.products(dict.fromkeys(names))
+
+    def _look(self, state: State, asked: list, most: int = 3) -> list[Found]:
+        return self.functions.look(state.taken, self.weighted, FREEDOM, asked, most)
+
+    def _element(self, found: Found) -> Element | None:
+        """A function's element, made once."""
+        one = self.functions.candidate(found)
+        if one not in self._made:
+            self._made[one] = self.functions.element(one, found.log_prior)
+        return self._made[one]
+
+    def _reformed(self, state: State) -> list[State]:
+        """A model with its last function in all forms, at the likeliest places."""
+        last = state.elements[-1]
+        if last.name or len(last.candidate.parts) > 1:
+            return []
+        variables = last.candidate.parts[0].variables
+        if variables[0].startswith("wrench."):
+            return []
+        rest = state.elements[:-1]
+        base = self.fit.state(rest, state.mode, state)
+        shapes = self.functions.shapes_of(variables)
+        found = self._look(base, [(variables, shapes)], most=4)
+        made = [self._element(one) for one in found]
+        new = [self.fit.state((*rest, e), state.mode, base) for e in made if e]
+        return [s for s in new if s.elements != state.elements]
+
+    def _retaken(self, states: Sequence[State]) -> list[State]:
+        """Models with nonlinear effects taken again about what was found."""
+        result = list(states)
+        for first in states[:_KEPT]:
+            state = first
+            for _ in range(_ROUNDS):
+                elements = tuple(self._again(state, k) for k in range(len(state.elements)))
+                if elements == state.elements:
+                    break
+                before = state.score
+                state = self.fit.state(elements, state.mode, state)
+                if abs(state.score - before) < _MOVED:
+                    break
+            if state is not first:
+                result[result.index(first)] = state
+        return result
+
+    def _again(self, state: State, k: int) -> Element:
+        """An element about its fitted values, itself if it is linear."""
+        e = state.elements[k]
+        if not e.name or LIBRARY[e.name].linear or not e.columns.shape[1]:
+            return e
+        x = e.values(state.sizes.mean[state.own(k)])
+        for j, slot in enumerate(e.hypothesis.slots):
+            if slot.shape:
+                x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)
+                x[j] = np.clip(x[j], slot.unknown.lower, slot.unknown.upper)
+        key = e.what, tuple(float(f"{v:.3g}") for v in x)
+        if key not in self._about:
+            self._about[key] = self.columns.about(e, x)
+        return self._about[key] or e
+
+    def _reduced(self, state: State) -> list[State]:
+        """A model without each of its elements."""
+        if len(state.elements) < 2:
+            return []
+        return [
+            self.fit.best(tuple(e for e in state.elements if e is not out), state)
+            for out in state.elements
+        ]
+
+    def _rivals(self) -> None:
+        """Every element of the best model against all others in its place."""
+        best = max(self.seen.values(), key=lambda s: s.score)
+        for out in best.elements:
+            rest = tuple(e for e in best.elements if e is not out)
+            base = self.fit.state(rest, best.mode, best)
+            listed = self._candidates(base, products=False)
+            near = [e for worth, e in listed if worth > best.score - 2 * _EQUAL]
+            states = [self.fit.best((*rest, e), base) for e in near if e is not out]
+            self._keep(self._retaken(sorted(states, key=lambda s: -s.score)))
+
+
+def _names(state: State) -> tuple[str, ...]:
+    """Names of a model's effects, and variables of its functions."""
+    names = [
+        e.name or "of " + ", ".join(e.candidate.parts[0].variables)
+        for e in state.elements
+    ]
+    return tuple(sorted(names))
+
+
+def _supported(state: State) -> bool:
+    """Whether the effects of a model differ from what is declared, within bounds."""
+    for k, e in enumerate(state.elements):
+        if not e.name or not e.columns.shape[1]:
+            continue
+        mean = state.sizes.mean[state.own(k)]
+        shapes = np.isfinite(e.given)
+        if np.all((mean <= e.lower)[~shapes] | (mean >= e.upper)[~shapes]):
+            return False
+        x = e.values(mean)
+        for j, slot in enumerate(e.hypothesis.slots):
+            low, high = slot.unknown.lower, slot.unknown.upper
+            if slot.shape and not low * 1.001 < x[j] < high * 0.999:
+                return False
+    return True
+
+
+def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
+    """The answer from all models seen."""
+    states = _unlike(states)
+    weights = np.array([s.score for s in states])
+    weights = np.exp(weights - logsumexp(weights))
+    best, fit = states[0], search.fit
+    hypotheses: list[Hypothesis] = []
+    values: list[NDArray] = []
+    functions: list[Learned] = []
+    names = [_names(s) for s in states]
+    if search.columns.device is not None:
+        hypotheses.append(search.columns.device)
+        values.append(search.columns.device.start)
+    for k, e in enumerate(best.elements):
+        mean = best.sizes.mean[best.own(k)]
+        if e.name:
+            hypotheses.append(e.hypothesis)
+            values.append(e.values(mean))
+            continue
+        own = _names(replace(best, elements=(e,)))[0]
+        share = sum(w for w, n in zip(weights, names, strict=True) if own in n)
+        functions.append(_learned(search, states, best, k, float(share)))
+    effects = {e.name for s in states for e in s.elements if e.name}
+    small, kept = search.columns.nuisance, np.flatnonzero(best.used)
+    blocks = len(np.unique(search.columns.block[fit.cells]))
+    tau, tau_std = scale(best.sizes.squares, fit.count)
+    return Selected(
+        hypotheses=tuple(hypotheses),
+        values=np.concatenate([np.zeros(0), *values]),
+        functions=tuple(functions),
+        prior=SmallPrior(
+            small.spring[kept], small.frame[kept], small.axis[kept],
+            best.sizes.std[: len(kept)] * tau,
+        ),  # fmt: skip
+        noise=Noise(tau, tau_std),
+        weights=good,
+        models=_models(states, weights),
+        probability={
+            name: float(sum(w for w, n in zip(weights, names, strict=True) if name in n))
+            for name in sorted(effects)
+        },
+        unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
+        blocks=blocks,
+        gain=best.score - search.begin.score,
+    )
+
+
+def _unlike(states: Sequence[State]) -> list[State]:
+    """Models without those that say of the readings what a likelier one says.
+
+    A function that does what an effect does is that effect: the one with fewer
+    functions stays.
+    """
+    ordered = sorted(states, key=lambda s: -s.score)[:60]
+    kept: list[State] = []
+    for state in ordered:
+        twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
+        if twin is None:
+            kept.append(state)
+        elif _functions(state) < _functions(kept[twin]):
+            both = np.logaddexp(state.score, kept[twin].score)
+            kept[twin] = replace(state, score=float(both))
+        elif _functions(state) > _functions(kept[twin]):
+            both = np.logaddexp(state.score, kept[twin].score)
+            kept[twin] = replace(kept[twin], score=float(both))
+        elif _names(state) != _names(kept[twin]):
+            kept.append(state)
+    return sorted(kept, key=lambda s: -s.score)
+
+
+def _functions(state: State) -> int:
+    return sum(not e.name for e in state.elements)
+
+
+def _same(one: State, other: State) -> bool:
+    """Whether two models differ by nothing that the readings could show."""
+    if not one.elements or not other.elements:
+        return one.elements == other.elements
+    difference = one.fitted - other.fitted
+    return float(difference @ difference) < _SAME * one.tau**2
+
+
+def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
+    """Models by their names, likeliest first."""
+    total: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
+    for state, weight in zip(states, weights, strict=True):
+        effects = tuple(sorted(e.name for e in state.elements if e.name))
+        labels = tuple(sorted(label(e.candidate) for e in state.elements if not e.name))
+        total[effects, labels] = total.get((effects, labels), 0.0) + float(weight)
+    models = [Model(*names, weight) for names, weight in total.items()]
+    return tuple(sorted(models, key=lambda m: -m.probability)[:20])
+
+
+def label(one: Candidate) -> str:
+    """A function in words."""
+    where = " and ".join(f"{p.where} {', '.join(p.components)}" for p in one.parts)
+    of = ", ".join(one.parts[0].variables)
+    given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
+    kind = "" if one.kind == "screw" else "compliance of "
+    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+
+
+def _learned(
+    search: Search, states: Sequence[State], best: State, k: int, probability: float
+) -> Learned:
+    """A function of the best model, and what does as well."""
+    e = best.elements[k]
+    rest = set(best.elements) - {e}
+    equal = list(search.functions.equivalents(e.candidate))
+    for s in states:
+        other = set(s.elements) - rest
+        if rest <= set(s.elements) and len(other) == 1 and not next(iter(other)).name:
+            parts = next(iter(other)).candidate.parts
+            if parts != e.candidate.parts and s.score > best.score - _EQUAL:
+                equal.append(parts)
+    without = search.fit.state(
+        tuple(x for x in best.elements if x is not e), best.mode, best
+    )
+    std = best.sizes.std[best.own(k)] * e.scale * best.tau
+    return Learned(
+        e.candidate, tuple(dict.fromkeys(equal)), best.score - without.score, std,
+        probability,
+    )  # fmt: skip
+
+
+def folds(state: State, blocks: NDArray) -> NDArray:
+    """(number of blocks,) ln densities of each block by a fit to all others."""
+    return leave_block_out(state.taken, blocks)[1]
