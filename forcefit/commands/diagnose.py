@@ -54,12 +54,11 @@ def diagnose(
         diagnosis = trace(data, finite=finite_motions, update=update)
     tally = None
     if calibrate:
-        from validation.diagnosis.verdict import calibrate as simulate
+        from validation.diagnosis.calibration import calibrate as simulate
 
         with progress_bars() as update:
-            selection = diagnosis.traced.selection
             tally = simulate(
-                selection.screen, selection.sets[0], calibrate,
+                diagnosis, calibrate,
                 lambda done, n: update("simulated campaigns", done, n),
             )  # fmt: skip
     write_json(results.table(diagnosis, tally), json)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import Prediction, predict
 from assembly.model.robot import Robot
@@ -131,9 +132,9 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
         return conditions, "of the robot file" if carried else "none"
     if not carried:
         return register(commands.take(measured), conditions), _FITTED
-    bare = replace(conditions, base=np.zeros(6))
+    bare = replace(commands, robot=_unplaced(commands.robot))
     try:
-        again = register(commands.take(measured), bare)
+        again = register(bare.take(measured), finite_conditions(bare))
     except BadInput:
         return conditions, "of the robot file"
     errors = [
@@ -142,6 +143,19 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
     if errors[0] > _MOVED * errors[1]:
         return again, _FITTED
     return conditions, "of the robot file"
+
+
+def _unplaced(robot: Robot) -> Robot:
+    """The robot without the place of any measuring frame."""
+
+    def without(effects: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+        kept = {name: dict(values) for name, values in effects.items()}
+        for name in BASE:
+            kept.get("registration", {}).pop(name, None)
+        return kept
+
+    sessions = {s: without(effects) for s, effects in robot.session_effects.items()}
+    return replace(robot, effects=without(robot.effects), session_effects=sessions)
 
 
 def _noise(commands: Campaign) -> NDArray:

@@ -28,6 +28,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
 from assembly.model.robot import BeamLink, Robot, beam_axis
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.responses import Responses
 
@@ -339,3 +340,23 @@ def _along(robot: Robot, name: str) -> tuple[str, ...]:
     assert isinstance(frame.link, BeamLink)
     axis = np.abs(beam_axis(frame)[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
+
+
+def in_cells(
+    sensitivities: Sensitivities, one: Candidate, campaign: Campaign
+) -> NDArray:
+    """What a candidate of m unknowns adds to the readings.
+
+    Args:
+        sensitivities: of the campaign's rows.
+        one: the candidate.
+        campaign: of R rows, N measured cells.
+
+    Returns:
+        (N, m) in the cells, over sigma.
+    """
+    changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
+    columns = changes.reshape(len(changes), -1)
+    if not campaign.cells.all():
+        columns = columns[:, campaign.cells.ravel()]
+    return columns.T

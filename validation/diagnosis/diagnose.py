@@ -18,13 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.claims import supported
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut, hidden, hold_out
 from validation.diagnosis.judge import Judged, judge
 from validation.diagnosis.trace import Traced, trace
-from validation.diagnosis.unknowns import Acting
 
 Update = Callable[[str, int, int], None]
 
@@ -87,19 +85,4 @@ def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
 
 def _found(campaign: Campaign, fitted: NDArray, update: Update, finite: bool) -> _Found:
     """Search and fit in some rows; readings of others are not there."""
-    traced = trace(hidden(campaign, ~fitted), fitted, update, finite=finite)
-    unknowns = traced.unknowns()
-    fit = fit_machine(traced.campaign, unknowns, traced.used)
-    while True:
-        weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
-        if not weak:
-            return _Found(traced, fit)
-        # the weakest first: two effects that do the same are both uncertain
-        one = min(weak, key=lambda e: _size(fit, e))
-        fit = fit_machine(traced.campaign, fit.unknowns.without([one]), traced.used)
-
-
-def _size(fit: MachineFit, one: Acting) -> float:
-    """[sigma^2] squared change of the fitted readings by an effect."""
-    x, _, slopes = fit.own(one)
-    return float(np.sum((slopes @ x) ** 2))
+    return _Found(*trace(hidden(campaign, ~fitted), fitted, update, finite=finite))

@@ -22,6 +22,9 @@ from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.structure import Trend
 from validation.diagnosis.trace import Traced
 
+_SURELY = 3.0  # standard deviations by which a scale of noise is surely above 1
+_MORE = 0.1  # and by how much, to be worth a word
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -46,7 +49,7 @@ class Diagnosis:
         noise: by sigma.
         with_outliers: before and after with the held-out rows called outliers.
         uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
-        noise_factor: (6,) by which repeats scatter more than the sigma stated.
+        noise_scale: true over stated sigma, and the standard deviation of that.
         noise_in_time: how noise is correlated in time, None if it is not; intervals of
             the effects are the wider for it.
         sequence: models up to the machine found, with errors on the held-out rows.
@@ -81,7 +84,7 @@ class Diagnosis:
     noise: Errors
     with_outliers: tuple[Errors, Errors]
     uncertainty: float
-    noise_factor: NDArray
+    noise_scale: tuple[float, float]
     noise_in_time: NoiseInTime | None
     sequence: tuple[Step, ...]
     held: HeldOut
@@ -108,6 +111,12 @@ class Diagnosis:
         """Whether the machine found predicts the held-out rows better than declared."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
+
+    @property
+    def more_scatter(self) -> bool:
+        """Whether readings scatter clearly more than stated."""
+        tau, std = self.noise_scale
+        return self.lack.sigma_too_small or tau > 1.0 + _SURELY * std + _MORE
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""

@@ -220,5 +220,5 @@ class Dense:
 
 
 def effect_prior(effects: int, ways: int) -> float:
-    """ln of the prior of a way in which one of so many effects may act."""
+    """Ln of the prior of a way in which one of so many effects may act."""
     return -math.log(2.0) - math.log(max(effects, 1)) - math.log(max(ways, 1))

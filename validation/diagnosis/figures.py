@@ -167,12 +167,9 @@ def separability_of(diagnosis: Diagnosis) -> Separability:
         The comparison, each effect in its most general form.
     """
     columns: dict[str, NDArray] = {}
-    for signature in diagnosis.traced.selection.screen.signatures:
-        h = signature.hypothesis
-        scale = np.array([slot.unknown.scale for slot in h.slots])
-        shown = signature.columns * scale
-        if h.effect not in columns and np.any(shown):
-            columns[h.effect] = shown
+    for element in diagnosis.traced.columns.library:
+        if element.name not in columns and np.any(element.columns):
+            columns[element.name] = element.columns
     return compare_signatures(columns)
 
 

@@ -19,7 +19,7 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -33,13 +33,13 @@ from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
     Sensitivities,
+    in_cells,
     places_of,
     variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.forms_tried import CandidateShape, is_angle
 from validation.diagnosis.gaussian import SIZES, Taken, averaged_gains
-from validation.diagnosis.remainder import in_cells
 from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
 
 Where = tuple[str, str, str]  # place, component, kind
@@ -195,7 +195,7 @@ class Functions:
     def _priors(
         self, variables: Variables, listed: tuple[CandidateShape, ...]
     ) -> dict[CandidateShape, float]:
-        """ln of the prior of each form of variables at one place."""
+        """Ln of the prior of each form of variables at one place."""
         count, places = len(self.variables), len(self.places) + len(self.together)
         prior = -math.log(2.0) - math.log(max(count, 1)) - math.log(max(places, 1))
         if len(variables) > 1:
@@ -261,7 +261,9 @@ class Functions:
         on = np.einsum("src,rc->sr", weighted.answers, held)
         found: list[Found] = []
         for variables, shapes in asked:
-            worth = self._worths(taken, weighted, freedom, variables, shapes, through, on)
+            worth = self._worths(
+                taken, weighted, freedom, variables, shapes, through, on
+            )
             priors = self._prior_of(variables)
             worth += np.array([priors(s) for s in shapes])[:, None]
             for flat in np.argsort(-worth, axis=None)[:most].tolist():
@@ -269,12 +271,14 @@ class Functions:
                 if np.isfinite(worth[k, where]):
                     prior = priors(shapes[k])
                     found.append(
-                        Found(float(worth[k, where]), where, variables, shapes[k], prior)
+                        Found(
+                            float(worth[k, where]), where, variables, shapes[k], prior
+                        )
                     )
         return sorted(found, key=lambda one: -one.worth)
 
-    def _prior_of(self, variables: Variables):  # noqa: ANN202
-        """ln prior of a form of variables."""
+    def _prior_of(self, variables: Variables):
+        """Ln prior of a form of variables."""
         known = self.priors(variables, self.shapes_of(variables))
         other = min(known.values(), default=0.0)
         return lambda shape: known.get(shape, other)
@@ -341,7 +345,7 @@ class Functions:
             squares += kind * mean[:, None]
         return squares
 
-    @lru_cache(maxsize=None)  # noqa: B019  one campaign at a time
+    @cache  # noqa: B019  one campaign at a time
     def _numbers(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """(R, q) columns of a form, falling as their prior does."""
         columns = self.sensitivities.basis(variables, shape)[0]
@@ -393,7 +397,10 @@ class Functions:
             ]
         cubic = CandidateShape("powers", ("2",))
         joints = [
-            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
+            w
+            for p in self.places
+            for w in p[:1]
+            if len(p) == 1 and w[2] == "compliance"
         ]
         for name, component, kind in joints:
             wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"

@@ -71,7 +71,7 @@ class Products:
         return Products(left, self.log_det + log_det)
 
     def log_evidence(self, count: int, freedom: float = math.inf) -> float:
-        """ln p(z) of n readings, all unknowns eliminated."""
+        """Ln p(z) of n readings, all unknowns eliminated."""
         return log_evidence(float(self.matrix[-1, -1]), self.log_det, count, freedom)
 
     def posterior(
@@ -88,7 +88,7 @@ class Products:
 def log_evidence(
     squares: float, log_det: float, count: int, freedom: float = math.inf
 ) -> float:
-    """ln p(z), of n readings with z' C^-1 z and ln det C; tau about 1 by ``freedom``."""
+    """Ln p(z), of n readings with z' C^-1 z and ln det C; tau about 1 by ``freedom``."""
     if math.isinf(freedom):
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from assembly.measurement.predict import predict
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import HeldOut, blocks_of
 from validation.diagnosis.lack_of_fit import (
     SIGNIFICANT,
@@ -22,14 +22,14 @@ from validation.diagnosis.next_measurement import NextMeasurement, next_measurem
 from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
 from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.prediction import predicted, residual_of
-from validation.diagnosis.scoring import FINITE, inclusion, named
 from validation.diagnosis.sequence import errors_of, pooled, stages
 from validation.diagnosis.signatures import whiten
 from validation.diagnosis.structure import trends
 from validation.diagnosis.text import text
-from validation.diagnosis.trace import BLUNDERS, Traced
-from validation.diagnosis.verdict import NOT_ENOUGH, by_names, linear_or_finite, verdict
+from validation.diagnosis.trace import FINITE, Traced
+from validation.diagnosis.verdict import NOT_ENOUGH, Kept, by_names, verdict
 
+BLUNDERS = 20  # one row in so many may be called a blunder, in all
 _LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
 _SHARE = 0.5  # of the readings that may be determined unknowns
 _DECISIVE = 8  # blocks of rows; with fewer, held-out rows that fail say "too few"
@@ -48,19 +48,6 @@ class Judged:
     fit: MachineFit
     used: NDArray
     held: NDArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Ranking:
-    """Sets of effects by name with their probabilities, best first.
-
-    Attributes:
-        sets: names of the effects and probability of each set.
-        probability: of every effect.
-    """
-
-    sets: tuple[tuple[tuple[str, ...], float], ...]
-    probability: dict[str, float]
 
 
 def judge(
@@ -89,18 +76,9 @@ def judge(
     fit, correlated = _with_noise_in_time(traced, fit)
     left = residual_of(campaign, fit.robot)
     lack = _lack_of_fit(campaign, traced, fit, left)
-    ranking = _ranked(traced, fit)
-    decision, claimed = verdict(
-        ranking.sets, ranking.probability, lack.significant,
-        small=bool(fit.unknowns.small),
-    )  # fmt: skip
     names = _names(fit)
-    if fit.unknowns.functions and not lack.significant:
-        decision, claimed = "learned", names
-    if decision == "explained":
-        claimed = tuple(sorted(set(claimed) & set(names)))
-        if not names and not fit.unknowns.small:
-            decision = "none_needed"
+    kept = Kept(names, bool(fit.unknowns.functions), bool(fit.unknowns.small))
+    decision, claimed = verdict(traced.selected, kept, lack.significant)
     errors = {
         kind: errors_of(campaign, residual, rows)
         for kind, residual in (("before", before), ("after", after))
@@ -122,8 +100,8 @@ def judge(
         traced=traced,
         claimed=claimed,
         effects=names,
-        probability=ranking.probability,
-        alternatives=ranking.sets,
+        probability=traced.selected.probability,
+        alternatives=by_names(traced.selected),
         lack=lack,
         declared=lack_of_fit(
             campaign.take(used), whiten(campaign.take(used), declared[used]), 0
@@ -137,7 +115,7 @@ def judge(
             errors_of(campaign, after, held.rows),
         ),
         uncertainty=_uncertainty(campaign, after, rows),
-        noise_factor=traced.noise_factor,
+        noise_scale=(traced.selected.noise.tau, traced.selected.noise.tau_std),
         noise_in_time=correlated,
         sequence=tuple(steps),
         held=held,
@@ -148,7 +126,7 @@ def judge(
         residual_after=left,
         trends=tuple(trends(campaign.take(used), traced.conditions.take(used), left[used]))
         if decision == "outside_library" else (),
-        next=_next(traced) if decision == "ambiguous" else None,
+        next=_next(campaign, traced, fit) if decision == "ambiguous" else None,
         needed=_needed(campaign, traced, fit) if decision == NOT_ENOUGH else "",
         remarks=remarks + _impossible(campaign),
         wording=text,
@@ -214,23 +192,6 @@ def _lack_of_fit(
     fitting = campaign.take(traced.used)
     residual = np.nan_to_num(whiten(fitting, left[traced.used]))
     return lack_of_fit(fitting, residual, round(float(fit.determined.sum())))
-
-
-def _ranked(traced: Traced, fit: MachineFit) -> _Ranking:
-    """The sets by name; finite motions alone are the best one where these say more."""
-    selection = traced.selection
-    sets = by_names(selection.screen, selection.sets)
-    probability = inclusion(selection.screen, selection.sets)
-    if fit.unknowns.functions:
-        # the library's own scores know nothing of what was learned
-        best = named(selection.screen, selection.sets[0])
-        certain = {name: float(name in best) for name in probability}
-        return _Ranking(((best, 1.0),), certain)
-    if traced.finite or selection.sets[0].members or selection.behind:
-        return _Ranking(sets, probability)
-    before = _declared_residual(traced.campaign, traced, True)[traced.used]
-    gain = np.sum(whiten(traced.fitting, before) ** 2) - selection.fit.rss
-    return _Ranking(*linear_or_finite(sets, probability, float(gain)))
 
 
 def _fails(
@@ -301,13 +262,12 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     return (f"a temperature that no sensor has, left out: {', '.join(ids[:10])}",)
 
 
-def _next(traced: Traced) -> NextMeasurement | None:
-    """The measurement that would tell the best set from its rivals."""
-    best_fit = traced.selection.fit
-    if traced.finite:  # of all rivals alike, so that it tells nothing apart
-        linear = replace(best_fit.conditions, exact=False)
-        best_fit = replace(best_fit, conditions=linear)
-    conditions = traced.conditions.take(traced.used)
-    return next_measurement(
-        traced.fitting, conditions, best_fit, traced.selection.rivals
-    )
+def _next(
+    campaign: Campaign, traced: Traced, fit: MachineFit
+) -> NextMeasurement | None:
+    """The measurement that would tell the best model from its rivals."""
+    rivals = [
+        fit_machine(traced.campaign, unknowns, traced.used)
+        for unknowns in traced.rivals()
+    ]
+    return next_measurement(campaign, traced.conditions, fit, rivals)

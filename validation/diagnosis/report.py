@@ -13,6 +13,7 @@ from forcefit.page.page import (
 )
 from forcefit.page.tables import Cell, Column, Value, table
 from validation.diagnosis import results
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.figures import (
     confounding_chart,
@@ -26,7 +27,6 @@ from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import LISTED, effects, learned, steps
 from validation.diagnosis.scene import worst_robot
 from validation.diagnosis.sentence import calibration_text, open_text, sentence
-from validation.diagnosis.verdict import Calibration
 
 _ASSUMED = (
     "Held-out rows chose and fitted nothing; errors before and after are theirs.",

@@ -9,6 +9,7 @@ import numpy as np
 
 from assembly.effects import LIBRARY
 from stiffness.screws import SCREW
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.claims import parameters_of
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.saving import functions_of, not_measured
@@ -16,7 +17,6 @@ from validation.diagnosis.sentence import formula, sentence
 from validation.diagnosis.sequence import LEARNED, Errors
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS
 from validation.diagnosis.unknowns import Small
-from validation.diagnosis.verdict import Calibration
 
 LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
@@ -61,9 +61,10 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
                 "after": _errors(diagnosis.with_outliers[1]),
             },
         },
-        "noise_factor": dict(
-            zip(KINDS, diagnosis.noise_factor[::3].tolist(), strict=True)
-        ),
+        "noise_scale": {
+            "value": diagnosis.noise_scale[0],
+            "std": diagnosis.noise_scale[1],
+        },
         "noise_in_time": None
         if diagnosis.noise_in_time is None
         else asdict(diagnosis.noise_in_time),
@@ -252,8 +253,8 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "std": dict(function.std),
                 "equivalent_places": [
                     [{"where": p.where, "components": list(p.components),
-                      "variables": [p.variable]} for p in parts]
-                    for parts in diagnosis.traced.learned[k].equivalent
+                      "variables": list(p.variables)} for p in parts]
+                    for parts in diagnosis.traced.selected.functions[k].equivalent
                 ],
                 "before": _errors(before),
                 "after": _errors(after),

@@ -129,8 +129,8 @@ def _record(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def not_measured(campaign: Campaign) -> list[str]:
     """Components of a reading that no row has."""
-    seen = campaign.cells.any(axis=0)
-    return [name for name, one in zip(READING, seen, strict=True) if not one]
+    seen = np.flatnonzero(campaign.cells.any(axis=0)).tolist()
+    return [name for k, name in enumerate(READING) if k not in seen]
 
 
 def digest(campaign: Campaign) -> str:

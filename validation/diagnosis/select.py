@@ -7,7 +7,6 @@ forms, nonlinear effects taken again about what was found.  It ends where one mo
 element makes nothing likelier, and every model that was seen has its weight.
 """
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -112,6 +111,7 @@ class Selected:
         unknowns: [-] well determined, the measuring frame's among them.
         blocks: configurations, or spans of time.
         gain: log posterior of the best model over the model without elements.
+        states: models that were seen, best first.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -125,6 +125,7 @@ class Selected:
     unknowns: float
     blocks: int
     gain: float
+    states: tuple[State, ...]
 
     @property
     def enough(self) -> bool:
@@ -301,7 +302,9 @@ class Search:
         for first in states[:_KEPT]:
             state = first
             for _ in range(_ROUNDS):
-                elements = tuple(self._again(state, k) for k in range(len(state.elements)))
+                elements = tuple(
+                    self._again(state, k) for k in range(len(state.elements))
+                )
                 if elements == state.elements:
                     break
                 before = state.score
@@ -405,19 +408,24 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         values=np.concatenate([np.zeros(0), *values]),
         functions=tuple(functions),
         prior=SmallPrior(
-            small.spring[kept], small.frame[kept], small.axis[kept],
+            small.spring[kept],
+            small.frame[kept],
+            small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
         noise=Noise(tau, tau_std),
         weights=good,
         models=_models(states, weights),
         probability={
-            name: float(sum(w for w, n in zip(weights, names, strict=True) if name in n))
+            name: float(
+                sum(w for w, n in zip(weights, names, strict=True) if name in n)
+            )
             for name in sorted(effects)
         },
         unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
         blocks=blocks,
         gain=best.score - search.begin.score,
+        states=tuple(states),
     )
 
 
@@ -473,7 +481,9 @@ def label(one: Candidate) -> str:
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
     kind = "" if one.kind == "screw" else "compliance of "
-    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )
 
 
 def _learned(

@@ -6,10 +6,11 @@ from numpy.typing import NDArray
 
 from assembly.effects.functions import columns_of, parameters_of
 from assembly.model.function import Function
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.saving import functions_of
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.verdict import NOT_ENOUGH, Calibration
+from validation.diagnosis.verdict import NOT_ENOUGH
 
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
@@ -79,11 +80,16 @@ def calibration_text(tally: Calibration) -> str:
     )
 
 
-def noise_text(factor: NDArray) -> str:
-    """That repeats were believed rather than the sigma stated."""
-    parts = {"rotations": factor[0], "positions": factor[3]}
-    words = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
-    return f"repeats scatter more than the sigma stated, which was taken {words}"
+def noise_text(diagnosis: Diagnosis) -> str:
+    """That readings scatter more than stated, and what that may be."""
+    tau, std = diagnosis.noise_scale
+    text = f"readings scatter {tau:.2f} +- {std:.2f} times the sigma stated"
+    if diagnosis.lack.sigma_too_small:
+        text += (
+            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is too "
+            "small, or there is memory, a change in time, or something not recorded"
+        )
+    return text
 
 
 def open_text(open_: NDArray) -> str:

@@ -3,8 +3,7 @@
 import math
 from typing import Any
 
-import numpy as np
-
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.next_measurement import NextMeasurement, load_text
 from validation.diagnosis.results import LISTED, effects, learned, small, steps
@@ -17,7 +16,6 @@ from validation.diagnosis.sentence import (
     sentence,
 )
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.verdict import Calibration
 
 
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
@@ -37,8 +35,8 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     missing = not_measured(diagnosis.campaign)
     if missing:
         lines += ["", f"not measured: {', '.join(missing)}"]
-    if np.any(diagnosis.noise_factor > 1):
-        lines += ["", noise_text(diagnosis.noise_factor)]
+    if diagnosis.more_scatter:
+        lines += ["", noise_text(diagnosis)]
     if diagnosis.noise_in_time is not None:
         noise = diagnosis.noise_in_time
         lines += [

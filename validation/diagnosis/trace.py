@@ -1,54 +1,48 @@
-"""The search of a diagnosis: which unknown numbers a machine has.
+"""The search of a diagnosis, from readings to the unknown numbers of a machine.
 
-Steps, each opened once:
+Steps:
 
 1. the measuring frame is found, where it is not known;
-2. every hypothesis's signature; all small sets scored; the best refitted in the full
-   model, signatures retaken there, and scored again until the best set stays;
-3. outlying rows are named, left out, and 2 repeated;
-4. functions are learned from the residual;
-5. is the residual noise?  Where repeats scatter more than stated, sigma is larger, and
-   2 to 4 are repeated.
+2. effects and functions are searched for together (:mod:`.select`);
+3. the machine that has them is fitted (:mod:`.fit`); what finite motions add to its
+   geometric errors is added to the model, and 2 is repeated until it stays.
 
 It is given the rows to be fitted, and reads no others.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import count, pairwise
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import apply_effects
+from assembly.effects import LIBRARY
+from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, with_finite_motions, with_second_order
-from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import Sensitivities
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.lack_of_fit import (
-    believed_noise,
-    lack_of_fit,
-    outlying,
+from assembly.measurement.predict import (
+    predict,
+    with_finite_motions,
+    with_rest_positions,
+    with_second_order,
 )
-from validation.diagnosis.learning import Learned
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.claims import supported
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.noise import weights_of
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
-from validation.diagnosis.responses import responses
-from validation.diagnosis.selection import Selection, Update, select
+from validation.diagnosis.select import Selected, select
 from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.small_terms import GEOMETRY, SMALL, screws_of
-from validation.diagnosis.teaching import NOTHING, Taught, cost_of, taught
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
 
-BLUNDERS = 20  # one row in so many may be called a blunder, in all
-_PASSES = 8  # of believing repeats, and finite geometric errors
-_TURNS = 6  # of leaving out rows, in each
-_LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
-_BENDS = 3  # times that what finite geometric errors add is found anew
-_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step towards the errors found
-_BENT = 0.1  # of what is left, or of sigma: change of what finite errors add
+Update = Callable[[str, int, int], None]
+FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
+_TURNS = 3  # of the search, with what finite geometric errors add
+_BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +50,14 @@ class Traced:
     """What the search found.
 
     Attributes:
-        campaign: of R rows; its sigma is the stated one times both factors below.
+        campaign: of R rows; sigma is as large as the search believed, of a blunder
+            many times as large.
         unregistered: conditions of all rows, before any registration.
-        conditions: the same, registered.
+        conditions: the same, registered, with what finite geometric errors add.
         used: (R,) bool, rows that were fitted.
-        outliers: (R,) bool, rows left out.
-        noise_factor: (6,) by which repeats scatter more than the sigma stated.
-        inflation: [-] by which sigma was made larger for what nothing explains.
-        selection: sets of effects, the best one fitted.
-        learned: functions learned together with it.
+        outliers: (R,) bool, rows whose readings are blunders, left out.
+        selected: models with their probabilities.
+        columns: of the campaign's cells.
         finite: whether motions of the declared model are finite.
     """
 
@@ -73,10 +66,8 @@ class Traced:
     conditions: Conditions
     used: NDArray
     outliers: NDArray
-    noise_factor: NDArray
-    inflation: float
-    selection: Selection
-    learned: tuple[Learned, ...]
+    selected: Selected
+    columns: Columns
     finite: bool
 
     @property
@@ -84,42 +75,54 @@ class Traced:
         """The rows fitted."""
         return self.campaign.take(self.used)
 
+    @cached_property
     def unknowns(self) -> Unknowns:
         """The unknown numbers of the machine, with their priors."""
-        fit, behind = self.selection.fit, self.selection.behind
+        found, effects, at = self.selected, [], 0
         unknown = self.campaign.registration == "unknown"
-        effects, at = [], 0
-        for k, h in enumerate(fit.hypotheses):
+        for k, h in enumerate(found.hypotheses):
             own = slice(at, at := at + len(h.slots))
             if unknown and k == 0:
                 effects += self._device_frames(h)
             else:
-                effects.append(Acting(h, fit.values[own]))
-        ends = np.cumsum([0, *(len(term) for term in behind.terms)])
-        sizes = [behind.size[a:b] for a, b in pairwise(ends.tolist())]
-        terms = list(zip(behind.terms, sizes, strict=True))
-        small = [Small(t.name, t.frame, t.axis, s) for t, s in terms if t.name in SMALL]
-        learned = [size for term, size in terms if term.name not in SMALL]
-        functions = [
-            LearnedFunction(one.candidate, size)
-            for one, size in zip(self.learned, learned, strict=True)
-        ]
-        sensitivities = None
-        if functions:
-            response = responses(self.conditions)
-            sensitivities = Sensitivities(
-                self.conditions, self.campaign.robot, response
-            )
+                effects.append(Acting(h, found.values[own]))
+        small = []
+        for name, springs in ((GEOMETRY, False), (SPRINGS, True)):
+            own = found.prior.spring == springs
+            if own.any():
+                prior = found.prior
+                small.append(
+                    Small(name, prior.frame[own], prior.axis[own], prior.std[own])
+                )
+        functions = [LearnedFunction(f.candidate, f.std) for f in found.functions]
         return Unknowns(
             self.campaign.robot, tuple(effects), tuple(small), tuple(functions),
-            sensitivities,
+            self.columns.sensitivities if functions else None,
         )  # fmt: skip
+
+    def rivals(self, most: int = 3) -> list[Unknowns]:
+        """Machines of other effects than the best model's, likeliest first."""
+        states = self.selected.states
+        own = frozenset(e.name for e in states[0].elements if e.name)
+        found: dict[frozenset[str], Unknowns] = {}
+        for state in states[1:]:
+            other = frozenset(e.name for e in state.elements if e.name)
+            if own <= other or other <= own or other in found or len(found) == most:
+                continue
+            elements = [(k, e) for k, e in enumerate(state.elements) if e.name]
+            effects = [
+                Acting(e.hypothesis, e.values(state.sizes.mean[state.own(k)]))
+                for k, e in elements
+            ]
+            device = [e for e in self.unknowns.effects if e.device]
+            found[other] = replace(
+                self.unknowns, effects=(*device, *effects), functions=()
+            )
+        return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
         """The measuring frame as it was found, one for each session."""
-        fitted = {"registration": self.selection.fit.effects["registration"]}
-        base = apply_effects(self.conditions, fitted).base
-        base = np.broadcast_to(base, (len(self.campaign), 6))
+        base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
             row = 0
@@ -131,7 +134,7 @@ class Traced:
 
 def trace(
     campaign: Campaign, fitted: NDArray, update: Update, *, finite: bool = False
-) -> Traced:
+) -> tuple[Traced, MachineFit]:
     """Search for the effects and functions that a declared model lacks.
 
     Args:
@@ -141,7 +144,7 @@ def trace(
         finite: whether motions of the declared model are finite.
 
     Returns:
-        What was found.
+        What was found, and the machine that has it.
 
     Raises:
         BadInput: the measuring frame is not known and cannot be found.
@@ -150,171 +153,95 @@ def trace(
     finite = finite or declared.exact
     complete = with_finite_motions if finite else with_second_order
     declared = conditions = complete(declared)
+    fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
         conditions = register(campaign.take(fitted), conditions)
-    impossible = impossible_rows(campaign)
-    outliers = impossible.copy()
-    factor, inflation, bends = np.ones(6), 1.0, 0
-    learned = NOTHING
-    straight: _Straight | None = None
-    earlier: Selection | None = None
-    for _ in range(_PASSES):
-        some = partial(select, update=update, finite=finite)
-        selection, outliers = _without_outliers(
-            campaign, conditions, fitted, (outliers, impossible), some, earlier
+    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
+        # where clearances of closed chains rest is found row by row, once
+        conditions = with_rest_positions(conditions)
+    columns = Columns(campaign, conditions, update)
+    cells = fitted[columns.row]
+    for turn in range(_TURNS):
+        read = predict(conditions).deviation
+        z = whiten(campaign, campaign.measured - read)
+        cells &= np.isfinite(z)
+        selected = select(columns, z[cells], cells, update)
+        traced = _traced(
+            campaign, declared, conditions, fitted, cells, selected, columns, finite
         )
-        earlier = selection
-        used = fitted & ~outliers
-        fitting = campaign.take(used)
-        if bends < _BENDS:
-            bent = _with_errors(campaign, conditions, used, selection, complete)
-            if bent is not conditions:
-                straight = straight or _Straight(conditions, used, selection)
-                conditions, bends = bent, bends + 1
-                continue
-        known = learned if inflation > 1.0 else None
-        selection, learned = taught(
-            campaign, conditions, used, selection, update, known
-        )
-        if straight is not None and np.array_equal(used, straight.used):
-            conditions, selection = _straighter(
-                campaign, straight, conditions, selection, learned, update
-            )
-        left = selection.behind.left(selection.fit.residual)
-        larger = believed_noise(fitting, left)
-        lack = lack_of_fit(
-            fitting, left, selection.unknowns + round(selection.behind.unknowns)
-        )
-        if np.any(larger > 1.0):
-            factor = factor * larger
-        elif inflation == 1.0 and lack.significant and lack.rms > _LOOSE:
-            # what nothing explains must not be fitted as if it were known to a sigma
-            inflation = lack.rms
-            larger = np.full(6, inflation)
-        else:
+        fit = _fitted(traced)
+        if turn == _TURNS - 1:
             break
-        campaign, straight = replace(campaign, sigma=campaign.sigma * larger), None
+        bent = _with_errors(conditions, fit, complete)
+        if bent is None or not _differs(campaign, bent, read, fitted):
+            break
+        conditions = bent
+    return traced, fit
+
+
+def _traced(
+    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
+    cells: NDArray, selected: Selected, columns: Columns, finite: bool,
+) -> Traced:  # fmt: skip
+    """What was found, with the sigma that was believed and rows that are blunders."""
+    weights = np.ones(len(columns.row))
+    weights[cells] = weights_of(selected.weights)
+    sigma = campaign.sigma.copy()
+    sigma[campaign.cells] *= selected.noise.tau / np.sqrt(weights)
+    good = np.ones(len(columns.row))
+    good[cells] = selected.weights
+    count = np.bincount(columns.row, minlength=len(campaign))
+    share = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
+    outliers = (share > 0.5 * np.maximum(count, 1)) | impossible_rows(campaign)
     return Traced(
-        campaign=campaign,
+        campaign=replace(campaign, sigma=sigma),
         unregistered=declared,
         conditions=conditions,
         used=fitted & ~outliers,
         outliers=outliers,
-        noise_factor=factor,
-        inflation=inflation,
-        selection=selection,
-        learned=learned.functions,
+        selected=selected,
+        columns=columns,
         finite=finite,
     )
 
 
-def _without_outliers(
-    campaign: Campaign, conditions: Conditions, fitted: NDArray,
-    left_out: tuple[NDArray, NDArray], selected: Callable[..., Selection],
-    earlier: Selection | None,
-) -> tuple[Selection, NDArray]:  # fmt: skip
-    """The selection on rows (R,) without those far off, and which these are.
-
-    The farthest are left out first and the others looked at again without them; what is
-    far off after some turns, all at once.
-
-    Returns:
-        The selection, and (R,) bool.
-    """
-    outliers, impossible = left_out
-    for turn in count():
-        used = fitted & ~outliers
-        earlier = selection = selected(
-            campaign.take(used), conditions.take(used), earlier=earlier
-        )
-        if turn == _TURNS:
-            break
-        left = selection.behind.left(selection.fit.residual)
-        called = int((outliers & ~impossible).sum())
-        most = max(0, len(campaign) // BLUNDERS - called)
-        far = outlying(campaign.take(used), left, most, worst=turn < _TURNS - 1)
-        if not far.any():
-            break
-        outliers = outliers.copy()
-        outliers[used] = far
-    return selection, outliers
+def _fitted(traced: Traced) -> MachineFit:
+    """The machine found, without effects that the readings do not support."""
+    fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
+    while True:
+        weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
+        if not weak:
+            return fit
+        # the weakest first: two effects that do the same are both uncertain
+        one = min(weak, key=lambda e: _size(fit, e))
+        fit = fit_machine(traced.campaign, fit.unknowns.without([one]), traced.used)
 
 
-@dataclass(frozen=True, eq=False)
-class _Straight:
-    """What a campaign's rows looked like before finite errors were added.
-
-    Attributes:
-        conditions: of all rows.
-        used: (R,) bool, the rows fitted.
-        selection: on these.
-    """
-
-    conditions: Conditions
-    used: NDArray
-    selection: Selection
-
-
-def _straighter(
-    campaign: Campaign, straight: _Straight, conditions: Conditions,
-    selection: Selection, learned: Taught, update: Update,
-) -> tuple[Conditions, Selection]:  # fmt: skip
-    """The same functions without finite errors, if they cost less there.
-
-    Errors may have stood for what was learned, and finite ones hide it.
-
-    Returns:
-        Conditions and selection with them, or those given.
-    """
-    if not learned.functions:
-        return conditions, selection
-    other, same = taught(
-        campaign, straight.conditions, straight.used, straight.selection, update,
-        learned,
-    )  # fmt: skip
-    if same.functions and cost_of(other) < cost_of(selection):
-        return straight.conditions, other
-    return conditions, selection
+def _size(fit: MachineFit, one: Acting) -> float:
+    """[sigma^2] squared change of the fitted readings by an effect."""
+    x, _, slopes = fit.own(one)
+    return float(np.sum((slopes @ x) ** 2))
 
 
 def _with_errors(
-    campaign: Campaign, conditions: Conditions, used: NDArray, selection: Selection,
+    conditions: Conditions, fit: MachineFit,
     complete: Callable[[Conditions], Conditions],
-) -> Conditions:  # fmt: skip
-    """Conditions whose finite part is that of the geometric errors found, too."""
-    # the errors change with it, and are followed until it stays; a step so large that
-    # what it adds leads away is halved
-    behind, fitting = selection.behind, campaign.take(used)
-    affected = apply_effects(conditions, selection.fit.effects)
-    own = [affected.robot.index(frame.name) for frame in campaign.robot.frames]
-    raw = behind.raw(selection.fit.residual)
-    was = predict(conditions.take(used)).deviation
+) -> Conditions | None:  # fmt: skip
+    """Conditions with what finite motions add to the geometric errors found."""
+    if not any(part.name == GEOMETRY for part in fit.unknowns.small):
+        return None
+    frames = fit.unknowns.robot.frames
+    own = [conditions.robot.index(frame.name) for frame in frames]
+    errors = conditions.errors.copy()
+    errors[:, own] += fit.robot.errors - fit.unknowns.robot.errors
+    added = complete(replace(conditions, errors=errors)).second_order
+    return replace(conditions, second_order=added)
 
-    def at(values: Sequence[NDArray]) -> tuple[float, NDArray, Conditions]:
-        errors = affected.errors.copy()
-        errors[:, own] += screws_of(campaign, behind.terms, values)
-        added = complete(replace(affected, errors=errors)).second_order
-        bent = replace(conditions, second_order=added)
-        change = whiten(fitting, predict(bent.take(used)).deviation - was)
-        left = raw - np.nan_to_num(change)
-        return behind.lost(left, values), left, bent
 
-    if not any(term.name == GEOMETRY for term in behind.terms):
-        return conditions
-    stays = behind.left(selection.fit.residual)
-    limit = _BENT * max(1.0, float(np.sqrt(np.mean(stays**2))))
-    known = [np.zeros(len(term)) for term in behind.terms]
-    lost, left = at(known)[0], raw
-    for _ in range(_PASSES):
-        aim = behind.values(behind.whitened(left))
-        for share in _SHARES:
-            values = [k + share * (x - k) for k, x in zip(known, aim, strict=True)]
-            trial, there, bent = at(values)
-            if trial < lost:
-                break
-        else:
-            break
-        if np.abs(there - left).max() < limit:
-            break
-        conditions, known, lost, left = bent, values, trial, there
-    return conditions
+def _differs(
+    campaign: Campaign, bent: Conditions, read: NDArray, fitted: NDArray
+) -> bool:
+    """Whether finite geometric errors change a fitted reading by more than noise."""
+    change = (predict(bent).deviation - read) / campaign.sigma
+    change = np.where(campaign.cells & fitted[:, None], change, 0.0)
+    return bool(np.nanmax(np.abs(change), initial=0.0) > _BENT)

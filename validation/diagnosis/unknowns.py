@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects.combine import combined
+from assembly.effects.effect import Values
 from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_rest_positions
@@ -139,7 +140,8 @@ class Unknowns:
             for e in self.effects
             for slot in e.hypothesis.slots
         ]
-        return np.concatenate([wide, *(p.std for p in (*self.small, *self.functions))])
+        priors = [*(p.std for p in self.small), *(f.std for f in self.functions)]
+        return np.concatenate([np.array(wide), *priors])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
@@ -178,7 +180,7 @@ class Unknowns:
 
     def _effects_at(
         self, x: NDArray
-    ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, dict[str, float]]]]:
+    ) -> tuple[dict[str, Values], dict[str, dict[str, Values]]]:
         """Effects of all rows, and of each session, those of the file included."""
         found: dict[str | None, dict[str, dict[str, float]]] = {None: {}}
         for one, own in zip(self.effects, self.slices, strict=False):
@@ -186,11 +188,13 @@ class Unknowns:
             effects = found.setdefault(one.session, {})
             if values or not one.hypothesis.slots:
                 effects.setdefault(one.hypothesis.effect, {}).update(values)
-        sessions = {s: dict(e) for s, e in self.robot.session_effects.items()}
+        sessions: dict[str, dict[str, Values]] = {
+            s: dict(e) for s, e in self.robot.session_effects.items()
+        }
         for session, effects in found.items():
             if session is not None:
-                sessions[session] = combined(sessions.get(session, {}), effects)
-        return combined(self.robot.effects, found[None]), sessions
+                sessions[session] = dict(combined(sessions.get(session, {}), effects))
+        return dict(combined(self.robot.effects, found[None])), sessions
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
         """Change of the readings per unknown, by the linear model at a robot.
