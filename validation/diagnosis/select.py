@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from assembly.effects import LIBRARY
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
@@ -43,6 +42,7 @@ _ROUNDS = 3  # of taking nonlinear effects again
 _MOVED = 0.3  # log posterior
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
+_LINEAR = 0.5  # squared whitened difference from a model that is linear enough
 _SHIFT = 3.0  # times that a shape may change in a round
 
 
@@ -179,7 +179,7 @@ class Search:
         self.empty = [self.fit.state((), mode) for mode in self.fit.modes()]
         self.begin = max(self.empty, key=lambda s: s.score)
         self.seen: dict[object, State] = {}
-        self._about: dict[object, Element | None] = {}
+        self._about: dict[object, list[Element] | None] = {}
         self._made: dict[object, Element | None] = {}
 
     def run(self, update: Update) -> list[State]:
@@ -191,10 +191,7 @@ class Search:
         front = [self.begin]
         for level in range(MOST):
             update("elements", level, MOST)
-            sources = list(front)
-            if level == 0:  # springs or geometry may stand for what is looked for
-                sources += [s for s in self.empty if s is not self.begin]
-            new = self._grown(sources, products=level == 0 or not front[0].elements)
+            new = self._grown(front, products=level == 0)
             best = max(self.seen.values(), key=lambda s: s.score)
             if not new or new[0].score < best.score - _DROP:
                 break
@@ -206,19 +203,22 @@ class Search:
         """Remember models that support what they claim."""
         for state in states:
             if _supported(state):
-                self.seen[frozenset(state.elements), state.mode] = state
+                self.seen[frozenset(_origins(state.elements)), state.mode] = state
 
     def _grown(self, sources: Sequence[State], *, products: bool) -> list[State]:
         """The best models with one element more, kept and in order."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
-        for state in sources:
-            for worth, element in self._candidates(state, products=products):
+        for state in self._with_less(sources):
+            whole = state in sources
+            for worth, element in self._candidates(
+                state, functions=whole, products=products and state is sources[0]
+            ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
                 if key not in tried or tried[key][0] < worth:
                     tried[key] = worth, elements, state
         ordered = sorted(tried.values(), key=lambda one: -one[0])
-        most = _BEAM + 2 * (len(sources) - 1)
+        most = _BEAM + 2 * len(sources)
         new = [self.fit.best(e, state) for _, e, state in ordered[:most]]
         new = self._retaken(sorted(new, key=lambda s: -s.score)[: 2 * _KEPT])
         for state in sorted(new, key=lambda s: -s.score)[:_FORMS]:
@@ -233,8 +233,18 @@ class Search:
             self._keep(self._reduced(state))
         return kept
 
+    def _with_less(self, states: Sequence[State]) -> list[State]:
+        """Models, and the same without geometry or springs: these may stand for more."""
+        less = [
+            self.fit.state(s.elements, mode, s)
+            for s in states
+            for mode in self.fit.modes()
+            if mode != s.mode and mode[0] <= s.mode[0] and mode[1] <= s.mode[1]
+        ]
+        return [*states, *less]
+
     def _candidates(
-        self, state: State, *, products: bool
+        self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
         """The best elements beside a model, with what it is then worth about."""
         gains = self.dense.gains(state.taken, FREEDOM)
@@ -252,7 +262,9 @@ class Search:
                 best.append((float(worth[i]), e))
             if len(best) >= _BEAM:
                 break
-        found = self._look(state, self.functions.first_look())
+        found: list[Found] = []
+        if functions:
+            found = self._look(state, self.functions.first_look())
         if products:
             found += self._look(state, self._products(found))
         found.sort(key=lambda one: -one.worth)
@@ -289,63 +301,105 @@ class Search:
             return []
         rest = state.elements[:-1]
         base = self.fit.state(rest, state.mode, state)
-        shapes = self.functions.shapes_of(variables)
+        shapes = tuple(self.functions.shapes_of(variables))
         found = self._look(base, [(variables, shapes)], most=4)
         made = [self._element(one) for one in found]
         new = [self.fit.state((*rest, e), state.mode, base) for e in made if e]
         return [s for s in new if s.elements != state.elements]
 
     def _retaken(self, states: Sequence[State]) -> list[State]:
-        """Models with nonlinear effects taken again about what was found."""
-        result = list(states)
-        for first in states[:_KEPT]:
-            state = first
-            for _ in range(_ROUNDS):
-                elements = tuple(self._again(state, k) for k in range(len(state.elements)))
-                if elements == state.elements:
-                    break
-                before = state.score
-                state = self.fit.state(elements, state.mode, state)
-                if abs(state.score - before) < _MOVED:
-                    break
-            if state is not first:
-                result[result.index(first)] = state
-        return result
+        """Models whose effects are taken again about what was found together."""
+        return [self._settled(s) if k < _KEPT else s for k, s in enumerate(states)]
 
-    def _again(self, state: State, k: int) -> Element:
-        """An element about its fitted values, itself if it is linear."""
-        e = state.elements[k]
-        if not e.name or LIBRARY[e.name].linear or not e.columns.shape[1]:
-            return e
-        x = e.values(state.sizes.mean[state.own(k)])
-        for j, slot in enumerate(e.hypothesis.slots):
-            if slot.shape:
-                x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)
-                x[j] = np.clip(x[j], slot.unknown.lower, slot.unknown.upper)
-        key = e.what, tuple(float(f"{v:.3g}") for v in x)
+    def _settled(self, state: State) -> State:
+        """A model about its own values, where that differs from what was assumed."""
+        for _ in range(_ROUNDS):
+            elements = self._again(state)
+            if elements is None:
+                break
+            before, state = state.score, self.fit.state(elements, state.mode, state)
+            if abs(state.score - before) < _MOVED:
+                break
+        return state
+
+    def _again(self, state: State) -> tuple[Element, ...] | None:
+        """Elements about a model's values; None where they add up to them already."""
+        own = [
+            (k, e)
+            for k, e in enumerate(state.elements)
+            if e.name and e.columns.shape[1]
+        ]
+        if not own:
+            return None
+        means = [state.sizes.mean[state.own(k)] for k, _ in own]
+        xs = [_within(e, e.values(d)) for (_, e), d in zip(own, means, strict=True)]
+        effects = [e for _, e in own]
+        key = tuple(e.origin for e in effects), tuple(
+            float(f"{v:.3g}") for x in xs for v in x
+        )
         if key not in self._about:
-            self._about[key] = self.columns.about(e, x)
-        return self._about[key] or e
+            settled = all(_has_shapes(e) for e in effects)
+            if settled:
+                d = [(x - e.begin)[e.slots] / e.scale for e, x in zip(effects, xs, strict=True)]
+                linear = sum(
+                    (e.columns @ y for e, y in zip(effects, d, strict=True)),
+                    start=np.zeros(len(self.fit.cells)),
+                )
+                linear += sum(e.offset for e in effects if e.offset is not None)
+                exact = self.columns.together(effects, xs)
+                miss = (exact - linear)[self.fit.cells]
+                settled = not float(miss @ miss) > _LINEAR
+            self._about[key] = None if settled else self.columns.again(effects, xs)
+        made = self._about[key]
+        if made is None:
+            return None
+        elements = list(state.elements)
+        for (k, _), new in zip(own, made, strict=True):
+            elements[k] = new
+        return tuple(elements)
 
     def _reduced(self, state: State) -> list[State]:
         """A model without each of its elements."""
         if len(state.elements) < 2:
             return []
-        return [
-            self.fit.best(tuple(e for e in state.elements if e is not out), state)
-            for out in state.elements
-        ]
+        own = _origins(state.elements)
+        rest = [tuple(e for e in own if e is not out) for out in own]
+        return [self._settled(self.fit.best(some, state)) for some in rest]
 
     def _rivals(self) -> None:
         """Every element of the best model against all others in its place."""
         best = max(self.seen.values(), key=lambda s: s.score)
-        for out in best.elements:
-            rest = tuple(e for e in best.elements if e is not out)
-            base = self.fit.state(rest, best.mode, best)
-            listed = self._candidates(base, products=False)
+        own = _origins(best.elements)
+        for out in own:
+            rest = tuple(e for e in own if e is not out)
+            base = self._settled(self.fit.state(rest, best.mode, best))
+            listed = [c for s in self._with_less([base]) for c in self._candidates(s)]
             near = [e for worth, e in listed if worth > best.score - 2 * _EQUAL]
-            states = [self.fit.best((*rest, e), base) for e in near if e is not out]
+            states = [
+                self.fit.best((*base.elements, e), base)
+                for e in near
+                if e.origin is not out
+            ]
             self._keep(self._retaken(sorted(states, key=lambda s: -s.score)))
+
+
+def _has_shapes(e: Element) -> bool:
+    """Whether an effect's shapes are among its unknowns."""
+    return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
+
+
+def _within(e: Element, x: NDArray) -> NDArray:
+    """Values of an effect, its shapes no farther than a round may take them."""
+    for j, slot in enumerate(e.hypothesis.slots):
+        if slot.shape:
+            x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)
+            x[j] = np.clip(x[j], slot.unknown.lower, slot.unknown.upper)
+    return x
+
+
+def _origins(elements: Iterable[Element]) -> tuple[Element, ...]:
+    """Elements where their unknowns begin."""
+    return tuple(e.origin for e in elements)
 
 
 def _names(state: State) -> tuple[str, ...]:
