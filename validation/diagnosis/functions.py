@@ -411,6 +411,8 @@ class Functions:
         for kind, parts in self._parts_together():
             name = parts[0].variable
             tried = forms.first(self.conditions, name)
+            if kind == "compliance":
+                tried += forms.uneven(self.conditions, name)
             listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
         cubic = CandidateShape("powers", ("2",))
         joints = [

@@ -40,6 +40,8 @@ _FORMS = 4  # models whose function is tried in other forms
 _DROP = 1.0  # log posterior by which a larger model may be behind
 _ROUNDS = 3  # of taking nonlinear effects again
 _MOVED = 0.3  # log posterior
+_LOOKED = 2  # of them, beside which functions are looked for
+_NEAR = 15.0  # log posterior by which an estimate may be wrong
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
 _LINEAR = 0.5  # squared whitened difference from a model that is linear enough
@@ -149,12 +151,12 @@ def select(
     """
     good = np.ones(len(z))
     search = Search(columns, z, cells, good)
-    begin = good_readings(search.begin.expected_squares())
+    begin = good_readings(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
         good, search = begin, Search(columns, z, cells, begin)
     states = search.run(update)
     again = good_readings(states[0].expected_squares())
-    if not np.array_equal(again < 0.5, good < 0.5):
+    if not np.array_equal(again, good):
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
     return _selected(search, states, good)
@@ -192,11 +194,17 @@ class Search:
         for level in range(MOST):
             update("elements", level, MOST)
             new = self._grown(front, products=level == 0)
-            best = max(self.seen.values(), key=lambda s: s.score)
+            best = self._likeliest()
             if not new or new[0].score < best.score - _DROP:
                 break
             front = new
-        self._rivals()
+        for _ in range(_ROUNDS):
+            before = self._likeliest()
+            self._exchange(before)
+            best = self._likeliest()
+            if best.score < before.score + _MOVED:
+                break
+            self._grown([best], products=False)
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
     def _keep(self, states: Iterable[State]) -> None:
@@ -209,9 +217,8 @@ class Search:
         """The best models with one element more, kept and in order."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._with_less(sources):
-            whole = state in sources
             for worth, element in self._candidates(
-                state, functions=whole, products=products and state is sources[0]
+                state, functions=state in sources[:_LOOKED], products=products and state is sources[0]
             ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
@@ -219,9 +226,8 @@ class Search:
                     tried[key] = worth, elements, state
         ordered = sorted(tried.values(), key=lambda one: -one[0])
         most = _BEAM + 2 * len(sources)
-        new = [self.fit.best(e, state) for _, e, state in ordered[:most]]
-        new = self._retaken(sorted(new, key=lambda s: -s.score)[: 2 * _KEPT])
-        for state in sorted(new, key=lambda s: -s.score)[:_FORMS]:
+        new = self._refined((e, state) for _, e, state in ordered[:most])
+        for state in new[:_FORMS]:
             new += self._reformed(state)
         self._keep(new)
         kept: list[State] = []
@@ -294,22 +300,31 @@ class Search:
     def _reformed(self, state: State) -> list[State]:
         """A model with its last function in all forms, at the likeliest places."""
         last = state.elements[-1]
-        if last.name or len(last.candidate.parts) > 1:
-            return []
-        variables = last.candidate.parts[0].variables
-        if variables[0].startswith("wrench."):
+        if last.name or last.candidate.parts[0].variable.startswith("wrench."):
             return []
         rest = state.elements[:-1]
         base = self.fit.state(rest, state.mode, state)
-        shapes = tuple(self.functions.shapes_of(variables))
-        found = self._look(base, [(variables, shapes)], most=4)
-        made = [self._element(one) for one in found]
+        made = self._forms_of(last, base)
         new = [self.fit.state((*rest, e), state.mode, base) for e in made if e]
         return [s for s in new if s.elements != state.elements]
 
-    def _retaken(self, states: Sequence[State]) -> list[State]:
-        """Models whose effects are taken again about what was found together."""
-        return [self._settled(s) if k < _KEPT else s for k, s in enumerate(states)]
+    def _forms_of(self, last: Element, base: State) -> list[Element | None]:
+        """The likeliest forms of a function's variables, at any single place."""
+        one = last.candidate
+        variables = one.parts[0].variables
+        priors = self.functions.shapes_of(variables)
+        if len(one.parts) == 1:
+            found = self._look(base, [(variables, tuple(priors))], most=4)
+            return [self._element(f) for f in found]
+        tried = [Candidate(one.parts, one.kind, shape) for shape in priors]
+        made = [
+            self._made.setdefault(c, self.functions.element(c, priors[c.shape]))
+            for c in tried
+        ]
+        shown = [e for e in made if e is not None]
+        dense = Dense(shown, self.fit.cells, self.fit.root)
+        worth = dense.gains(base.taken, FREEDOM) + [e.log_prior for e in shown]
+        return [shown[i] for i in np.argsort(-worth)[:4].tolist()]
 
     def _settled(self, state: State) -> State:
         """A model about its own values, where that differs from what was assumed."""
@@ -349,7 +364,8 @@ class Search:
                 exact = self.columns.together(effects, xs)
                 miss = (exact - linear)[self.fit.cells]
                 settled = not float(miss @ miss) > _LINEAR
-            self._about[key] = None if settled else self.columns.again(effects, xs)
+            again = None if settled else self.columns.again(effects, xs)
+            self._about[key] = again
         made = self._about[key]
         if made is None:
             return None
@@ -366,21 +382,35 @@ class Search:
         rest = [tuple(e for e in own if e is not out) for out in own]
         return [self._settled(self.fit.best(some, state)) for some in rest]
 
-    def _rivals(self) -> None:
-        """Every element of the best model against all others in its place."""
-        best = max(self.seen.values(), key=lambda s: s.score)
+    def _likeliest(self) -> State:
+        return max(self.seen.values(), key=lambda s: s.score)
+
+    def _exchange(self, best: State) -> None:
+        """Look at a model with an element less, or with another in its place."""
         own = _origins(best.elements)
+        self._keep(self._reduced(best))
+        curved = any(e.first for e in best.elements)
         for out in own:
             rest = tuple(e for e in own if e is not out)
-            base = self._settled(self.fit.state(rest, best.mode, best))
-            listed = [c for s in self._with_less([base]) for c in self._candidates(s)]
-            near = [e for worth, e in listed if worth > best.score - 2 * _EQUAL]
-            states = [
-                self.fit.best((*base.elements, e), base)
-                for e in near
-                if e.origin is not out
-            ]
-            self._keep(self._retaken(sorted(states, key=lambda s: -s.score)))
+            base = self.fit.best(rest, best)
+            base = self._settled(base) if curved else base
+            listed = self._candidates(base, functions=not out.name)
+            for less in self._with_less([base])[1:]:
+                listed += self._candidates(less, functions=False)
+            listed.sort(key=lambda one: -one[0])
+            near = {e.origin: e for w, e in listed if w > best.score - _NEAR}
+            near.pop(out, None)
+            tried = [(*base.elements, e) for e in [*near.values()][:_BEAM]]
+            self._keep(self._refined((elements, base) for elements in tried))
+
+    def _refined(
+        self, tried: Iterable[tuple[tuple[Element, ...], State]]
+    ) -> list[State]:
+        """Models, the likeliest in their best mode and about their values."""
+        new = [self.fit.state(elements, s.mode, s) for elements, s in tried]
+        new.sort(key=lambda s: -s.score)
+        best = [self._settled(self.fit.best(s.elements, s)) for s in new[:_KEPT]]
+        return sorted([*best, *new[_KEPT:]], key=lambda s: -s.score)
 
 
 def _has_shapes(e: Element) -> bool:
