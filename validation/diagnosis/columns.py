@@ -1,14 +1,16 @@
 """Everything a search may use, of a campaign's design alone: no reading is looked at."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY
+from assembly.effects import LIBRARY, apply_effects
 from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict, with_second_order
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.elements import Element, effect_element, effect_prior
@@ -18,7 +20,12 @@ from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import Signature, Tangents, loaded_components
+from validation.diagnosis.signatures import (
+    Signature,
+    Tangents,
+    loaded_components,
+    whiten,
+)
 from validation.diagnosis.small_terms import small_terms
 
 _VISIBLE = 4.0  # squared whitened change of the readings
@@ -103,13 +110,56 @@ class Columns:
         ]
         return np.hstack(own)
 
-    def about(self, element: Element, x: NDArray) -> Element | None:
-        """An effect's element about values of its unknowns; None without an answer."""
-        signature = self.tangents.about(element.hypothesis, x, {})
-        if not _finite(signature):
-            return None
+    def again(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> list[Element]:
+        """Effects to first order about values that they have together.
+
+        Args:
+            elements: of the library.
+            xs: values of the slots of each.
+
+        Returns:
+            Elements whose sum, at these values, is what all of them do; those given
+            where the model has no answer.
+        """
         robot = self.campaign.robot
-        return effect_element(signature, robot, element.log_prior, x)
+        public = self._public(elements, xs)
+        middle = self.together(elements, xs)
+        made = []
+        for e, x in zip(elements, xs, strict=True):
+            others = {name: v for name, v in public.items() if name != e.name}
+            signature = self.tangents.about(e.hypothesis, x, others)
+            if not _finite(signature) or not np.isfinite(middle).all():
+                return list(elements)
+            middle = middle - signature.columns @ x
+            made.append(replace(signature, offset=np.zeros_like(middle)))
+        # what all of them do together beside their tangents goes with the first
+        made[0] = replace(made[0], offset=middle)
+        return [
+            replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
+            for s, e, x in zip(made, elements, xs, strict=True)
+        ]
+
+    def together(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
+        """(N,) what effects of the library do together, whitened."""
+        public = self._public(elements, xs)
+        if any(LIBRARY[name].clearance for name in public):
+            return self.tangents.model(public) - self.tangents.declared
+        changed = apply_effects(self.conditions, public)
+        if np.ndim(self.conditions.second_order) == 2:
+            # what they move is finite, as the declared errors are
+            changed = with_second_order(changed)
+        whitened = whiten(self.campaign, predict(changed).deviation)
+        return whitened - self.tangents.declared
+
+    def _public(
+        self, elements: Sequence[Element], xs: Sequence[NDArray]
+    ) -> dict[str, dict[str, float]]:
+        """Parameters of effects by their public names."""
+        robot = self.conditions.robot
+        return {
+            e.name: e.hypothesis.public(robot, x)
+            for e, x in zip(elements, xs, strict=True)
+        }
 
 
 def _finite(signature: Signature) -> bool:

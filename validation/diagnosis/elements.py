@@ -38,6 +38,7 @@ class Element:
         what: the hypothesis or candidate.
         slots: (m,) which of the hypothesis's slots; columns of a function.
         begin: values of all slots where the unknowns are zero.
+        first: the same as it was scored at first, where it was taken again since.
     """
 
     name: str
@@ -52,6 +53,12 @@ class Element:
     what: Hypothesis | Candidate
     slots: NDArray
     begin: NDArray
+    first: "Element | None" = None
+
+    @property
+    def origin(self) -> "Element":
+        """The same where its unknowns begin."""
+        return self.first or self
 
     @property
     def hypothesis(self) -> Hypothesis:

@@ -17,9 +17,9 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -46,6 +46,7 @@ Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
+_LISTED = 2000  # functions that are ordered
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,48 @@ class Weighted:
     cells: tuple[NDArray, NDArray]
 
 
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """Products of one form at c places, columns scaled to norm about one."""
+
+    number: int
+    shape: int
+    where: NDArray
+    gram: NDArray
+    along: NDArray
+    most: NDArray
+    prior: float
+
+
+def _likeliest(
+    parts: Mapping[int, Sequence[_Scored]], taken: Taken, freedom: float
+) -> list[tuple[float, int, int, int]]:
+    """Worth, and which variables, form and place, of all that show; best first."""
+    worths, whose = [], []
+    for own in parts.values():
+        gains = averaged_gains(
+            np.concatenate([p.gram for p in own]), np.concatenate([p.along for p in own]),
+            np.concatenate([p.most for p in own]), False, taken, freedom,
+        )  # fmt: skip
+        sizes = [len(p.where) for p in own]
+        worths.append(gains + np.repeat([p.prior for p in own], sizes))
+        numbers = np.repeat([(p.number, p.shape) for p in own], sizes, axis=0)
+        whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
+    worth, names = np.concatenate(worths), np.concatenate(whose)
+    order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
+    return [(float(worth[i]), *map(int, names[i])) for i in order]
+
+
+def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
+    """(c, m) root of the mean squared norm of columns, of turns and of shifts."""
+    diagonal = np.einsum("skk->sk", gram)
+    squares = np.zeros_like(diagonal)
+    for kind in (turns, ~turns):
+        mean = (diagonal * kind).sum(axis=1) / np.maximum(kind.sum(axis=1), 1)
+        squares += kind * mean[:, None]
+    return np.sqrt(squares)
+
+
 class Functions:
     """Places, variables and forms of a campaign's functions."""
 
@@ -102,7 +145,8 @@ class Functions:
         self.variables = variables_of(self.conditions)
         self.plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         self._list_places()
-        self.priors = lru_cache(maxsize=None)(self._priors)
+        self.shapes_of = lru_cache(maxsize=None)(self._shapes_of)
+        self.prior = lru_cache(maxsize=None)(self._prior)
 
     def _list_places(self) -> None:
         """Components at places, and combinations of some at one place."""
@@ -151,6 +195,12 @@ class Functions:
                 self.equal.append([])
                 self.members.append(seen_ones)
         self.most = np.array([min(self._most(w) for w in p) for p in self.places])
+        self._groups: list[tuple[NDArray, NDArray, NDArray]] = []
+        for size in sorted({len(m) for m in self.members}):
+            where = np.array([i for i, m in enumerate(self.members) if len(m) == size])
+            mem = np.array([self.members[i] for i in where])
+            turns = [[AXES.index(self.places[i][0][1]) < 3 for i in m] for m in mem]
+            self._groups.append((where, mem, np.array(turns)))
         pairs = {pair for m in self.members for pair in combinations(m, 2)}
         self._pairs = {pair: k for k, pair in enumerate(sorted(pairs))}
 
@@ -192,23 +242,24 @@ class Functions:
             beside[k] = np.einsum("rc,rc->r", answers[i], answers[j])
         return Weighted(rows, answers, squares, beside, (row, component))
 
-    def _priors(
-        self, variables: Variables, listed: tuple[CandidateShape, ...]
-    ) -> dict[CandidateShape, float]:
-        """Ln of the prior of each form of variables at one place."""
+    def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
+        """All forms of one variable or two, with ln of the prior at one place."""
+        if len(variables) == 1:
+            shapes = forms.every(self.conditions, variables[0], "compliance")
+        else:
+            both = forms.of_two(self.conditions, *variables)
+            shapes = [] if both is None else both[1]
         count, places = len(self.variables), len(self.places) + len(self.together)
         prior = -math.log(2.0) - math.log(max(count, 1)) - math.log(max(places, 1))
         if len(variables) > 1:
             prior -= math.log(2.0 * max(count - 1, 1))
-        logs = forms.log_priors(listed)
-        return {s: prior + float(p) for s, p in zip(listed, logs, strict=True)}
+        logs = forms.log_priors(shapes)
+        return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
-    def shapes_of(self, variables: Variables) -> tuple[CandidateShape, ...]:
-        """All forms of one variable or two."""
-        if len(variables) == 1:
-            return tuple(forms.every(self.conditions, variables[0], "compliance"))
-        both = forms.of_two(self.conditions, *variables)
-        return () if both is None else tuple(both[1])
+    def _prior(self, variables: Variables, shape: CandidateShape) -> float:
+        """ln of the prior of a form of variables, at one place."""
+        known = self.shapes_of(variables)
+        return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
         """Variables, and forms that show whether they count."""
@@ -259,66 +310,49 @@ class Functions:
         held[row, component] = taken.held
         through = weighted.answers.transpose(1, 0, 2) @ U
         on = np.einsum("src,rc->sr", weighted.answers, held)
-        found: list[Found] = []
-        for variables, shapes in asked:
-            worth = self._worths(
-                taken, weighted, freedom, variables, shapes, through, on
-            )
-            priors = self._prior_of(variables)
-            worth += np.array([priors(s) for s in shapes])[:, None]
-            for flat in np.argsort(-worth, axis=None)[:most].tolist():
-                k, where = divmod(flat, worth.shape[1])
-                if np.isfinite(worth[k, where]):
-                    prior = priors(shapes[k])
-                    found.append(
-                        Found(
-                            float(worth[k, where]), where, variables, shapes[k], prior
-                        )
-                    )
-        return sorted(found, key=lambda one: -one.worth)
+        parts: dict[int, list[_Scored]] = {}
+        for number, (variables, shapes) in enumerate(asked):
+            for one in self._blocks(number, weighted, variables, shapes, through, on):
+                parts.setdefault(one.along.shape[1], []).append(one)
+        best: list[Found] = []
+        each: dict[int, int] = {}
+        for worth, number, k, where in _likeliest(parts, taken, freedom):
+            each[number] = each.get(number, 0) + 1
+            if each[number] <= most:
+                variables, shapes = asked[number]
+                prior = self.prior(variables, shapes[k])
+                best.append(Found(worth, where, variables, shapes[k], prior))
+        return best
 
-    def _prior_of(self, variables: Variables):
-        """Ln prior of a form of variables."""
-        known = self.priors(variables, self.shapes_of(variables))
-        other = min(known.values(), default=0.0)
-        return lambda shape: known.get(shape, other)
-
-    def _worths(
-        self, taken: Taken, weighted: Weighted, freedom: float, variables: Variables,
+    def _blocks(
+        self, number: int, weighted: Weighted, variables: Variables,
         shapes: Sequence[CandidateShape], through: NDArray, on: NDArray,
-    ) -> NDArray:  # fmt: skip
-        """(forms, places) log evidence ratios."""
+    ) -> Iterator[_Scored]:  # fmt: skip
+        """Products of all forms of variables at all places."""
         columns = [self._numbers(variables, s)[weighted.rows] for s in shapes]
         ends = np.cumsum([0, *(c.shape[1] for c in columns)])
         P = np.hstack(columns)
         S = len(weighted.answers)
-        flat = through.reshape(len(P), -1)
-        shown = (flat.T @ P).reshape(S, -1, P.shape[1])
+        shown = (through.reshape(len(P), -1).T @ P).reshape(S, -1, P.shape[1])
         along = on @ P
-        worths = np.full((len(shapes), len(self.places)), -np.inf)
         for k, own in enumerate(columns):
             part = slice(ends[k], ends[k + 1])
             m = own.shape[1]
             outer = (own[:, :, None] * own[:, None, :]).reshape(len(own), m * m)
             whole = (weighted.squares @ outer).reshape(S, m, m)
             cross = (weighted.beside @ outer).reshape(-1, m, m)
-            for size in sorted({len(mem) for mem in self.members}):
-                where = [i for i, mem in enumerate(self.members) if len(mem) == size]
-                mem = np.array([self.members[i] for i in where])
+            prior = self.prior(variables, shapes[k])
+            for where, mem, turns in self._groups:
+                c, size = mem.shape
                 B = whole[mem[:, 0]] if size == 1 else self._joined(mem, whole, cross)
-                y = shown[mem, :, part].transpose(0, 2, 1, 3)
-                y = y.reshape(len(mem), -1, size * m)
-                b = along[mem, part].reshape(len(mem), size * m)
-                diagonal = np.einsum("skk->sk", B)
-                norm = np.sqrt(self._by_kind(mem, diagonal, m))
-                most = self.most[where] * norm.max(axis=1)
-                left = B - y.transpose(0, 2, 1) @ y
+                y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
+                b = along[mem, part].reshape(c, size * m)
+                norm = _by_kind(np.repeat(turns, m, axis=1), B)
                 scale = np.where(norm > 0, 1 / np.maximum(norm, 1e-300), 0.0)
-                left = left * scale[:, :, None] * scale[:, None, :]
-                worths[k, where] = averaged_gains(
-                    left, b * scale, most, False, taken, freedom
-                )
-        return worths
+                left = B - y.transpose(0, 2, 1) @ y
+                left *= scale[:, :, None] * scale[:, None, :]
+                most = self.most[where] * norm.max(axis=1)
+                yield _Scored(number, k, where, left, b * scale, most, prior)
 
     def _joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
         """(c, s m, s m) products of combinations of s components."""
@@ -333,19 +367,7 @@ class Functions:
                 B[:, j, :, i] = cross[pair].transpose(0, 2, 1)
         return B.reshape(c, s * m, s * m)
 
-    def _by_kind(self, members: NDArray, diagonal: NDArray, m: int) -> NDArray:
-        """(c, s m) mean squared norm of columns, of turns and of shifts."""
-        turns = np.array([
-            [AXES.index(self.places[i][0][1]) < 3 for i in own] for own in members
-        ])
-        turns = np.repeat(turns, m, axis=1)
-        squares = np.zeros_like(diagonal)
-        for kind in (turns, ~turns):
-            mean = (diagonal * kind).sum(axis=1) / np.maximum(kind.sum(axis=1), 1)
-            squares += kind * mean[:, None]
-        return squares
-
-    @cache  # noqa: B019  one campaign at a time
+    @lru_cache(maxsize=None)  # noqa: B019  one campaign at a time
     def _numbers(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """(R, q) columns of a form, falling as their prior does."""
         columns = self.sensitivities.basis(variables, shape)[0]
@@ -388,19 +410,13 @@ class Functions:
         base = -math.log(2.0 * count)
         for kind, parts in self._parts_together():
             name = parts[0].variable
-            shapes = self.shapes_of((name,))
             tried = forms.first(self.conditions, name)
-            logs = dict(zip(shapes, forms.log_priors(shapes), strict=True))
-            share = base - math.log(len(self.places) + len(self.together) + 1)
-            listed += [
-                (Candidate(parts, kind, s), share + float(logs[s])) for s in tried
-            ]
+            if kind == "compliance":
+                tried += forms.uneven(self.conditions, name)
+            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
         cubic = CandidateShape("powers", ("2",))
         joints = [
-            w
-            for p in self.places
-            for w in p[:1]
-            if len(p) == 1 and w[2] == "compliance"
+            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
         ]
         for name, component, kind in joints:
             wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"

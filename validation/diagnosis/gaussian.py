@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.special import gammaln, log_ndtr, logsumexp
+from scipy.special import gammaln, log_ndtr
 
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] what a block may do to readings
 SPAN = math.log(SIZES[-1] / SIZES[0])
@@ -186,9 +186,11 @@ def averaged_gains(
         score = turned[:, 0] * spread / tau
         gains += np.where(bounded, log_ndtr(score) + math.log(2.0), 0.0)
     plausible = SIZES[:, None] <= most
-    gains = np.where(plausible, gains, -np.inf)
-    with np.errstate(divide="ignore"):
-        return logsumexp(gains, axis=0) - np.log(plausible.sum(axis=0).clip(1))
+    largest = np.where(plausible, gains, -1e300).max(axis=0)
+    shares = np.where(plausible, np.exp(np.minimum(gains - largest, 0.0)), 0.0)
+    total, sizes = shares.sum(axis=0), plausible.sum(axis=0)
+    average = largest + np.log(np.maximum(total, 1e-300) / np.maximum(sizes, 1))
+    return np.where(sizes > 0, average, -np.inf)
 
 
 def size_cost(determined: float) -> float:

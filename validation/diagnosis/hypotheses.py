@@ -158,8 +158,7 @@ def _groupings(
     ways.append(tuple(tuple(names) for names in kinds.values()))
     ways.append((places,))
     ways += [(tuple(names),) for names in kinds.values()]
-    if few:
-        ways += [((p,),) for p in places]
+    ways += [((p,),) for p in places]
     yield from dict.fromkeys(ways)
 
 

@@ -1,7 +1,7 @@
 """Noise: its scale beside the stated sigma, and blunders.
 
-A reading is good, with N(0, tau^2), or with a probability of one in a hundred a
-blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
+A reading is good, with N(0, tau^2), or with a probability of one in five hundred
+a blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
-_BLUNDERS = 0.01  # of the readings, before they are looked at
+_BLUNDERS = 0.002  # of the readings, before they are looked at
 _WIDTH = 30.0  # times tau
-_MANY = 0.05  # more far off than this share are no blunders but an effect
+_CLEAR = 10.0  # times tau: what no effect does to a few readings alone
+_MANY = 0.03  # more far off than this share are no blunders but an effect
 _MEDIAN = 0.4549  # of the chi-square of one degree of freedom
 
 
@@ -34,21 +35,23 @@ class Noise:
     findings: tuple[str, ...] = ()
 
 
-def good_readings(squares: NDArray) -> NDArray:
+def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
     """Probability of every reading that it is no blunder.
 
     Args:
         squares: (n,) expected squared residuals, with what the fit does not know.
 
+        clearly: whether blunders must be far off, as where effects may be left.
+
     Returns:
-        (n,) ones where so many are far off that it is no matter of blunders.
+        (n,) 1 of those that are likelier good; ones where so many are far off that it is no matter of blunders.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
         good = (1 - _BLUNDERS) * np.exp(-squares / (2 * v))
         bad = _BLUNDERS / _WIDTH * np.exp(-squares / (2 * v * _WIDTH**2))
         share = np.where(bad + good > 0, good / np.maximum(bad + good, 1e-300), 0.0)
-    share = np.where(share > 0.5, 1.0, share)
+    share = np.where((share > 0.5) | (clearly & (squares < _CLEAR**2 * v)), 1.0, share)
     if np.mean(share < 0.5) > _MANY:
         return np.ones(len(squares))
     return share

@@ -7,6 +7,7 @@ forms, nonlinear effects taken again about what was found.  It ends where one mo
 element makes nothing likelier, and every model that was seen has its weight.
 """
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from assembly.effects import LIBRARY
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
@@ -40,8 +40,11 @@ _FORMS = 4  # models whose function is tried in other forms
 _DROP = 1.0  # log posterior by which a larger model may be behind
 _ROUNDS = 3  # of taking nonlinear effects again
 _MOVED = 0.3  # log posterior
+_LOOKED = 2  # of them, beside which functions are looked for
+_NEAR = 15.0  # log posterior by which an estimate may be wrong
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
+_LINEAR = 0.5  # squared whitened difference from a model that is linear enough
 _SHIFT = 3.0  # times that a shape may change in a round
 
 
@@ -150,12 +153,12 @@ def select(
     """
     good = np.ones(len(z))
     search = Search(columns, z, cells, good)
-    begin = good_readings(search.begin.expected_squares())
+    begin = good_readings(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
         good, search = begin, Search(columns, z, cells, begin)
     states = search.run(update)
     again = good_readings(states[0].expected_squares())
-    if not np.array_equal(again < 0.5, good < 0.5):
+    if not np.array_equal(again, good):
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
     return _selected(search, states, good)
@@ -180,7 +183,7 @@ class Search:
         self.empty = [self.fit.state((), mode) for mode in self.fit.modes()]
         self.begin = max(self.empty, key=lambda s: s.score)
         self.seen: dict[object, State] = {}
-        self._about: dict[object, Element | None] = {}
+        self._about: dict[object, list[Element] | None] = {}
         self._made: dict[object, Element | None] = {}
 
     def run(self, update: Update) -> list[State]:
@@ -192,37 +195,41 @@ class Search:
         front = [self.begin]
         for level in range(MOST):
             update("elements", level, MOST)
-            sources = list(front)
-            if level == 0:  # springs or geometry may stand for what is looked for
-                sources += [s for s in self.empty if s is not self.begin]
-            new = self._grown(sources, products=level == 0 or not front[0].elements)
-            best = max(self.seen.values(), key=lambda s: s.score)
+            new = self._grown(front, products=level == 0)
+            best = self._likeliest()
             if not new or new[0].score < best.score - _DROP:
                 break
             front = new
-        self._rivals()
+        for _ in range(_ROUNDS):
+            before = self._likeliest()
+            self._exchange(before)
+            best = self._likeliest()
+            if best.score < before.score + _MOVED:
+                break
+            self._grown([best], products=False)
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
     def _keep(self, states: Iterable[State]) -> None:
         """Remember models that support what they claim."""
         for state in states:
             if _supported(state):
-                self.seen[frozenset(state.elements), state.mode] = state
+                self.seen[frozenset(_origins(state.elements)), state.mode] = state
 
     def _grown(self, sources: Sequence[State], *, products: bool) -> list[State]:
         """The best models with one element more, kept and in order."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
-        for state in sources:
-            for worth, element in self._candidates(state, products=products):
+        for state in self._with_less(sources):
+            for worth, element in self._candidates(
+                state, functions=state in sources[:_LOOKED], products=products and state is sources[0]
+            ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
                 if key not in tried or tried[key][0] < worth:
                     tried[key] = worth, elements, state
         ordered = sorted(tried.values(), key=lambda one: -one[0])
-        most = _BEAM + 2 * (len(sources) - 1)
-        new = [self.fit.best(e, state) for _, e, state in ordered[:most]]
-        new = self._retaken(sorted(new, key=lambda s: -s.score)[: 2 * _KEPT])
-        for state in sorted(new, key=lambda s: -s.score)[:_FORMS]:
+        most = _BEAM + 2 * len(sources)
+        new = self._refined((e, state) for _, e, state in ordered[:most])
+        for state in new[:_FORMS]:
             new += self._reformed(state)
         self._keep(new)
         kept: list[State] = []
@@ -234,8 +241,18 @@ class Search:
             self._keep(self._reduced(state))
         return kept
 
+    def _with_less(self, states: Sequence[State]) -> list[State]:
+        """Models, and the same without geometry or springs: these may stand for more."""
+        less = [
+            self.fit.state(s.elements, mode, s)
+            for s in states
+            for mode in self.fit.modes()
+            if mode != s.mode and mode[0] <= s.mode[0] and mode[1] <= s.mode[1]
+        ]
+        return [*states, *less]
+
     def _candidates(
-        self, state: State, *, products: bool
+        self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
         """The best elements beside a model, with what it is then worth about."""
         gains = self.dense.gains(state.taken, FREEDOM)
@@ -253,7 +270,9 @@ class Search:
                 best.append((float(worth[i]), e))
             if len(best) >= _BEAM:
                 break
-        found = self._look(state, self.functions.first_look())
+        found: list[Found] = []
+        if functions:
+            found = self._look(state, self.functions.first_look())
         if products:
             found += self._look(state, self._products(found))
         found.sort(key=lambda one: -one.worth)
@@ -283,72 +302,136 @@ class Search:
     def _reformed(self, state: State) -> list[State]:
         """A model with its last function in all forms, at the likeliest places."""
         last = state.elements[-1]
-        if last.name or len(last.candidate.parts) > 1:
-            return []
-        variables = last.candidate.parts[0].variables
-        if variables[0].startswith("wrench."):
+        if last.name or last.candidate.parts[0].variable.startswith("wrench."):
             return []
         rest = state.elements[:-1]
         base = self.fit.state(rest, state.mode, state)
-        shapes = self.functions.shapes_of(variables)
-        found = self._look(base, [(variables, shapes)], most=4)
-        made = [self._element(one) for one in found]
+        made = self._forms_of(last, base)
         new = [self.fit.state((*rest, e), state.mode, base) for e in made if e]
         return [s for s in new if s.elements != state.elements]
 
-    def _retaken(self, states: Sequence[State]) -> list[State]:
-        """Models with nonlinear effects taken again about what was found."""
-        result = list(states)
-        for first in states[:_KEPT]:
-            state = first
-            for _ in range(_ROUNDS):
-                elements = tuple(
-                    self._again(state, k) for k in range(len(state.elements))
-                )
-                if elements == state.elements:
-                    break
-                before = state.score
-                state = self.fit.state(elements, state.mode, state)
-                if abs(state.score - before) < _MOVED:
-                    break
-            if state is not first:
-                result[result.index(first)] = state
-        return result
+    def _forms_of(self, last: Element, base: State) -> list[Element | None]:
+        """The likeliest forms of a function's variables, at any single place."""
+        one = last.candidate
+        variables = one.parts[0].variables
+        priors = self.functions.shapes_of(variables)
+        if len(one.parts) == 1:
+            found = self._look(base, [(variables, tuple(priors))], most=4)
+            return [self._element(f) for f in found]
+        tried = [Candidate(one.parts, one.kind, shape) for shape in priors]
+        made = [
+            self._made.setdefault(c, self.functions.element(c, priors[c.shape]))
+            for c in tried
+        ]
+        shown = [e for e in made if e is not None]
+        dense = Dense(shown, self.fit.cells, self.fit.root)
+        worth = dense.gains(base.taken, FREEDOM) + [e.log_prior for e in shown]
+        return [shown[i] for i in np.argsort(-worth)[:4].tolist()]
 
-    def _again(self, state: State, k: int) -> Element:
-        """An element about its fitted values, itself if it is linear."""
-        e = state.elements[k]
-        if not e.name or LIBRARY[e.name].linear or not e.columns.shape[1]:
-            return e
-        x = e.values(state.sizes.mean[state.own(k)])
-        for j, slot in enumerate(e.hypothesis.slots):
-            if slot.shape:
-                x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)
-                x[j] = np.clip(x[j], slot.unknown.lower, slot.unknown.upper)
-        key = e.what, tuple(float(f"{v:.3g}") for v in x)
+    def _settled(self, state: State) -> State:
+        """A model about its own values, where that differs from what was assumed."""
+        for _ in range(_ROUNDS):
+            elements = self._again(state)
+            if elements is None:
+                break
+            before, state = state.score, self.fit.state(elements, state.mode, state)
+            if abs(state.score - before) < _MOVED:
+                break
+        return state
+
+    def _again(self, state: State) -> tuple[Element, ...] | None:
+        """Elements about a model's values; None where they add up to them already."""
+        own = [
+            (k, e)
+            for k, e in enumerate(state.elements)
+            if e.name and e.columns.shape[1]
+        ]
+        if not own:
+            return None
+        means = [state.sizes.mean[state.own(k)] for k, _ in own]
+        xs = [_within(e, e.values(d)) for (_, e), d in zip(own, means, strict=True)]
+        effects = [e for _, e in own]
+        key = tuple(e.origin for e in effects), tuple(
+            float(f"{v:.3g}") for x in xs for v in x
+        )
         if key not in self._about:
-            self._about[key] = self.columns.about(e, x)
-        return self._about[key] or e
+            settled = all(_has_shapes(e) for e in effects)
+            if settled:
+                d = [(x - e.begin)[e.slots] / e.scale for e, x in zip(effects, xs, strict=True)]
+                linear = sum(
+                    (e.columns @ y for e, y in zip(effects, d, strict=True)),
+                    start=np.zeros(len(self.fit.cells)),
+                )
+                linear += sum(e.offset for e in effects if e.offset is not None)
+                exact = self.columns.together(effects, xs)
+                miss = (exact - linear)[self.fit.cells]
+                settled = not float(miss @ miss) > _LINEAR
+            again = None if settled else self.columns.again(effects, xs)
+            self._about[key] = again
+        made = self._about[key]
+        if made is None:
+            return None
+        elements = list(state.elements)
+        for (k, _), new in zip(own, made, strict=True):
+            elements[k] = new
+        return tuple(elements)
 
     def _reduced(self, state: State) -> list[State]:
         """A model without each of its elements."""
         if len(state.elements) < 2:
             return []
-        return [
-            self.fit.best(tuple(e for e in state.elements if e is not out), state)
-            for out in state.elements
-        ]
+        own = _origins(state.elements)
+        rest = [tuple(e for e in own if e is not out) for out in own]
+        return [self._settled(self.fit.best(some, state)) for some in rest]
 
-    def _rivals(self) -> None:
-        """Every element of the best model against all others in its place."""
-        best = max(self.seen.values(), key=lambda s: s.score)
-        for out in best.elements:
-            rest = tuple(e for e in best.elements if e is not out)
-            base = self.fit.state(rest, best.mode, best)
-            listed = self._candidates(base, products=False)
-            near = [e for worth, e in listed if worth > best.score - 2 * _EQUAL]
-            states = [self.fit.best((*rest, e), base) for e in near if e is not out]
-            self._keep(self._retaken(sorted(states, key=lambda s: -s.score)))
+    def _likeliest(self) -> State:
+        return max(self.seen.values(), key=lambda s: s.score)
+
+    def _exchange(self, best: State) -> None:
+        """Look at a model with an element less, or with another in its place."""
+        own = _origins(best.elements)
+        self._keep(self._reduced(best))
+        curved = any(e.first for e in best.elements)
+        for out in own:
+            rest = tuple(e for e in own if e is not out)
+            base = self.fit.best(rest, best)
+            base = self._settled(base) if curved else base
+            listed = self._candidates(base, functions=not out.name)
+            for less in self._with_less([base])[1:]:
+                listed += self._candidates(less, functions=False)
+            listed.sort(key=lambda one: -one[0])
+            near = {e.origin: e for w, e in listed if w > best.score - _NEAR}
+            near.pop(out, None)
+            tried = [(*base.elements, e) for e in [*near.values()][:_BEAM]]
+            self._keep(self._refined((elements, base) for elements in tried))
+
+    def _refined(
+        self, tried: Iterable[tuple[tuple[Element, ...], State]]
+    ) -> list[State]:
+        """Models, the likeliest in their best mode and about their values."""
+        new = [self.fit.state(elements, s.mode, s) for elements, s in tried]
+        new.sort(key=lambda s: -s.score)
+        best = [self._settled(self.fit.best(s.elements, s)) for s in new[:_KEPT]]
+        return sorted([*best, *new[_KEPT:]], key=lambda s: -s.score)
+
+
+def _has_shapes(e: Element) -> bool:
+    """Whether an effect's shapes are among its unknowns."""
+    return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
+
+
+def _within(e: Element, x: NDArray) -> NDArray:
+    """Values of an effect, its shapes no farther than a round may take them."""
+    for j, slot in enumerate(e.hypothesis.slots):
+        if slot.shape:
+            x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)
+            x[j] = np.clip(x[j], slot.unknown.lower, slot.unknown.upper)
+    return x
+
+
+def _origins(elements: Iterable[Element]) -> tuple[Element, ...]:
+    """Elements where their unknowns begin."""
+    return tuple(e.origin for e in elements)
 
 
 def _names(state: State) -> tuple[str, ...]:
@@ -408,18 +491,14 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         values=np.concatenate([np.zeros(0), *values]),
         functions=tuple(functions),
         prior=SmallPrior(
-            small.spring[kept],
-            small.frame[kept],
-            small.axis[kept],
+            small.spring[kept], small.frame[kept], small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
         noise=Noise(tau, tau_std),
         weights=good,
         models=_models(states, weights),
         probability={
-            name: float(
-                sum(w for w, n in zip(weights, names, strict=True) if name in n)
-            )
+            name: float(sum(w for w, n in zip(weights, names, strict=True) if name in n))
             for name in sorted(effects)
         },
         unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
@@ -481,9 +560,7 @@ def label(one: Candidate) -> str:
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
     kind = "" if one.kind == "screw" else "compliance of "
-    return (
-        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
-    )
+    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
 
 
 def _learned(

@@ -89,6 +89,14 @@ def of_two(
     return (first, second), [*shapes, CandidateShape("powers", ("1.0", "0.1", "1.1"))]
 
 
+def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
+    """What is softer in some places of a turn than in others."""
+    if not is_angle(conditions.robot, name):
+        return []
+    names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
+    return [CandidateShape("waves", own) for own in names]
+
+
 def of_direction(name: str) -> CandidateShape:
     """Backlash that varies around a turn of the same joint."""
     return CandidateShape("reversal_waves", _ANGLE)
