@@ -1,4 +1,4 @@
-"""What the columns of a device's table mean, by their names."""
+"""The header of a device's table: where it is, and which target a column is of."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,47 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from validation.campaign.dialect import parse_number
+from validation.exchange.column_names import (
+    LENGTH_UNITS,
+    Column,
+    column_of,
+    unit_word,
+)
 
-QUATERNION = ("w", "x", "y", "z")
-_NAMES = {"name", "point", "pointid", "pointname", "target", "id", "label", "group",
-          "groupname", "collection", "collectionname", "targetname"}  # fmt: skip
-_TIMES = {"timestamp", "time", "date", "datetime"}
-_BEFORE = "(?:measurement|measured|meas|actual|point|position|pos|coord|trans|t|p)*"
-_AFTER = "(?:measurement|measured|meas|actual|position|pos|coord|coordinate)?"
-_AXIS = re.compile(_BEFORE + "([xyz])" + _AFTER)
-_SPREAD = re.compile(r"(?:measurement)?(u95|u|uncertainty|sigma|std|stddev|sd)([xyz])")
-_QUATERNION = re.compile("(?:quaternion|quat|q|rotation|rot|orientation|ori)([wxyz])")
-_NUMBERED = re.compile("(?:quaternion|quat|q)([0-3])")
-_ANGLE = re.compile("(?:euler|rotation|rot|orientation|ori|angle|r)([xyz])")
-_NAMED_ANGLES = {"roll": "x", "pitch": "y", "yaw": "z"}
-_UNIT = re.compile(
-    r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)"
-)  # not the 95 of U(95)
-_UNIT_AFTER = re.compile(r"[_ ](mm|um|cm|in|m|deg|mrad|rad)$", re.IGNORECASE)
 _STATED = re.compile(r"\bunits?\b(.*)", re.IGNORECASE)
-_LENGTHS = ("mm", "m", "um", "cm", "in")
-_WORDS = {"meter": "m", "millimeter": "mm", "centimeter": "cm", "micrometer": "um",
-          "inche": "in", "inch": "in", "µm": "um", "μm": "um", "degree": "deg",
-          "°": "deg", "radian": "rad"}  # fmt: skip
+_KINDS = {"rotation", "position", "translation", "orientation"}
 _PREAMBLE = 100  # lines before a header, at most
-
-
-@dataclass(frozen=True)
-class Column:
-    """What a column holds.
-
-    Attributes:
-        kind: ``"axis"``, ``"sigma"``, ``"U"``, ``"quaternion"``, ``"angle"``,
-            ``"name"``, ``"time"``, or ``""`` for what is passed over.
-        axis: x, y, z, or w of a quaternion.
-        unit: as stated in its name, or empty.
-        target: that it belongs to, or empty.
-    """
-
-    kind: str
-    axis: str = ""
-    unit: str = ""
-    target: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +51,7 @@ def find_header(
         The header; None if no row names x, y and z.
     """
     for i, (_, cells) in enumerate(rows[:_PREAMBLE]):
+        cells = _with_kinds(cells, rows[i - 1][1] if i else [])
         columns = [column_of(cell) for cell in cells]
         axes = [column.axis for column in columns if column.kind == "axis"]
         several = any(axes.count(axis) > 1 for axis in "xyz")
@@ -91,7 +61,7 @@ def find_header(
             if not wide and set(axes) != set("xyz"):
                 continue
         after = rows[i + 1][1] if i + 1 < len(rows) else []
-        units = [_unit_word(cell) for cell in after]
+        units = [unit_word(cell) for cell in after]
         below = any(units) and not any(_is_number(cell) for cell in after)
         if below:
             columns = [
@@ -122,41 +92,6 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
     return Header(0, (), (), "", 0)
 
 
-def column_of(cell: str) -> Column:
-    """What a column holds, by its name alone.
-
-    Args:
-        cell: of the header.
-
-    Returns:
-        Its meaning, of no target.
-    """
-    stated = _UNIT.search(cell)
-    unit = (stated[1] or stated[2] or "") if stated else ""
-    name = _UNIT.sub("", cell).strip()
-    if not unit and (after := _UNIT_AFTER.search(name)):
-        unit, name = after[1].lower(), name[: after.start()]
-    plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    unit = _unit_word(unit) or unit
-    if plain in _TIMES:
-        return Column("time", plain, unit)
-    if plain in _NAMES:
-        return Column("name", unit=unit)
-    if match := _AXIS.fullmatch(plain):
-        return Column("axis", match[1], unit)
-    if match := _SPREAD.fullmatch(plain):
-        return Column("U" if match[1][0] == "u" else "sigma", match[2], unit)
-    if match := _NUMBERED.fullmatch(plain):
-        return Column("quaternion", QUATERNION[int(match[1])], unit)
-    if plain in _NAMED_ANGLES:
-        return Column("angle", _NAMED_ANGLES[plain], unit)
-    if match := _ANGLE.fullmatch(plain):
-        return Column("angle", match[1], unit)
-    if match := _QUATERNION.fullmatch(plain):
-        return Column("quaternion", match[1], unit)
-    return Column("", unit=unit)
-
-
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
@@ -180,7 +115,11 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        found = [_only(label, targets) for label in labels]
+        exact = set(labels) & set(targets)  # a body, not its markers arm:1, arm:2
+        found = [
+            label if label in exact else _only(label, [*{*targets} - exact])
+            for label in labels
+        ]
         marked = [
             Column(c.kind, c.axis, c.unit, t if c.kind not in {"name", "time"} else "")
             for c, t in zip(plain, found, strict=True)
@@ -241,6 +180,15 @@ def _only(label: str, targets: Sequence[str]) -> str:
     return found[0] if len(found) == 1 else ""
 
 
+def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
+    """Names of columns with the kind written above: Rotation, Position (OptiTrack)."""
+    kinds = [word if word.lower() in _KINDS else "" for word in above]
+    if not any(kinds) or len(above) > len(cells):
+        return cells
+    kinds += [""] * (len(cells) - len(kinds))
+    return [f"{kind} {cell}".strip() for kind, cell in zip(kinds, cells, strict=True)]
+
+
 def _filled(cells: Sequence[str], count: int) -> list[str]:
     """Labels of merged cells: an empty one has the label before it."""
     labels: list[str] = []
@@ -254,19 +202,10 @@ def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]
-            units = [unit for w in words if (unit := _unit_word(w)) in _LENGTHS]
+            units = [unit for w in words if (unit := unit_word(w)) in LENGTH_UNITS]
             if units:  # the "in" of "units in mm" is a preposition
                 return line, next((u for u in units if u != "in"), "in")
     return 0, ""
-
-
-def _unit_word(text: str) -> str:
-    """Short name of a unit, empty if it is none of lengths and angles."""
-    word = text.strip().strip("[]()").lower().replace("metre", "meter")
-    if len(word) > 2:
-        word = word.removesuffix("s")
-    word = _WORDS.get(word, word)
-    return word if word in {*_LENGTHS, "deg", "rad", "mrad"} else ""
 
 
 def _is_number(cell: str, decimal: str = ".") -> bool:

@@ -72,10 +72,12 @@ def _first_column(
         table = np.array([row[first : first + width] for row in numbers])
         points = table.reshape(len(table), -1, 3)
         lengths = np.linalg.norm(np.diff(points, axis=1), axis=2)
-        ratio = lengths / np.where(declared > 0, declared, np.nan)
-        off[first] = float(np.nanstd(ratio) / np.nanmean(ratio))
+        ratio = (lengths / np.where(declared > 0, declared, np.nan)).ravel()
+        ratio = ratio[np.isfinite(ratio)]
+        if ratio.any():
+            off[first] = float(ratio.std() / ratio.mean())
     best = min(off, key=lambda first: off[first], default=0)
-    return best if off and off[best] < _ALIKE * off[0] else 0
+    return best if off and off[best] < _ALIKE * off.get(0, np.inf) else 0
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:

@@ -124,6 +124,11 @@ def test_rows_of_numbers_alone_are_all_targets_in_their_order(lab, run, before):
     assert_exact(lab, 39)
 
 
+def test_rows_without_any_reading_are_one_line(lab, run):
+    line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
+    assert "found no" in line
+
+
 def test_vicon_trajectories_are_read(lab, run):
     """Names above merged cells, units below; a target that was hidden is missing."""
     body = list(rows(line="{k}00,0"))
@@ -154,6 +159,44 @@ def test_motive_csv_is_read(lab, run):
     table = imported(lab, run, "\n".join([*head, *rows(line="{k},0.{k}")]))
     assert table["readings"] == 39
     assert_exact(lab, 39)
+
+
+def test_motive_rigid_body_is_read_without_its_markers(lab, run):
+    """Its rotation is a quaternion x, y, z, w; its markers have its name too."""
+    lab.targets("A", unit=None, noise_rotation=1e-4)
+    kinds = ["Rotation"] * 4 + ["Position"] * 6
+    head = [
+        "Format Version,1.23,Length Units,Millimeters",
+        ",Type," + ",".join(["Rigid Body"] * 7 + ["Rigid Body Marker"] * 3),
+        ",Name," + ",".join(["A"] * 7 + ["A:1"] * 3),
+        ",," + ",".join(kinds),
+        "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z",
+    ]
+    body = []
+    for k, angles in enumerate(ANGLES):
+        place = 1e3 * seen(angles, "A")
+        cells = [k, 0.1 * k, *oriented(k).as_quat(), *place, *place]
+        body.append(",".join(repr(float(x)) for x in cells))
+    table = imported(lab, run, "\n".join([*head, *body]))
+    assert table["mounts"]["A"] == pytest.approx(MOUNT.as_rotvec(), abs=1e-9)
+    assert_exact(lab, 13)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit",
+     "Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit",
+     "Point Name;X_mm;Y_mm;Z_mm;Date;Time"],
+)  # fmt: skip
+def test_german_headers_and_units_after_a_slash_are_read(lab, run, head):
+    lab.targets(unit=None, decimal='","')
+    line = "p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00"
+    body = [line.replace(".", ",").replace("02,03,", "02.03.")
+            for line in points(line=line)]  # fmt: skip
+    imported(lab, run, "\n".join([head, *body]))
+    assert_exact(lab, 39)
+    times = read_campaign(lab.folder / "campaign").covariates["time"]
+    assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
 
 
 @pytest.mark.parametrize("stated", ["Units: Millimeters", "Units in mm", "unit\tmm"])
@@ -371,6 +414,8 @@ ORIENTATIONS = {
                {"orientation": '"ZYX"'}),
     "fixed": ("roll [deg],pitch [deg],yaw [deg]",
               lambda R: R.as_euler("xyz", degrees=True), {"orientation": '"xyz"'}),
+    "kuka": ("A [deg],B [deg],C [deg]", lambda R: R.as_euler("ZYX", degrees=True),
+             {"orientation": '"ZYX"'}),
     "vector": ("rx,ry,rz", lambda R: R.as_rotvec(),
                {"orientation": '"rotation_vector"', "angle_unit": '"rad"'}),
     "proper": ("rx [rad],ry [rad],rz [rad]", lambda R: R.as_euler("ZXZ"),
