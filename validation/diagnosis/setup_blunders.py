@@ -162,10 +162,9 @@ def _made(given: SetUp, made: Sequence[Correction]) -> SetUp:
 def _sample(campaign: Campaign) -> NDArray:
     """Rows spread evenly over those by which a set-up can be judged."""
     cells = campaign.cells
-    usable = cells[:, :3].all(axis=1) | cells[:, 3:].all(axis=1)
-    if campaign.registration == "known":
-        usable |= cells[:, 3:].any(axis=1)
-    rows = np.flatnonzero(usable)
+    enough = np.any if campaign.registration == "known" else np.all
+    usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
+    rows: NDArray = np.flatnonzero(usable)
     return rows[np.linspace(0, len(rows) - 1, min(_ROWS, len(rows))).astype(int)]
 
 
@@ -176,8 +175,8 @@ class _Judge:
         self.campaign = campaign
         robot = without_joint_clearances(conditions.robot)
         self.conditions = replace(conditions, robot=robot, rest=None, second_order=0.0)
-        self.cells = campaign.cells.copy()
-        self.cells[:, :3] &= self.cells[:, :3].all(axis=1)[:, None]
+        self.cells = np.array(campaign.cells)
+        self.cells[:, :3] = self.cells[:, :3].all(axis=1, keepdims=True)
 
     def residual(self, setup: SetUp) -> float:
         """[sigma] trimmed rms of what is left, infinite where it cannot be placed."""

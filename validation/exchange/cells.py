@@ -6,6 +6,8 @@ apostrophe is text in Excel.
 
 import codecs
 import csv
+import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +58,23 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
         raise BadInput(f"{path}: empty; expected a table")
     mark = _mark([line for _, line in lines[:_SAMPLE]], decimal)
     rows = [(number, _cells(line, mark)) for number, line in lines]
+    if mark == _BLANK:
+        rows = _with_names_of_words(lines, rows)
     return Sheet(str(path), "." if mark == "," else decimal, rows)
+
+
+def _with_names_of_words(
+    lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
+) -> list[tuple[int, list[str]]]:
+    """Rows, in which two blanks part a header of words, such as Point Name."""
+    usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
+    return [
+        (number, wide)
+        if len(cells) != usual
+        and len(wide := re.split(r"\s{2,}|\t", line.strip())) == usual
+        else (number, cells)
+        for (number, line), (_, cells) in zip(lines, rows, strict=True)
+    ]
 
 
 def _text(path: Path | str) -> str:
@@ -97,7 +115,7 @@ def _mark(lines: Sequence[str], decimal: str) -> str:
 def _cells(line: str, mark: str) -> list[str]:
     """Cells of a line."""
     if mark == _BLANK:
-        line = line.replace("\t", _BLANK).strip()
+        line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
     except csv.Error:  # a cell without end: no table

@@ -98,6 +98,17 @@ def match(
     return Match(how, rows, strangers, unmatched, missing, duplicates, copies)
 
 
+def _repeated(readings: Sequence[Reading]) -> str:
+    """Which reading is there twice, if that is why they are too many."""
+    seen: dict[object, Reading] = {}
+    for reading in readings:
+        digits = (reading.names, reading.position.tobytes(), str(reading.time))
+        other = seen.setdefault(digits, reading)
+        if other is not reading:
+            return f"; line {reading.line} repeats line {other.line}"
+    return ""
+
+
 def _same(a: Reading, b: Reading) -> bool:
     """Whether two readings are equal to the last digit, of one name and time."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
@@ -146,6 +157,7 @@ def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
                 f"{len(commands.ids)} commands; expected the id of the command in "
                 "their names, times in both tables, or as many readings as commands "
                 f"(names such as {describe('::'.join(first.names))})"
+                f"{_repeated([r for r, t in ours if t == target])}"
             )
     at, seen = [], Counter[str]()
     for target in named:

@@ -209,6 +209,17 @@ def test_lines_before_the_header_are_passed_over_and_say_the_unit(lab, run, stat
     assert_exact(lab, 39)
 
 
+@pytest.mark.parametrize(
+    "head",
+    ["Point Name    X          Y          Z", "Point  X [mm]  Y [mm]  Z [mm]",
+     "Point X [mm] Y [mm] Z [mm]"],
+)  # fmt: skip
+def test_header_of_words_in_a_table_of_blanks_is_read(lab, run, head):
+    body = points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}")
+    assert imported(lab, run, "\n".join([head, *body]))["joined_by"] == "name"
+    assert_exact(lab, 39)
+
+
 def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
     assert 'line 1: found the unit "in", the targets file says "mm"' in line
@@ -291,6 +302,15 @@ def test_reading_that_a_file_has_twice_is_named(lab, run):
     assert table["readings"] == 39
     (line,) = table["left_out"]
     assert 'line 40 ("Main::p1::B"): the same reading twice' in line
+
+
+def test_reading_that_is_one_too_many_is_named(lab, run):
+    """Joined by order a repeated line moves all that follow."""
+    body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
+    lab.targets("A")
+    line = refused(lab, run, "\n".join([*body[:6], body[5], *body[6:]]))
+    assert 'found 14 readings of "A" for 13 commands' in line
+    assert line.endswith("; line 7 repeats line 6")
 
 
 def test_what_is_there_twice_in_the_commands_is_named(lab, run):
