@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import place_many_joints
+from assembly.kinematics.posture import place_many, place_many_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -32,6 +32,7 @@ _CLEAR = 0.1  # of the residual left: only this set of corrections is followed
 _LESS = 0.9  # of the residual must be left for a further correction to be followed
 _DECISIVE = 0.5  # of the residual must be left for blunders to be reported
 _NEEDED = 1.5  # times the residual that is left without one of them
+_FAR = 10.0  # times the spread of the readings: no unit that places could have
 _NOISE = 3.0  # [sigma] of residual, below which nothing is looked for
 _LEAST = 100.0  # by which chi-square must fall for each blunder
 
@@ -74,7 +75,7 @@ def setup_blunders(
     if not len(rows):
         return ()
     judged = _Judge(campaign.take(rows), conditions.take(rows))
-    given = as_given(judged.campaign)
+    given = judged.given
     start = judged.residual(given)
     if not _NOISE < start < np.inf:
         return ()
@@ -172,7 +173,7 @@ class _Judge:
     """What a set-up leaves of the readings of some rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
-        self.campaign = campaign
+        self.campaign, self.given = campaign, as_given(campaign)
         robot = without_joint_clearances(conditions.robot)
         self.conditions = replace(conditions, robot=robot, rest=None, second_order=0.0)
         self.cells = np.array(campaign.cells)
@@ -205,12 +206,18 @@ class _Judge:
     def _moved(self, setup: SetUp) -> Conditions | None:
         """Conditions of a set-up; None where too few of its commands can be reached."""
         moved = replace(self.conditions, load=setup.loads)
-        if np.array_equal(setup.coordinates, self.campaign.coordinates):
-            return moved
         robot = moved.robot
-        actuated = np.array([frame.actuated for frame in robot.frames])
-        held = np.where(actuated, setup.coordinates, np.nan)
-        postures, _ = place_many_joints(robot, held)
+        if not np.array_equal(setup.poses, self.given.poses):
+            wide = np.nanstd(setup.points, axis=0).max()
+            if np.std(setup.poses[:, :3], axis=0).max() > _FAR * wide:
+                return None  # and it may take long to find that it is out of reach
+            postures, _ = place_many(robot, setup.poses)
+        elif not np.array_equal(setup.coordinates, self.given.coordinates):
+            actuated = np.array([frame.actuated for frame in robot.frames])
+            held = np.where(actuated, setup.coordinates, np.nan)
+            postures, _ = place_many_joints(robot, held)
+        else:
+            return moved
         if any(posture is None for posture in postures):
             return None
         placed = [posture for posture in postures if posture is not None]

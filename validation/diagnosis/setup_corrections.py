@@ -14,10 +14,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from assembly.model.robot import Robot
+from stiffness.screws import rotation_vector
 from validation.campaign.campaign import LOAD, Campaign
 
 _INCH = 25.4
 _GRAVITY = 9.81  # kg taken for N
+_MISREAD: tuple[tuple[str, str, Callable[[Rotation], Rotation]], ...] = (
+    ("transposed", "transposed", lambda turn: turn.inv()),
+    # of x y z w read as w x y z, the parts x y z w hold y z w x
+    ("quaternion", "with the quaternion's w taken last, not first",
+     lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), 1, axis=-1))),
+    ("quaternion", "with the quaternion's w taken first, not last",
+     lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), -1, axis=-1))),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +35,7 @@ class SetUp:
 
     Attributes:
         coordinates: (R, n) [rad or m] commanded, of every joint.
+        poses: (R, 6) [m, rad] tx ty tz rx ry rz commanded, where poses are.
         loads: (R, 6) [N m, N].
         nominal_points: (R, 3) [m] of the commands as the file gives them.
         nominal_turns: (R, 3, 3) likewise the platform's axes.
@@ -35,6 +45,7 @@ class SetUp:
     """
 
     coordinates: NDArray
+    poses: NDArray
     loads: NDArray
     nominal_points: NDArray
     nominal_turns: NDArray
@@ -79,6 +90,7 @@ def as_given(campaign: Campaign) -> SetUp:
     turns[turned] = deviation @ T[turned, :3, :3]
     return SetUp(
         coordinates=np.array(campaign.coordinates),
+        poses=np.hstack([T[:, :3, 3], rotation_vector(T[:, :3, :3])]),
         loads=np.array(campaign.loads),
         nominal_points=points,
         nominal_turns=T[:, :3, :3],
@@ -100,6 +112,8 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried = []
     if campaign.commanded == "joints":
         tried += [*_of_joints(campaign.robot)]
+    else:
+        tried += [*_of_poses()]
     tried += [*_of_loads(campaign)]
     if np.isfinite(campaign.measured[:, 3:]).all(axis=1).any():
         tried += [*_of_lengths()]
@@ -130,6 +144,26 @@ def _of_joints(robot: Robot) -> Iterator[Correction]:
         for factor in (f for one in factors for f in (one, 1 / one)):
             what = f"times {factor:.4g}"
             yield Correction("unit", names, what, _scaled(columns, factor))
+
+
+def _of_poses() -> Iterator[Correction]:
+    """Units of commanded places, and commanded rotations misread."""
+    names = ("pose.tx", "pose.ty", "pose.tz")
+    for factor in (f for one in (_INCH, 1e3) for f in (one, 1 / one)):
+
+        def scaled(given: SetUp, factor: float = factor) -> SetUp:
+            return replace(given, poses=given.poses * np.repeat([factor, 1.0], 3))
+
+        yield Correction("unit", names, f"times {factor:.4g}", scaled)
+    for kind, what, change in _MISREAD:
+
+        def turned(
+            given: SetUp, change: Callable[[Rotation], Rotation] = change
+        ) -> SetUp:
+            turns = change(Rotation.from_rotvec(given.poses[:, 3:])).as_rotvec()
+            return replace(given, poses=np.hstack([given.poses[:, :3], turns]))
+
+        yield Correction(kind, ("pose.rx", "pose.ry", "pose.rz"), what, turned)
 
 
 def _scaled(columns: list[int], factor: float) -> Callable[[SetUp], SetUp]:
@@ -214,15 +248,7 @@ def _cautious(sigma: NDArray, factor: float) -> NDArray:
 def _of_rotations() -> Iterator[Correction]:
     """Rotations read inverted, or from a quaternion whose w is in the wrong place."""
     names = ("meas.rx", "meas.ry", "meas.rz")
-    kinds: list[tuple[str, str, Callable[[Rotation], Rotation]]] = [
-        ("transposed", "transposed", lambda turn: turn.inv()),
-        # of x y z w read as w x y z, the parts x y z w hold y z w x
-        ("quaternion", "with the quaternion's w taken last, not first",
-         lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), 1, axis=-1))),
-        ("quaternion", "with the quaternion's w taken first, not last",
-         lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), -1, axis=-1))),
-    ]  # fmt: skip
-    for kind, what, change in kinds:
+    for kind, what, change in _MISREAD:
 
         def absolute(
             given: SetUp, change: Callable[[Rotation], Rotation] = change

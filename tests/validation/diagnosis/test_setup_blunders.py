@@ -5,11 +5,13 @@ wrongly after it was placed and measured rightly; it has errors of its own of a
 millimetre, which no correction explains.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import Posture, place_many_joints
+from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.robots import load_robot
@@ -197,7 +199,11 @@ def test_rotations_that_were_misread_are_named(rng, change, kind, words):
     assert words in one.sentence
 
 
-@pytest.mark.parametrize("name", ["arm6", "delta", "hexapod", "3rrr"])
+@pytest.mark.parametrize(
+    "name",
+    ["arm6", "3rrr", *(pytest.param(n, marks=pytest.mark.slow)
+                       for n in ("delta", "hexapod"))],
+)  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
 def test_machine_that_is_only_inaccurate_has_no_blunder(rng, name, unknown):
     """Errors of a millimetre are a hundred sigma, and no blunder."""
@@ -238,3 +244,49 @@ def test_heights_alone_name_a_joint_where_the_device_is_known(rng):
     machine.q[:, 2] *= -1
     machine.points[:, :2] = np.nan
     assert said(machine.campaign()) == {("sign", ("q.joint3",))}
+
+
+def commanded_by_pose(machine, change):
+    """The campaign of a machine whose commanded poses are written down changed."""
+    T, _ = machine.declared(machine.q, machine.loads)
+    turns = Rotation.from_matrix(T[:, :3, :3])
+    postures, _ = place_many(machine.robot, change(T[:, :3, 3], turns))
+    campaign = machine.campaign(rotations=True)
+    given = np.array([p.transforms for p in postures])
+    nominal = given[:, machine.robot.index(machine.robot.platform)]
+    gap = Rotation.from_matrix(
+        machine.turns @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    ).as_rotvec()
+    shift = machine.points - nominal[:, :3, 3] - nominal[:, :3, :3] @ POINT
+    return replace(
+        campaign,
+        commanded="pose",
+        coordinates=np.array([p.coordinates for p in postures]),
+        transforms=given,
+        measured=np.hstack([gap, shift]),
+    )
+
+
+@pytest.mark.slow
+def test_commanded_rotations_that_were_transposed_are_named(rng):
+    machine = Machine(rng, "hexapod", spread=0.01)
+    campaign = commanded_by_pose(
+        machine, lambda p, R: np.hstack([p, R.inv().as_rotvec()])
+    )
+    expected = {("transposed", ("pose.rx", "pose.ry", "pose.rz"))}
+    assert said(campaign) == expected
+    right = commanded_by_pose(machine, lambda p, R: np.hstack([p, R.as_rotvec()]))
+    assert said(right) == set()
+
+
+@pytest.mark.slow
+def test_commanded_places_in_another_unit_are_named(rng):
+    """Inches taken for a length that is 25.4 times longer; struts have no limits."""
+    machine = Machine(rng, "hexapod", spread=0.01)
+
+    def change(p, R):
+        return np.hstack([p * 25.4, R.as_rotvec()])
+
+    (one,) = found(commanded_by_pose(machine, change))
+    assert (one.kind, one.columns) == ("unit", ("pose.tx", "pose.ty", "pose.tz"))
+    assert "times 0.03937" in one.sentence
