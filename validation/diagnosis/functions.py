@@ -19,7 +19,7 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -132,17 +132,20 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 class Functions:
     """Places, variables and forms of a campaign's functions."""
 
-    def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
+    def __init__(
+        self, campaign: Campaign, sensitivities: Sensitivities, some: bool = True
+    ) -> None:
         """List them; what does the same to the readings counts once.
 
         Args:
             campaign: of which commands, loads, covariates and sigma are read.
             sensitivities: of its rows.
+            some: whether any function may act.
         """
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self._over_sigma = np.where(campaign.cells, 1 / campaign.sigma, 0.0)
-        self.variables = variables_of(self.conditions)
+        self.variables = variables_of(self.conditions) if some else []
         self.plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         self._list_places()
         self.shapes_of = lru_cache(maxsize=None)(self._shapes_of)
@@ -257,7 +260,7 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """ln of the prior of a form of variables, at one place."""
+        """Ln of the prior of a form of variables, at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
@@ -300,7 +303,7 @@ class Functions:
         Returns:
             Functions, best first.
         """
-        if not len(self.places):
+        if not len(self.places) or not asked:
             return []
         row, component = weighted.cells
         count = taken.across.shape[1]
@@ -367,7 +370,7 @@ class Functions:
                 B[:, j, :, i] = cross[pair].transpose(0, 2, 1)
         return B.reshape(c, s * m, s * m)
 
-    @lru_cache(maxsize=None)  # noqa: B019  one campaign at a time
+    @cache  # noqa: B019  one campaign at a time
     def _numbers(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """(R, q) columns of a form, falling as their prior does."""
         columns = self.sensitivities.basis(variables, shape)[0]
@@ -413,10 +416,15 @@ class Functions:
             tried = forms.first(self.conditions, name)
             if kind == "compliance":
                 tried += forms.uneven(self.conditions, name)
-            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
+            listed += [
+                (Candidate(parts, kind, s), self.prior((name,), s)) for s in tried
+            ]
         cubic = CandidateShape("powers", ("2",))
         joints = [
-            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
+            w
+            for p in self.places
+            for w in p[:1]
+            if len(p) == 1 and w[2] == "compliance"
         ]
         for name, component, kind in joints:
             wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"

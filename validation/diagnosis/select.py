@@ -7,7 +7,6 @@ forms, nonlinear effects taken again about what was found.  It ends where one mo
 element makes nothing likelier, and every model that was seen has its weight.
 """
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -220,7 +219,9 @@ class Search:
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._with_less(sources):
             for worth, element in self._candidates(
-                state, functions=state in sources[:_LOOKED], products=products and state is sources[0]
+                state,
+                functions=state in sources[:_LOOKED],
+                products=products and state is sources[0],
             ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
@@ -351,13 +352,17 @@ class Search:
         means = [state.sizes.mean[state.own(k)] for k, _ in own]
         xs = [_within(e, e.values(d)) for (_, e), d in zip(own, means, strict=True)]
         effects = [e for _, e in own]
-        key = tuple(e.origin for e in effects), tuple(
-            float(f"{v:.3g}") for x in xs for v in x
+        key = (
+            tuple(e.origin for e in effects),
+            tuple(float(f"{v:.3g}") for x in xs for v in x),
         )
         if key not in self._about:
             settled = all(_has_shapes(e) for e in effects)
             if settled:
-                d = [(x - e.begin)[e.slots] / e.scale for e, x in zip(effects, xs, strict=True)]
+                d = [
+                    (x - e.begin)[e.slots] / e.scale
+                    for e, x in zip(effects, xs, strict=True)
+                ]
                 linear = sum(
                     (e.columns @ y for e, y in zip(effects, d, strict=True)),
                     start=np.zeros(len(self.fit.cells)),
@@ -491,14 +496,18 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         values=np.concatenate([np.zeros(0), *values]),
         functions=tuple(functions),
         prior=SmallPrior(
-            small.spring[kept], small.frame[kept], small.axis[kept],
+            small.spring[kept],
+            small.frame[kept],
+            small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
         noise=Noise(tau, tau_std),
         weights=good,
         models=_models(states, weights),
         probability={
-            name: float(sum(w for w, n in zip(weights, names, strict=True) if name in n))
+            name: float(
+                sum(w for w, n in zip(weights, names, strict=True) if name in n)
+            )
             for name in sorted(effects)
         },
         unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
@@ -560,7 +569,9 @@ def label(one: Candidate) -> str:
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
     kind = "" if one.kind == "screw" else "compliance of "
-    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )
 
 
 def _learned(
