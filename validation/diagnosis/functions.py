@@ -18,7 +18,7 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
 
@@ -46,6 +46,8 @@ Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
+_REMEMBERED = 8  # columns of forms whose products are kept
+_WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
 
 
@@ -78,6 +80,7 @@ class Weighted:
         squares: (S, R).
         beside: (pairs, R) products of components of one combination.
         cells: their rows and components.
+        known: products of columns of a form at all places, and of pairs of these.
     """
 
     rows: NDArray
@@ -85,6 +88,19 @@ class Weighted:
     squares: NDArray
     beside: NDArray
     cells: tuple[NDArray, NDArray]
+    known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
+
+    def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
+        """(S, m, m) B'B at all places and (pairs, m, m), of columns P (R, m)."""
+        if key in self.known:
+            return self.known[key]
+        m = columns.shape[1]
+        outer = (columns[:, :, None] * columns[:, None, :]).reshape(-1, m * m)
+        whole = (self.squares @ outer).reshape(-1, m, m)
+        cross = (self.beside @ outer).reshape(-1, m, m)
+        if m <= _REMEMBERED:
+            self.known[key] = whole, cross
+        return whole, cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,12 +354,12 @@ class Functions:
         for k, own in enumerate(columns):
             part = slice(ends[k], ends[k + 1])
             m = own.shape[1]
-            outer = (own[:, :, None] * own[:, None, :]).reshape(len(own), m * m)
-            whole = (weighted.squares @ outer).reshape(S, m, m)
-            cross = (weighted.beside @ outer).reshape(-1, m, m)
+            whole, cross = weighted.products((variables, shapes[k]), own)
             prior = self.prior(variables, shapes[k])
             for where, mem, turns in self._groups:
                 c, size = mem.shape
+                if size > 1 and size * m > _WIDEST:
+                    continue
                 B = whole[mem[:, 0]] if size == 1 else self._joined(mem, whole, cross)
                 y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
                 b = along[mem, part].reshape(c, size * m)

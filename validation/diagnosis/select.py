@@ -186,7 +186,10 @@ class Search:
 
     def run(self, update: Update) -> list[State]:
         """All models seen, best first."""
-        self.weighted: Weighted = self.functions.weighted(self.fit.cells, self.fit.root)
+        cells = self.fit.cells.copy()
+        cells[cells] = self.fit.glanced
+        root = self.fit.root[self.fit.glanced]
+        self.weighted: Weighted = self.functions.weighted(cells, root)
         pool = [*self.columns.library, *self.columns.explicit]
         self.dense = Dense(pool, self.fit.cells, self.fit.root)
         self._keep(self.empty)
@@ -288,7 +291,12 @@ class Search:
         return self.functions.products(dict.fromkeys(names))
 
     def _look(self, state: State, asked: list, most: int = 3) -> list[Found]:
-        return self.functions.look(state.taken, self.weighted, FREEDOM, asked, most)
+        found = self.functions.look(state.glance, self.weighted, FREEDOM, asked, most)
+        more = len(self.fit.glanced) / self.fit.glanced.sum()
+        scaled = [
+            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior) for f in found
+        ]
+        return sorted(scaled, key=lambda one: -one.worth)
 
     def _element(self, found: Found) -> Element | None:
         """A function's element, made once."""
