@@ -44,6 +44,7 @@ from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
 
 Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
+Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
 _REMEMBERED = 8  # columns of forms whose products are kept
@@ -277,7 +278,7 @@ class Functions:
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
-    def first_look(self) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    def first_look(self) -> list[Asked]:
         """Variables, and forms that show whether they count."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
@@ -286,7 +287,7 @@ class Functions:
 
     def products(
         self, names: Iterable[str]
-    ) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    ) -> list[Asked]:
         """Products of some variables with any others."""
         asked: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -302,7 +303,7 @@ class Functions:
 
     def look(
         self, taken: Taken, weighted: Weighted, freedom: float,
-        asked: Sequence[tuple[Variables, tuple[CandidateShape, ...]]], most: int,
+        asked: Sequence[Asked], most: int,
     ) -> list[Found]:  # fmt: skip
         """The best functions of some variables and forms beside what is known.
 
