@@ -18,8 +18,8 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -44,8 +44,11 @@ from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
 
 Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
+Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
+_REMEMBERED = 8  # columns of forms whose products are kept
+_WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
 
 
@@ -78,6 +81,7 @@ class Weighted:
         squares: (S, R).
         beside: (pairs, R) products of components of one combination.
         cells: their rows and components.
+        known: products of columns of a form at all places, and of pairs of these.
     """
 
     rows: NDArray
@@ -85,6 +89,19 @@ class Weighted:
     squares: NDArray
     beside: NDArray
     cells: tuple[NDArray, NDArray]
+    known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
+
+    def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
+        """(S, m, m) B'B at all places and (pairs, m, m), of columns P (R, m)."""
+        if key in self.known:
+            return self.known[key]
+        m = columns.shape[1]
+        outer = (columns[:, :, None] * columns[:, None, :]).reshape(-1, m * m)
+        whole = (self.squares @ outer).reshape(-1, m, m)
+        cross = (self.beside @ outer).reshape(-1, m, m)
+        if m <= _REMEMBERED:
+            self.known[key] = whole, cross
+        return whole, cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,11 +277,11 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """Ln of the prior of a form of variables, at one place."""
+        """ln of the prior of a form of variables, at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
-    def first_look(self) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    def first_look(self) -> list[Asked]:
         """Variables, and forms that show whether they count."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
@@ -273,7 +290,7 @@ class Functions:
 
     def products(
         self, names: Iterable[str]
-    ) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    ) -> list[Asked]:
         """Products of some variables with any others."""
         asked: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -289,7 +306,7 @@ class Functions:
 
     def look(
         self, taken: Taken, weighted: Weighted, freedom: float,
-        asked: Sequence[tuple[Variables, tuple[CandidateShape, ...]]], most: int,
+        asked: Sequence[Asked], most: int,
     ) -> list[Found]:  # fmt: skip
         """The best functions of some variables and forms beside what is known.
 
@@ -341,12 +358,12 @@ class Functions:
         for k, own in enumerate(columns):
             part = slice(ends[k], ends[k + 1])
             m = own.shape[1]
-            outer = (own[:, :, None] * own[:, None, :]).reshape(len(own), m * m)
-            whole = (weighted.squares @ outer).reshape(S, m, m)
-            cross = (weighted.beside @ outer).reshape(-1, m, m)
+            whole, cross = weighted.products((variables, shapes[k]), own)
             prior = self.prior(variables, shapes[k])
             for where, mem, turns in self._groups:
                 c, size = mem.shape
+                if size > 1 and size * m > _WIDEST:
+                    continue
                 B = whole[mem[:, 0]] if size == 1 else self._joined(mem, whole, cross)
                 y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
                 b = along[mem, part].reshape(c, size * m)
@@ -370,7 +387,7 @@ class Functions:
                 B[:, j, :, i] = cross[pair].transpose(0, 2, 1)
         return B.reshape(c, s * m, s * m)
 
-    @cache  # noqa: B019  one campaign at a time
+    @lru_cache(maxsize=None)  # noqa: B019  one campaign at a time
     def _numbers(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """(R, q) columns of a form, falling as their prior does."""
         columns = self.sensitivities.basis(variables, shape)[0]
@@ -416,15 +433,10 @@ class Functions:
             tried = forms.first(self.conditions, name)
             if kind == "compliance":
                 tried += forms.uneven(self.conditions, name)
-            listed += [
-                (Candidate(parts, kind, s), self.prior((name,), s)) for s in tried
-            ]
+            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
         cubic = CandidateShape("powers", ("2",))
         joints = [
-            w
-            for p in self.places
-            for w in p[:1]
-            if len(p) == 1 and w[2] == "compliance"
+            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
         ]
         for name, component, kind in joints:
             wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
