@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.measurement.conditions import Conditions
+from assembly.measurement.variables import variable
 from assembly.measurement.predict import predict, with_second_order
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
-from validation.diagnosis.holdout import blocks_of
+from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
@@ -31,6 +33,7 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.small_terms import small_terms
 
 FUNCTION = "function"
+_CLOCK = 0.999  # correlation with time of what counts it
 _VISIBLE = 4.0  # squared whitened change of the readings
 
 
@@ -80,6 +83,29 @@ class Columns:
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
         self.explicit = self.functions.explicit()
+
+    def without_clocks(self) -> "Columns":
+        """The same without functions of time and effects that time alone drives."""
+        other = copy(self)
+        other.library = [e for e in self.library if LIBRARY[e.name].needs != ("time",)]
+        names = [n for n in self.functions.variables if not self._is_clock(n)]
+        other.functions = self.functions.of(names)
+        other.explicit = other.functions.explicit()
+        return other
+
+    @property
+    def has_clocks(self) -> bool:
+        """Whether rows follow one another and something counts the time."""
+        successive = blocks_of(self.campaign)[1] == SPANS
+        return successive and any(map(self._is_clock, self.functions.variables))
+
+    def _is_clock(self, name: str) -> bool:
+        """Whether a variable goes with time alone."""
+        time = self.conditions.time
+        if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
+            return name == "time"
+        x = variable(self.conditions, name)
+        return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Hypotheses that show; of those that do the same, the first."""

@@ -18,6 +18,7 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
@@ -168,6 +169,14 @@ class Functions:
         self.shapes_of = lru_cache(maxsize=None)(self._shapes_of)
         self.prior = lru_cache(maxsize=None)(self._prior)
 
+    def of(self, variables: list[str]) -> "Functions":
+        """The same of some of the variables."""
+        other = copy(self)
+        other.variables = variables
+        other.shapes_of = lru_cache(maxsize=None)(other._shapes_of)
+        other.prior = lru_cache(maxsize=None)(other._prior)
+        return other
+
     def _list_places(self) -> None:
         """Components at places, and combinations of some at one place."""
         singles: list[Where] = []
@@ -288,9 +297,7 @@ class Functions:
             for name in self.variables
         ]
 
-    def products(
-        self, names: Iterable[str]
-    ) -> list[Asked]:
+    def products(self, names: Iterable[str]) -> list[Asked]:
         """Products of some variables with any others."""
         asked: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -433,10 +440,15 @@ class Functions:
             tried = forms.first(self.conditions, name)
             if kind == "compliance":
                 tried += forms.uneven(self.conditions, name)
-            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
+            listed += [
+                (Candidate(parts, kind, s), self.prior((name,), s)) for s in tried
+            ]
         cubic = CandidateShape("powers", ("2",))
         joints = [
-            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
+            w
+            for p in self.places
+            for w in p[:1]
+            if len(p) == 1 and w[2] == "compliance"
         ]
         for name, component, kind in joints:
             wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"

@@ -43,6 +43,8 @@ _ROUNDS = 3  # of taking nonlinear effects again
 _MOVED = 0.3  # log posterior
 _LOOKED = 2  # of them, beside which functions are looked for
 _NEAR = 15.0  # log posterior by which an estimate may be wrong
+_PROVEN = 2.0  # standard errors by which a function predicts left-out blocks better
+_UNLIKELY = 12.0  # log posterior behind the best, from which a model has no weight
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
 _LINEAR = 0.5  # squared whitened difference from a model that is linear enough
@@ -228,7 +230,9 @@ class Search:
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._with_less(sources):
             for worth, element in self._candidates(
-                state, functions=state in sources[:_LOOKED], products=products and state is sources[0]
+                state,
+                functions=state in sources[:_LOOKED],
+                products=products and state is sources[0],
             ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
@@ -297,14 +301,13 @@ class Search:
             names.append("approach")
         return self.functions.products(dict.fromkeys(names))
 
-    def look(
-        self, state: State, asked: Sequence[Asked], most: int = 3
-    ) -> list[Found]:
+    def look(self, state: State, asked: Sequence[Asked], most: int = 3) -> list[Found]:
         """The best functions beside a model, by what they would be worth in all rows."""
         found = self.functions.look(state.glance, self.weighted, FREEDOM, asked, most)
         more = len(self.fit.glanced) / self.fit.glanced.sum()
         scaled = [
-            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior) for f in found
+            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior)
+            for f in found
         ]
         return sorted(scaled, key=lambda one: -one.worth)
 
@@ -367,13 +370,17 @@ class Search:
         means = [state.sizes.mean[state.own(k)] for k, _ in own]
         xs = [_within(e, e.values(d)) for (_, e), d in zip(own, means, strict=True)]
         effects = [e for _, e in own]
-        key = tuple(e.origin for e in effects), tuple(
-            float(f"{v:.3g}") for x in xs for v in x
+        key = (
+            tuple(e.origin for e in effects),
+            tuple(float(f"{v:.3g}") for x in xs for v in x),
         )
         if key not in self._about:
             settled = all(_has_shapes(e) for e in effects)
             if settled:
-                d = [(x - e.begin)[e.slots] / e.scale for e, x in zip(effects, xs, strict=True)]
+                d = [
+                    (x - e.begin)[e.slots] / e.scale
+                    for e, x in zip(effects, xs, strict=True)
+                ]
                 linear = sum(
                     (e.columns @ y for e, y in zip(effects, d, strict=True)),
                     start=np.zeros(len(self.fit.cells)),
@@ -478,7 +485,7 @@ def _supported(state: State) -> bool:
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     """The answer from all models seen."""
-    states = _unlike(states)
+    states = _confirmed(search, _unlike(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     best, fit = states[0], search.fit
@@ -507,7 +514,9 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         values=np.concatenate([np.zeros(0), *values]),
         functions=tuple(functions),
         prior=SmallPrior(
-            small.spring[kept], small.frame[kept], small.axis[kept],
+            small.spring[kept],
+            small.frame[kept],
+            small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
         noise=Noise(tau, tau_std),
@@ -519,6 +528,55 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         gain=best.score - search.begin.score,
         states=tuple(states),
     )
+
+
+def _confirmed(search: Search, states: Sequence[State]) -> list[State]:
+    """Models without functions that do not predict rows they were not fitted to.
+
+    Effects of the library are not asked for it: it refuses true ones of two or three
+    times the noise.
+
+    Returns:
+        Models, best first; the model without elements is always among them.
+    """
+    blocks = search.columns.block[search.fit.cells]
+    kept: dict[frozenset[Element], State] = {}
+    for state in [*states, search.begin]:
+        best = max((s.score for s in kept.values()), default=-np.inf)
+        if state.score < best - _UNLIKELY and state is not search.begin:
+            continue
+        pruned = _pruned(search, state, blocks)
+        kept.setdefault(frozenset(pruned.elements), pruned)
+    return sorted(kept.values(), key=lambda s: -s.score)
+
+
+def _pruned(search: Search, state: State, blocks: NDArray) -> State:
+    """A model without its functions that are not confirmed, the least one first."""
+    while True:
+        gains = {
+            e: _gain(search, state, e, blocks) for e in state.elements if not e.name
+        }
+        least = min(gains, key=lambda e: gains[e], default=None)
+        if least is None or gains[least] > _PROVEN:
+            return state
+        rest = tuple(e for e in state.elements if e is not least)
+        state = search.fit.best(rest, state)
+
+
+def _gain(search: Search, state: State, e: Element, blocks: NDArray) -> float:
+    """Standard errors by which a function predicts left-out blocks better."""
+    rest = tuple(x for x in state.elements if x is not e)
+    without = search.fit.state(rest, state.mode, state)
+    return advantage(folds(state, blocks), folds(without, blocks))
+
+
+def advantage(one: NDArray, other: NDArray) -> float:
+    """Standard errors by which ln densities of blocks are larger than others."""
+    gains = one - other
+    if len(gains) < 2:
+        return 0.0
+    error = float(gains.std(ddof=1)) * len(gains) ** 0.5
+    return float(gains.sum()) / max(error, 1e-300)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
@@ -583,7 +641,9 @@ def label(one: Candidate) -> str:
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
     kind = "" if one.kind == "screw" else "compliance of "
-    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )
 
 
 def _learned(
