@@ -24,6 +24,7 @@ from stiffness.fem.error_indicator import (
     traction_errors,
 )
 from stiffness.fem.material import Material, material_of_elements
+from stiffness.fem.quality import volume_error
 from stiffness.link import scaled
 from stiffness.mesh.curved_elements import refine_inverted
 from stiffness.mesh.edge_grading import (
@@ -32,8 +33,9 @@ from stiffness.mesh.edge_grading import (
     singular_edges,
     split_joining_edges,
 )
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.improve import fitted
 from stiffness.mesh.refine import refine
+from stiffness.mesh.solid import Solid
 
 # effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
 # benchmarks/stiffness_random_parts.py
@@ -53,6 +55,7 @@ class Level:
         errors: (s, 6, 6) local error indicators: contribution of each of the solid's
             tetrahedra to K_h - K, without an effectivity index.
         geometry_errors: (s, 6, 6) the same for the geometry of curved elements.
+        volume_error: [1] relative, of the elements against the part's.
     """
 
     solid: Solid
@@ -61,6 +64,7 @@ class Level:
     solution: Condensed
     errors: NDArray
     geometry_errors: NDArray
+    volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
         """(6, 6) the stiffness, its indicated error and the geometry's."""
@@ -89,7 +93,7 @@ def solve_level(
     Raises:
         BadInput: no material fills the link.
     """
-    solid = split_joining_edges(refine_inverted(solid, ORDER), ENDS)
+    solid = fitted(split_joining_edges(refine_inverted(solid, ORDER), ENDS))
     parts = layered(solid, ENDS)
     mesh = isoparametric(solid, ORDER, parts)
     material = material_of_elements(mesh, materials)
@@ -112,9 +116,12 @@ def solve_level(
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
     np.add.at(errors, parts.parent, indicated)
-    by_face = geometry_errors(mesh, solid.shapes, solution.fields, lam, mu)
+    by_face = geometry_errors(
+        mesh, solid.shapes, solution.fields, lam, mu, solid.surface
+    )
     np.add.at(geometry, parts.parent[mesh.owner], by_face)
-    return Level(solid, mesh, material, solution, errors, geometry)
+    off = volume_error(solid, mesh)
+    return Level(solid, mesh, material, solution, errors, geometry, off)
 
 
 def estimated_error(

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from stiffness.fem.elements import Elements, gradients_on_faces, integration
 from stiffness.surface.primitives import Plane, Shape
+from stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _CHUNK = 1024  # faces at a time
@@ -134,8 +135,9 @@ def geometry_errors(
     fields: NDArray,
     lam: NDArray,
     mu: NDArray,
+    surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Error of the stiffness because curved elements deviate from the exact shapes.
+    """Error of the stiffness because elements deviate from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
@@ -143,6 +145,8 @@ def geometry_errors(
         fields: (n, 3, k) [m] displacements of the unit cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
+        surface: by which patches are judged that meet others smoothly: an element may
+            lie across their border; if absent, each face by its own patch's shape.
 
     Returns:
         (f, k, k) [unit of the stiffness] each boundary triangle's share, the energy
@@ -153,23 +157,28 @@ def geometry_errors(
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.faces), cases, cases))
-    for number in np.unique(mesh.patch[mesh.curved[mesh.owner]]):
-        shape = shapes[number]
-        faces = np.flatnonzero((mesh.patch == number) & mesh.curved[mesh.owner])
-        if shape is None or isinstance(shape, Plane):
+    for number in np.unique(mesh.patch):
+        shape, across = shapes[number], surface is not None and surface.tangent[number]
+        on = mesh.patch == number
+        faces = np.flatnonzero(on if across else on & mesh.curved[mesh.owner])
+        if shape is None or (isinstance(shape, Plane) and not across):
             continue
         for first in range(0, len(faces), _CHUNK):
             some = faces[first : first + _CHUNK]
             places, normal, area, G = gradients_on_faces(mesh, some)
-            away, slope = shape.signed(places.reshape(-1, 3))
-            outward = np.einsum("fqx,fqx->fq", normal, slope.reshape(normal.shape))
-            gap = away.reshape(area.shape) * np.sign(outward)
+            flat = places.reshape(-1, 3), normal.reshape(-1, 3)
+            if across and surface is not None:
+                gap = surface.outside(*flat).reshape(area.shape)
+            else:
+                away, slope = shape.signed(flat[0])
+                facing = np.einsum("nx,nx->n", flat[1], slope)
+                gap = (away * np.sign(facing)).reshape(area.shape)
             cells = mesh.owner[some]
             roots = _energy_roots(G, fields[mesh.cells[cells]], lam[cells], mu[cells])
             weighted = (roots * (area * gap)[..., None, None]).swapaxes(1, 2)
-            flat = (len(some), cases, -1)
-            errors[some] = weighted.reshape(flat) @ roots.swapaxes(1, 2).reshape(
-                flat
+            rows = (len(some), cases, -1)
+            errors[some] = weighted.reshape(rows) @ roots.swapaxes(1, 2).reshape(
+                rows
             ).swapaxes(1, 2)
     return errors
 

@@ -31,7 +31,9 @@ from stiffness.fem.material import Material, check_materials
 from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.mesh.mesh import MeshFailed, Solid, mesh_solid
+from stiffness.mesh.fit_to_patches import MeshFailed
+from stiffness.mesh.mesh import mesh_solid
+from stiffness.mesh.solid import Solid
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import Interface
 from stiffness.surface.patches import triangles_on
@@ -224,10 +226,14 @@ def _refined(
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
+        # a volume that is off by a share may be off in K by as much, in every motion
+        error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
+        if level.volume_error > max(accuracy, 0.7 * worst):
+            break  # the file's facets limit the accuracy, not the mesh
         growth = _wanted_growth(history, sizes, worst / accuracy)
         solid = _affordable_mesh(level, growth, budget, start)
         if solid is None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stiffness.fem.elements import Elements, integration, triangle_areas
 from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid, element_quality
 from stiffness.surface.surface import directed_edges
 
 
@@ -41,20 +41,21 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
     }
 
 
-def element_quality(solid: Solid) -> NDArray:
-    """How well shaped tetrahedra are.
+def volume_error(solid: Solid, mesh: Elements) -> float:
+    """How far the volume of a mesh may be from that of the part.
 
     Args:
-        solid: straight tetrahedra.
+        solid: the straight tetrahedra.
+        mesh: its elements.
 
     Returns:
-        (t,) [1] 1 for a regular one, 0 for a flat one: 6 sqrt(2) volume over the cube
-        of the root mean square edge.
+        [1] relative to the part's; zero where the surface is not known.
     """
-    corners = solid.points[solid.cells]
-    i, j = EDGES.T
-    mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
-    return 6 * np.sqrt(2) * solid.volumes() / mean_square**1.5
+    if solid.surface is None:
+        return 0.0
+    volume = sum(float(w.sum()) for *_, w in integration(mesh))
+    off = abs(volume - solid.surface.volume) + solid.surface.unsure_volume
+    return off / solid.surface.volume
 
 
 def dihedral_angles(solid: Solid) -> NDArray:

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.mesh import Solid, moved_onto_shapes
 from stiffness.mesh.refine import (
     chosen_by_all,
     edge_code,
@@ -26,6 +25,7 @@ from stiffness.mesh.refine import (
     length_ranks,
     split_edges,
 )
+from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
 LAYER_SHARE = 0.25  # thickness of the layer over the element's; 0.15 to 0.3 do as well

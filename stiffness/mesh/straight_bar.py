@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane, Shape
 
 _AROUND = 8  # elements around a full circle at least

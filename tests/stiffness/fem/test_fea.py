@@ -21,7 +21,7 @@ from stiffness.fem.fea import (
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.link import scaled
-from stiffness.mesh.mesh import MeshFailed
+from stiffness.mesh.fit_to_patches import MeshFailed
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import check_surface
