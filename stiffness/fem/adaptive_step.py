@@ -9,7 +9,7 @@ above it may be, so that K lies between K_h - E and K_h.  The middle of this int
 returned: its error is half as large at most, on the same mesh.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,7 +76,11 @@ class Level:
 
 
 def solve_level(
-    solid: Solid, materials: Sequence[Material], centers: NDArray, interface: str
+    solid: Solid,
+    materials: Sequence[Material],
+    centers: NDArray,
+    interface: str,
+    check: Callable[[int], None] | None = None,
 ) -> Level:
     """Stiffness, fields and local error indicators of one mesh.
 
@@ -86,6 +90,7 @@ def solve_level(
         materials: the first fills the link, later ones where they say.
         centers: (2, 3) [m] of base and tip.
         interface: one of ``KINDS``.
+        check: called with the number of unknowns before they are solved for.
 
     Returns:
         The solution on cubic elements with a layer along the singular edges.
@@ -96,6 +101,8 @@ def solve_level(
     solid = fitted(split_joining_edges(refine_inverted(solid, ORDER), ENDS))
     parts = layered(solid, ENDS)
     mesh = isoparametric(solid, ORDER, parts)
+    if check is not None:
+        check(3 * len(mesh.nodes))
     material = material_of_elements(mesh, materials)
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)

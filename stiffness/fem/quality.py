@@ -10,6 +10,8 @@ from stiffness.mesh.lagrange import EDGES
 from stiffness.mesh.solid import Solid, element_quality
 from stiffness.surface.surface import directed_edges
 
+_FLAT = 0.01  # quality of a tetrahedron that says little and conditions badly
+
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
     """Counts, size and shape of a mesh.
@@ -22,7 +24,9 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
         elements; ``closed``, whether every edge of the boundary has two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
-        ``largest_angle`` [rad] between two faces of a tetrahedron.  Quality and angles
+        ``largest_angle`` [rad] between two faces of a tetrahedron; ``flat_elements``,
+        how many have a quality below 0.01; ``drawn_out``, whether a bar's section was
+        drawn out in long elements, of which none counts as flat.  Quality and angles
         are those of the tetrahedra before graded layers are cut off, thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
@@ -36,6 +40,8 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         "closed": bool((count % 2 == 0).all()),
         "worst_quality": float(quality.min()),
         "mean_quality": float(quality.mean()),
+        "flat_elements": int((quality < _FLAT).sum()) if solid.surface else 0,
+        "drawn_out": solid.surface is None,
         "smallest_angle": float(angles.min()),
         "largest_angle": float(angles.max()),
     }

@@ -35,7 +35,7 @@ __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
 _SAME_NUMBERS = "stiffness/mesh/same_random_numbers.cpp"  # makes meshes reproducible
-_FORMAT = 3  # of the cached meshes; raised when what they hold changes
+_FORMAT = 4  # of the cached meshes; raised when what they hold changes
 
 
 def mesh_solid(

@@ -10,7 +10,7 @@ from stiffness.surface.interface import Interface
 from stiffness.surface.primitives import Cone, Plane, Shape
 from stiffness.surface.recognition import recognise
 from stiffness.surface.smooth_outline import SmoothOutline, smooth_outline
-from stiffness.surface.surface import Surface
+from stiffness.surface.surface import Surface, directed_edges
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 
@@ -91,6 +91,33 @@ def interface_shape(interface: Interface) -> Shape:
     if interface.kind == "bore":
         return Cone(interface.point, interface.direction, interface.radius)
     return Plane(interface.point, interface.direction)
+
+
+def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
+    """Refuse rigid interfaces that share an edge: their stiffness has no finite value.
+
+    Args:
+        surface: the link's.
+        base: the held interface.
+        tip: the loaded interface.
+
+    Raises:
+        BadInput: they share an edge, or an interface has no part of the surface.
+    """
+    codes: list[NDArray] = []
+    for name, interface in (("base", base), ("tip", tip)):
+        members = surface.triangles[triangles_on(surface, interface, name)]
+        ends = np.sort(directed_edges(members), axis=1)
+        codes.append(np.unique(ends[:, 0] * len(surface.points) + ends[:, 1]))
+    common = np.intersect1d(codes[0], codes[1])
+    if len(common):
+        ends = np.array(divmod(int(common[0]), len(surface.points)))
+        where = ", ".join(f"{v:.4g}" for v in surface.points[ends].mean(axis=0))
+        raise BadInput(
+            f"{surface.name}: base {base} and tip {tip} share an edge near ({where}) "
+            "m; between rigid faces that touch the stiffness has no finite value: "
+            "leave a gap, or choose --interface distributing"
+        )
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:

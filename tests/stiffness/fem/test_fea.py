@@ -218,6 +218,29 @@ def test_expected_costs_are_those_measured_and_grow_faster_than_the_mesh(monkeyp
     assert sparse_solver.expected_cost(400_000) == (3 * memory, 10 * seconds)
 
 
+def test_the_mesher_leaves_time_for_the_solver(monkeypatch):
+    """Of 100 s it gets 60; of what is left after a failure 60 % again."""
+    limits, now = [], itertools.count(0.0, 10.0)
+    monkeypatch.setattr(fea.time, "monotonic", lambda: next(now))
+
+    def fail(*_, time_limit, **__):
+        limits.append(time_limit)
+        raise MeshFailed("no mesh")
+
+    monkeypatch.setattr(fea, "mesh_solid", fail)
+    with pytest.raises(MeshFailed):
+        fea.first_mesh(bar_surface(), *PLANES, Budget(seconds=100.0))
+    np.testing.assert_allclose(limits, 0.6 * (100 - 10 * np.array([1, 3, 5])))
+
+
+def test_a_first_mesh_that_costs_more_than_the_budget_is_refused():
+    """400 000 unknowns take 20 s: after 290 of 300 s, or beyond a million unknowns."""
+    fea._refuse_cost(400_000, Budget(seconds=300.0), 270.0)
+    for unknowns, spent in ((400_000, 290.0), (1_200_000, 0.0)):
+        with pytest.raises(MeshFailed, match=f"{unknowns} unknowns, about .* s and"):
+            fea._refuse_cost(unknowns, Budget(seconds=300.0), spent)
+
+
 def test_a_mesher_that_fails_is_asked_for_finer_meshes_while_there_is_time(monkeypatch):
     """Twice finer, then five times, then its failure; at once where time is up."""
     surface, tried = bar_surface(), []
