@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-_CALLS = (40, 160)  # of the residual in a fit, and in one that may still succeed
+_CALLS = (25, 100)  # of the residual in a fit, and in one that may still succeed
 _MAY_FIT = 0.02  # of the points' size: the largest residual then
 _FITS = 1e-9  # of it: a shape that has been found
 _TINY = 1e-300  # keeps a division at a shape's own axis finite

@@ -23,6 +23,8 @@ from stiffness.surface.primitives import (
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 _MISSES = (60, 20)  # seeds of a part without a shape of strips, of any
+_CONE = 10  # points that tell a cone; fewer lie on one that is not there
+_CYLINDER = 1e-4  # slope below which a cone is a cylinder, which seven points tell
 _FEW = 12  # flat faces; a part of fewer is no faceted curve
 _STEP = 2e-3  # [rad] between two angles that count as different
 _MANY = 5  # steps between angles; more are on one circle by no coincidence
@@ -105,6 +107,9 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
             continue
         shape = fit(points, normals)
         if _lies_on(shape, points, graph):
+            few_for_cone = len(points) < _CONE and isinstance(shape, Cone)
+            if few_for_cone and abs(shape.slope) > _CYLINDER:
+                return None
             return shape if _is_faceted(shape, points) else None
     return None
 
