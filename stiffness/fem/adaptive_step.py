@@ -21,16 +21,22 @@ from stiffness.fem.elements import ORDER, Elements, isoparametric
 from stiffness.fem.error_indicator import (
     error_matrices,
     geometry_errors,
+    material_errors,
     traction_errors,
 )
-from stiffness.fem.material import Material, material_of_elements
+from stiffness.fem.material import (
+    Material,
+    material_at,
+    material_of_elements,
+    regions_of,
+)
 from stiffness.fem.quality import volume_error
 from stiffness.link import scaled
 from stiffness.mesh.curved_elements import refine_inverted
 from stiffness.mesh.edge_grading import (
     ENDS,
+    graded_edges,
     layered,
-    singular_edges,
     split_joining_edges,
 )
 from stiffness.mesh.improve import fitted
@@ -98,8 +104,10 @@ def solve_level(
     Raises:
         BadInput: no material fills the link.
     """
-    solid = fitted(split_joining_edges(refine_inverted(solid, ORDER), ENDS))
-    parts = layered(solid, ENDS)
+    regions = regions_of(materials)
+    finer = split_joining_edges(refine_inverted(solid, ORDER), ENDS, regions)
+    solid = fitted(finer)
+    parts = layered(solid, ENDS, regions=regions)
     mesh = isoparametric(solid, ORDER, parts)
     if check is not None:
         check(3 * len(mesh.nodes))
@@ -107,7 +115,7 @@ def solve_level(
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
-    on_edge[singular_edges(solid, ENDS)] = True
+    on_edge[graded_edges(solid, ENDS, regions)] = True
     singular = on_edge[mesh.cells[:, :4]].any(axis=1)
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
@@ -127,6 +135,11 @@ def solve_level(
         mesh, solid.shapes, solution.fields, lam, mu, solid.surface
     )
     np.add.at(geometry, parts.parent[mesh.owner], by_face)
+    if not all(region.planes for region in regions):
+        jagged = material_errors(
+            mesh, solution.fields, lam, mu, lambda p: material_at(p, materials)[:, 1]
+        )
+        np.add.at(geometry, parts.parent, jagged)
     off = volume_error(solid, mesh)
     return Level(solid, mesh, material, solution, errors, geometry, off)
 

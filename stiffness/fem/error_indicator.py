@@ -25,7 +25,7 @@ Sources:
     Friedrichs & Dressler (1961) for the layer at a plate's free edge.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from stiffness.surface.primitives import Plane, Shape
 from stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
+_SAME_MODULUS = 1e-6  # relative difference
 _CHUNK = 1024  # faces at a time
 _SINGULAR_SHARE = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
 # remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
@@ -180,6 +181,45 @@ def geometry_errors(
             errors[some] = weighted.reshape(rows) @ roots.swapaxes(1, 2).reshape(
                 rows
             ).swapaxes(1, 2)
+    return errors
+
+
+def material_errors(
+    mesh: Elements,
+    fields: NDArray,
+    lam: NDArray,
+    mu: NDArray,
+    shear_at: Callable[[NDArray], NDArray],
+) -> NDArray:
+    """Error of the stiffness because elements lie across a face between materials.
+
+    Args:
+        mesh: the tetrahedra.
+        fields: (n, 3, k) [m] displacements of the unit cases.
+        lam: (t,) [Pa] Lame's first constant.
+        mu: (t,) [Pa] shear modulus.
+        shear_at: shear modulus (n,) [Pa] of the link at points (n, 3) [m].
+
+    Returns:
+        (t, k, k) [unit of the stiffness] positive where an element is too stiff: the
+        energy of what is of another material, times the ratio of the moduli.
+    """
+    cases = fields.shape[2]
+    errors = np.zeros((len(mesh.cells), cases, cases))
+    for part, _, _, N, G, w in integration(mesh):
+        places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
+        own = mu[part][:, None]
+        true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
+        # tractions go on across the face: what is softer has the more energy there
+        ratio = np.maximum(own / true, true / own)
+        sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
+        some = np.flatnonzero(sign.any(axis=1))
+        roots = _energy_roots(
+            G[some], fields[mesh.cells[part[some]]], lam[part[some]], mu[part[some]]
+        )
+        weight = (sign * ratio * w)[some]
+        weighted = roots * weight[:, :, None, None]
+        errors[part[some]] = np.einsum("cqkx,cqlx->ckl", weighted, roots, optimize=True)
     return errors
 
 

@@ -27,12 +27,14 @@ from stiffness.fem.adaptive_step import (
 )
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.mass_properties import PointMass, mass_properties
-from stiffness.fem.material import Material, check_materials
+from stiffness.fem.material import Material, check_materials, regions_of
 from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
 from stiffness.mesh.fit_to_patches import MeshFailed
+from stiffness.mesh.improve import fitted
 from stiffness.mesh.mesh import mesh_solid
+from stiffness.mesh.regions import cut_by_regions
 from stiffness.mesh.slender_bar import slender_bar
 from stiffness.mesh.solid import Solid
 from stiffness.mesh.straight_bar import straight_bar
@@ -177,6 +179,7 @@ def solve_link(
         for side, name in ((base, "base"), (tip, "tip"))
     ])
     first = first_mesh(surface, base, tip, options.budget, options.cache)
+    first = fitted(cut_by_regions(first, regions_of(materials)))
     level, K, error, report = _refined(first, materials, centers, options, start)
     report |= {
         "surface_volume": surface.volume,

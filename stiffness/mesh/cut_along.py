@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.refine import chosen_by_all, edge_code, edges_of, split_edges
+from stiffness.mesh.refine import edge_code
 from stiffness.mesh.solid import Solid
+from stiffness.mesh.split_crossing import split_crossing
 from stiffness.surface.smooth_outline import SmoothOutline
 
 _NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the outline
 _REACH = 0.005  # of the part's size: a corner is moved by no more
-_PASSES = 100
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
@@ -30,22 +30,11 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
     Returns:
         The solid; its triangles at the outline belong to the side on which they lie.
     """
-    on = _corners_on(solid, outline)
-    for _ in range(_PASSES):
-        ends, of_cell = edges_of(solid.cells, len(solid.points))
-        crossing, share = _crossing_edges(solid, outline, on, ends)
-        if not crossing.any():
-            break
-        # one edge of each tetrahedron at a time: the first that all around it chose
-        order = np.where(crossing, np.arange(len(ends), 0, -1), 0)
-        first = order[of_cell].argmax(axis=1)
-        chosen = of_cell[np.arange(len(of_cell)), first]
-        touched = crossing[of_cell].any(axis=1)
-        split = crossing & chosen_by_all(of_cell, chosen[touched], len(ends))
-        start, end = solid.points[ends[split]].swapaxes(0, 1)
-        places = start + share[split, None] * (end - start)
-        solid, _ = split_edges(solid, ends, of_cell, split, places)
-        on = np.r_[on, np.ones(len(places), dtype=bool)]
+
+    def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
+        return _crossing_edges(finer, outline, on, ends)
+
+    solid, on = split_crossing(solid, _corners_on(solid, outline), crossing)
     return replace(solid, patch=_sides(solid, outline, on))
 
 

@@ -15,16 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.refine import chosen_by_all, edge_code, edges_of, split_edges
+from stiffness.mesh.refine import edge_code, edges_of, split_edges
 from stiffness.mesh.solid import (
     Solid,
     corners_on_shapes,
     element_quality,
+    meeting_shapes,
     moved_onto_shapes,
     node_patches,
-    on_shapes,
     tetrahedra_quality,
 )
+from stiffness.mesh.split_crossing import one_of_each
+from stiffness.surface.primitives import project
 
 POOR = 0.08  # quality below which a tetrahedron is to be mended; pytetwild's are better
 _ROUNDS = 4
@@ -76,11 +78,7 @@ def _split_inside(solid: Solid, limit: float) -> Solid:
     wanted = np.zeros(len(ends), dtype=bool)
     wanted[of_cell[poor, longest[poor]]] = True
     wanted &= inner
-    # one edge of each tetrahedron at a time
-    order = np.where(wanted, np.arange(1, len(ends) + 1), 0)
-    first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]
-    touched = wanted[of_cell].any(axis=1)
-    split = wanted & chosen_by_all(of_cell, first[touched], len(ends))
+    split = one_of_each(wanted, of_cell)
     return split_edges(solid, ends, of_cell, split)[0]
 
 
@@ -108,13 +106,13 @@ def _best_place(
     best = float(tetrahedra_quality(around).min())
     i, j = EDGES.T
     step = 0.3 * float(np.linalg.norm(around[:, i] - around[:, j], axis=2).mean())
-    fixed = any(solid.shapes[p] is None for p in key) or len(key) > 2
+    known = meeting_shapes(solid, key, place[None])
+    fixed = any(solid.shapes[p] is None for p in key) or len(known) > 2
     for _ in range(0 if fixed else _STEPS):
         tries = place + step * _DIRECTIONS
-        if key:
-            group = [(key, np.arange(len(tries)))]
-            near = on_shapes(tries, group, solid.shapes, step, solid.walls)
-            tries = near[(near != tries).any(axis=1)]  # not those too far from them
+        if known:
+            near = project(tries, known)
+            tries = near[np.linalg.norm(near - tries, axis=1) <= step]
         if len(tries) == 0:
             step /= 2
             continue

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.mesh.lagrange import EDGES
-from stiffness.surface.primitives import Shape, project
+from stiffness.surface.primitives import Plane, Shape, project
 from stiffness.surface.true_surface import TrueSurface
 
+_ON_KEPT = 1e-9  # of the part's size: a corner on a kept plane
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
 
 
@@ -27,6 +28,7 @@ class Solid:
         walls: of pairs of an interface and a patch that it goes over into smoothly,
             the wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
         surface: that the boundary is to have; None if its patches' shapes are all.
+        kept: planes inside the link; corners on them stay there.
     """
 
     points: NDArray
@@ -36,6 +38,7 @@ class Solid:
     shapes: tuple[Shape | None, ...]
     walls: Mapping[tuple[int, int], Shape] = field(default_factory=dict)
     surface: TrueSurface | None = None
+    kept: tuple[Plane, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -43,6 +46,26 @@ class Solid:
         """(t,) [m^3] of the straight tetrahedra."""
         a, b, c, d = np.moveaxis(self.points[self.cells], 1, 0)
         return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
+
+
+def meeting_shapes(
+    solid: Solid, key: tuple[int, ...], points: NDArray
+) -> tuple[Shape, ...]:
+    """Shapes that corners are to lie on.
+
+    Args:
+        solid: any.
+        key: the patches they lie on; none for corners inside.
+        points: (n, 3) [m] the corners' places, all on the same kept planes.
+
+    Returns:
+        The patches' shapes, or what takes their place where two meet smoothly, and the
+        kept planes.
+    """
+    known = _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
+    near = _ON_KEPT * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    kept = [p for p in solid.kept if (np.abs(p.signed(points)[0]) < near).all()]
+    return (*known, *kept)
 
 
 def _meeting_shapes(
@@ -180,7 +203,15 @@ def corners_on_shapes(solid: Solid) -> NDArray:
     """
     groups = node_patches(len(solid.points), solid.faces, solid.patch)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    return on_shapes(solid.points, groups, solid.shapes, 0.01 * size, solid.walls)
+    target = on_shapes(solid.points, groups, solid.shapes, 0.01 * size, solid.walls)
+    for plane in solid.kept:
+        on = np.abs(plane.signed(solid.points)[0]) < _ON_KEPT * size
+        for key, group in groups:
+            some = group[on[group]]
+            if len(some):
+                known = meeting_shapes(solid, key, solid.points[some])
+                target[some] = project(solid.points[some], known)
+    return target
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:

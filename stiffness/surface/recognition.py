@@ -107,9 +107,8 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
             continue
         shape = fit(points, normals)
         if _lies_on(shape, points, graph):
-            few_for_cone = len(points) < _CONE and isinstance(shape, Cone)
-            if few_for_cone and abs(shape.slope) > _CYLINDER:
-                return None
+            if len(points) < _CONE and isinstance(shape, Cone):
+                return shape if abs(shape.slope) < _CYLINDER else None
             return shape if _is_faceted(shape, points) else None
     return None
 

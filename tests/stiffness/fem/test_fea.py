@@ -24,6 +24,7 @@ from stiffness.link import scaled
 from stiffness.mesh.fit_to_patches import MeshFailed
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
+from stiffness.surface.primitives import Plane
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
 
@@ -80,7 +81,8 @@ def test_the_papers_bar_from_its_surface(cache):
 @pytest.mark.slow
 def test_a_bar_of_two_materials_end_to_end(cache):
     """Stretched: two springs in series, but for the end effect both have."""
-    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226)
+    middle = Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0]))
+    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, planes=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
     one, two = (
         solve_link(bar_surface(), *PLANES, m, options=options).link
