@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from stiffness.fem.elements import lame
-from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import check_surface
 
@@ -131,3 +131,43 @@ CUBE_TRIANGLES = np.array(
 
 def bar(facets=32, **kwargs):
     return check_surface(*cylinder(facets=facets, **kwargs), "bar")
+
+
+def rounded_outline(half_sizes, corner, inset, steps):
+    """Corners (4 (steps + 1), 2) of a rectangle with round corners, from the right."""
+    centers = np.array(half_sizes) - corner
+    angle = np.pi / 2 * np.arange(steps + 1) / steps
+    points = []
+    for k, signs in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        turn = angle + k * np.pi / 2
+        arc = (corner - inset) * np.column_stack([np.cos(turn), np.sin(turn)])
+        points.append(arc + centers * signs)
+    return np.concatenate(points)
+
+
+def rounded_block(half_sizes, corner, profile, steps):
+    """Rounded outlines, inset as (inset, z) of a profile says, one above the other."""
+    rings = [
+        np.insert(rounded_outline(half_sizes, corner, inset, steps), 2, z, axis=1)
+        for inset, z in profile
+    ]
+    count = len(rings[0])
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    triangles = []
+    for k in range(len(rings) - 1):
+        a, b = k * count, (k + 1) * count
+        triangles += [np.column_stack([i + a, j + a, j + b])]
+        triangles += [np.column_stack([i + a, j + b, i + b])]
+    top, total = (len(rings) - 1) * count, len(rings) * count
+    triangles += [np.column_stack([0 * i + total, j, i])]
+    triangles += [np.column_stack([0 * i + total + 1, i + top, j + top])]
+    ends = [[0, 0, profile[0][1]], [0, 0, profile[-1][1]]]
+    points = np.concatenate([*rings, ends])
+    return check_surface(points, np.concatenate(triangles), "rounded block")
+
+
+def fillet_profile(radius, height, steps):
+    """(inset, z) of a fillet at the foot of a wall."""
+    angle = np.pi / 2 * np.arange(steps + 1) / steps
+    foot = [(radius * (1 - np.sin(a)), radius * (1 - np.cos(a))) for a in angle]
+    return [*foot, (0.0, height)]

@@ -33,7 +33,7 @@ from stiffness.mesh.lagrange import (
     quadrature,
     shape_functions,
 )
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid
 
 ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
 # derivatives of the barycentric coordinates by the reference element's

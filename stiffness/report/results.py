@@ -145,6 +145,16 @@ def link_text(link: LinkStiffness) -> str:
         f"{math.degrees(mesh['largest_angle']):.0f} degrees; boundary "
         f"{mesh['area']:.6g} m^2 (surface {mesh['surface_area']:.6g})",
     ]
+    if mesh.get("flat_elements"):
+        lines.append(
+            f"WARNING: {mesh['flat_elements']} elements are nearly flat, quality below "
+            "0.01: the surface has details much smaller than its walls, or facets that "
+            "are not smooth"
+        )
+    if mesh.get("drawn_out"):
+        lines.append(
+            "the bar's section was drawn out: its elements are long on purpose"
+        )
     lines += [f"repaired: {repair}" for repair in mesh["repairs"]]
     if link.mass > 0:
         center = ", ".join(f"{v:.5g}" for v in link.center_of_mass)

@@ -9,14 +9,10 @@ import pytest
 from forcefit.native.libraries import load_library
 from stiffness.fem.quality import element_quality
 from stiffness.mesh import mesh as mesh_module
-from stiffness.mesh.mesh import (
-    MeshFailed,
-    boundary_faces,
-    cache_folder,
-    fit_to_patches,
-    mesh_solid,
-)
+from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
+from stiffness.mesh.mesh import cache_folder, mesh_solid
 from stiffness.mesh.refine import refine
+from stiffness.mesh.solid import boundary_faces
 from stiffness.surface.decimate import coarser_surface, euler_characteristic
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
