@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import contact_length_of, play_means
 from assembly.statistics.requirement import Plan
 from assembly.sweeps.identity import robot_hash
 from forcefit.inputs.display import html_table, short_repr
@@ -85,7 +85,15 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
         "proven_scale": allocation.proven_scale,
         "verification": allocation.verification,
         "play": plan.clearance_model if plan.limits_pose else None,
+        "contact_length": _contact_length(plan),
     }
+
+
+def _contact_length(plan: Plan) -> float | None:
+    """[m] contact length of the contact model, None for the others."""
+    if not plan.limits_pose or plan.clearance_model != "contact":
+        return None
+    return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
@@ -103,9 +111,8 @@ def allocation_text(results: dict[str, Any]) -> str:
         line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
         lines.append(line + (" (the loosest allowed)" if one["at_loosest"] else ""))
     if results["play"]:
-        lines.append(
-            f"pose errors: play {results['play']}: {CLEARANCE_MODELS[results['play']]}"
-        )
+        means = play_means(results["play"], results["contact_length"])
+        lines.append(f"pose errors: play {results['play']}: {means}")
     lines.append(_price_text(results))
     for key, worst in results["worst"].items():
         proven = (

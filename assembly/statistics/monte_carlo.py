@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from assembly.kinematics.posture import POSE
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
     ImportanceOptions,
@@ -157,9 +157,10 @@ def _solved(
                 future.cancel()
 
 
-def provenance(experiment: Experiment) -> dict[str, str | int]:
+def provenance(experiment: Experiment) -> dict[str, str | int | float]:
     """Values that must be equal for two runs to give the same draws."""
     posture, sources = experiment.posture, experiment.sources
+    contact = experiment.used_contact_length
     numbers = [
         sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
         sources.least, sources.limit, sources.signed, posture.transforms,
@@ -171,6 +172,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
         "play": experiment.clearance_model,
+        **({} if contact is None else {"contact_length": contact}),
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
         "stress": int(experiment.stress),
@@ -198,12 +200,13 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
             "stiffness": ("draw", "wrench_component"),
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
     meanings = MEANINGS | {
-        k: f"{MEANINGS[k]}; {CLEARANCE_MODELS[experiment.clearance_model]}"
+        k: f"{MEANINGS[k]}; "
+        f"{play_means(experiment.clearance_model, experiment.used_contact_length)}"
         for k in POSE_ERRORS
     }
     if experiment.clearance_model == "worst":
         meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
-        meanings["platform_screw"] += f"; {CLEARANCE_MODELS['least']}"
+        meanings["platform_screw"] += f"; {play_means('least')}"
     variables = {
         name: (
             dims.get(name, ("draw",)), rows[name],

@@ -46,6 +46,8 @@ class Plan:
         seed: of all draws.
         clearance_model: for limits of pose errors, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+        contact_length: [m] of the contact model, see
+            :class:`assembly.statistics.experiment.Experiment`.
     """
 
     sources: ErrorSources
@@ -60,6 +62,7 @@ class Plan:
     draws: int = 1000
     seed: int = 1
     clearance_model: str = "worst"
+    contact_length: float | None = None
 
     @property
     def limits_pose(self) -> bool:
@@ -114,7 +117,7 @@ class Requirement:
             Experiment(
                 p, plan.sources, margins=False, stress="stress" in plan.limits,
                 clearance_model=plan.clearance_model if plan.limits_pose else "least",
-                precision=(rotation, translation),
+                contact_length=plan.contact_length, precision=(rotation, translation),
             )
             for p in self.postures
         ]  # fmt: skip
@@ -224,6 +227,7 @@ class Requirement:
                 values,
                 key,
                 self.plan.clearance_model,
+                self.plan.contact_length,
             ),
             values,
             key,
@@ -238,7 +242,7 @@ class Requirement:
         def search() -> tuple:
             corner = worst_corner(
                 self.prepared[key][i], self.plan.sources, spread, corners, key,
-                self.plan.clearance_model,
+                self.plan.clearance_model, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
 

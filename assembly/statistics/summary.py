@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.estimates import (
     bracketed,
     mean,
@@ -56,7 +56,8 @@ def summarise(
         level: of confidence of all intervals.
 
     Returns:
-        ``draws`` and how many of them are ``assembled``; ``play`` and what it means;
+        ``draws`` and how many of them are ``assembled``; ``play``, what it means and
+        its ``contact_length`` [m];
         ``assembles`` (with any energy, rigidly in both readings), ``exceeds`` and
         ``within_limits`` with the probabilities among all draws; mean, quantiles and
         most probable value of every quantity among those that assemble, of margins
@@ -69,10 +70,11 @@ def summarise(
     if strength is not None:
         limits.setdefault("stress", strength)
     count, play = data.sizes["draw"], str(data.attrs["play"])
+    length = data.attrs.get("contact_length")
     solved = data["status"].values == 0
     report: dict[str, Any] = {
         "draws": count, "assembled": int(solved.sum()), "confidence": level,
-        "play": play, "play_means": CLEARANCE_MODELS[play],
+        "play": play, "play_means": play_means(play, length), "contact_length": length,
         "assembles": {"forced": proportion(int(solved.sum()), count, level)},
         "duality_gap": float(np.nanmax(data["duality_gap"].values, initial=0.0)),
     }  # fmt: skip
@@ -192,6 +194,11 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
         f"pose errors: play {summary['play']}: {summary['play_means']}",
     ]
+    if summary["play"] == "contact" and not summary.get("load"):
+        lines.append(
+            "the contact length decides which clearances close; with the load of "
+            "service (--load) they close as it presses them"
+        )
     if summary.get("play_not_mixed"):
         lines.append(
             f"warning: in {summary['play_not_mixed']} draws uniform clearances are not "
