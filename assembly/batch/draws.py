@@ -1,6 +1,6 @@
 """Least energies of many draws of the errors at one posture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from numpy.typing import NDArray
 
@@ -29,3 +29,14 @@ class Draws:
     multipliers: NDArray
     platform_screw: NDArray
     fallback: NDArray
+
+    def taken(self, rows: NDArray) -> "Draws":
+        """Some of the draws.
+
+        Args:
+            rows: indices of them, or which they are.
+
+        Returns:
+            These, in that order.
+        """
+        return Draws(*(getattr(self, one.name)[rows] for one in fields(self)))

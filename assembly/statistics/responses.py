@@ -58,7 +58,7 @@ def respond(
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
-        some = _selected(draws, solved)
+        some = draws.taken(solved)
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
                 prepared, some, key, (clearance_model, contact_length), solved
@@ -94,11 +94,6 @@ def _pose_error(
     slopes = np.zeros_like(screws)
     size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])
     return size, slopes, None
-
-
-def _selected(draws: Draws, rows: NDArray) -> Draws:
-    """Some of the draws."""
-    return Draws(*(getattr(draws, name)[rows] for name in Draws.__dataclass_fields__))
 
 
 def _wrench_quantity(
