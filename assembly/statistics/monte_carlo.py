@@ -27,6 +27,7 @@ from assembly.statistics.importance_table import (
     importance_design,
     importance_rows,
 )
+from assembly.statistics.perfect_parts import stored_perfect_parts
 from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
@@ -222,4 +223,5 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         labels |= {"wrench_component": list(WRENCH), "motion": np.arange(6)}
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
-    return xarray.Dataset(variables, labels, provenance(experiment) | at)
+    alone = {"perfect_parts": stored_perfect_parts(experiment)}
+    return xarray.Dataset(variables, labels, provenance(experiment) | at | alone)

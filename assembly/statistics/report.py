@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from assembly.statistics.plot import NAMES
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
 from assembly.statistics.summary import WORDS
+from assembly.statistics.tightening import ranked, tightening_tiles
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -60,6 +62,7 @@ def draws_page(
             f"play {summary['play']}: {summary['play_means']}.",
             body=[
                 section("How often", _yields(summary)),
+                _perfect_parts(summary),
                 section("One of the worst", robot) if robot else "",
                 section("How large", _quantities(summary), _histograms(summary, data)),
                 _importance(summary),
@@ -100,24 +103,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
         answer = [part for one in high95 for part in (" and ", one)][1:]
         note = f"of the platform's error; play {summary['play']}."
         tiles.append(Tile("95 % stay below", answer, [note]))
-    ranked = _ranked(summary, "translation") or _ranked(summary, "energy")
-    if ranked:
-        name, (value, *_) = ranked[0]
-        note = "share of the variance it has a part in."
-        tiles.append(Tile("What governs it", [f"{name}: {100 * value:.0f} %"], [note]))
-        more = ", ".join(name for name, _ in ranked[1:3])
-        tiles.append(Tile("What to tighten", [name], [f"then {more}." if more else ""]))
-    return tiles
-
-
-def _ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Total shares of the variance by error, the largest first."""
-    one = summary.get("importance", {}).get("quantities", {}).get(key, {})
-    if "reason" in one or "total_index" not in one:
-        return []
-    shares = [(name, list(map(float, v))) for name, v in one["total_index"].items()]
-    known = [(name, v) for name, v in shares if np.isfinite(v[0]) and v[0] > 1e-6]
-    return sorted(known, key=lambda item: -item[1][0])
+    return tiles + tightening_tiles(summary)
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
@@ -137,6 +123,29 @@ def _yields(summary: Mapping[str, Any]) -> str:
     words = ("probability", f"at least ({level})", "at most", "draws undecided")
     head: list[str | Column] = ["", *(Column(one, digits=5) for one in words)]
     return table(head, rows, "yields")
+
+
+def _perfect_parts(summary: Mapping[str, Any]) -> str:
+    """What perfect parts reach, and the part of each kind of clearance in it."""
+    parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
+    if not parts:
+        return ""
+    limits = {k: one["limit"] for k, one in summary["exceeds"].items()}
+    reached: list[list[Cell]] = [
+        [NAMES[key], Value(one["reached"], one["unit"]),
+         Value(limits[key], one["unit"]) if key in limits else ""]
+        for key, one in parts.items()
+    ]  # fmt: skip
+    of_joints: list[list[Cell]] = [
+        [f"{NAMES[key]}: {name}", Value(size, one["unit"]), size / one["reached"]]
+        for key, one in parts.items()
+        for name, size in one.get("clearances", {}).items()
+    ]
+    pieces = [table(["all errors zero", "reached", "limit"], reached, "perfect parts")]
+    if of_joints:
+        head: list[str | Column] = ["clearance", "its part", Column("share")]
+        pieces.append(table(head, of_joints, "clearances"))
+    return section("What perfect parts reach", *pieces)
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
@@ -191,22 +200,27 @@ def _importance(summary: Mapping[str, Any]) -> str:
     """Which errors the variance is owed to."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
-        ranked = _ranked(summary, key)[:_LISTED]
-        if not ranked:
+        shares = ranked(summary, key)[:_LISTED]
+        if not shares:
             pieces.append(paragraph(f"{NAMES[key]}: {one.get('reason', 'no shares')}."))
             continue
         rows: list[list[Cell]] = [
-            [name, *values, float(one["first_index"][name][0])]
-            for name, values in ranked
-        ]
+            [name, *values, float(one["first_index"][name][0]),
+             rank_text(one["rank"].get(name))]
+            for name, values in shares
+        ]  # fmt: skip
         play = f" (play {summary['importance']['play']})" if key in POSE_ERRORS else ""
         axis = Axis(f"share of the variance: {NAMES[key]}")
         words = ("share, with others", "at least", "at most", "share alone")
-        head: list[str | Column] = ["error", *map(Column, words)]
+        head: list[str | Column] = ["error", *map(Column, words), "rank"]
         pieces += [
-            bars({name: v[0] for name, v in ranked}, axis, NAMES[key] + play, np.nan),
+            bars({name: v[0] for name, v in shares}, axis, NAMES[key] + play, np.nan),
             table(head, rows, "shares"),
         ]
+    if pieces:
+        pieces.append(
+            paragraph(f"{NOT_DISTINGUISHED[0].upper()}{NOT_DISTINGUISHED[1:]}.")
+        )
     return section("What governs it", *pieces) if pieces else ""
 
 
