@@ -1,6 +1,6 @@
-"""Pages of draws and of tolerances: yields, what governs them, what to tighten."""
+"""Page of draws: yields, what perfect parts reach, what governs the results."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,11 +25,6 @@ _ASSUMED = (
     "Small screws: the closures are linear in the errors of each draw.",
     "Yields count all draws; energies, forces, pose errors only those that assemble.",
     "Intervals are of the sampling alone: they do not cover a wrong distribution.",
-)
-_TOLERANCES_ASSUMED = (
-    "Limits hold at the postures of the grid; between them nothing is said.",
-    "Errors are independent and keep within their tolerances.",
-    "Small screws: the closures are linear in the errors.",
 )
 
 
@@ -222,151 +217,3 @@ def _importance(summary: Mapping[str, Any]) -> str:
             paragraph(f"{NOT_DISTINGUISHED[0].upper()}{NOT_DISTINGUISHED[1:]}.")
         )
     return section("What governs it", *pieces) if pieces else ""
-
-
-def tolerances_page(
-    results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
-) -> str:
-    """The page of ``assembly tolerances``.
-
-    Args:
-        results: with ``present``, ``allocation`` or both.
-        provenance: command and files.
-        pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
-
-    Returns:
-        HTML, which needs no other file.
-    """
-    present, allocation = (results.get(key) for key in ("present", "allocation"))
-    tiles, body, sentences = [], [], []
-    good = True
-    if present is not None:
-        share = 100 * present["assemblable_share"]
-        sentences.append(
-            f"{share:.1f} % of {present['postures']} postures go together by "
-            "clearances alone; all of them with the errors times "
-            f"{present['factor_on_errors']:.4g}."
-        )
-        tiles += _present_tiles(present)
-        body.append(_present_section(present))
-        body += [section("Where it is tight", *pictures)] if any(pictures) else []
-    if allocation is not None:
-        check = allocation["verification"]
-        good = (check or {}).get("verdict") != "contradicted"
-        sentences.append(_allocation_sentence(allocation))
-        tiles += _allocation_tiles(allocation)
-        body.append(_allocation_section(allocation))
-    return page(
-        Page(
-            title=f"{results['robot']}: tolerances",
-            verdict=" ".join(sentences),
-            good=good and (present is None or present["assemblable_share"] == 1.0),
-            tiles=tiles,
-            about=f"{results['postures']} postures.",
-            body=body,
-            assumed=_TOLERANCES_ASSUMED,
-            provenance=provenance,
-            results=results,
-        )
-    )
-
-
-def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """The largest margin, and the error it is owed to."""
-    at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
-    note = f"at {at or 'the origin'} [m, rad]; 1 and less goes together."
-    tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
-    if present["slopes"]:
-        first = present["slopes"][0]
-        share = f"{100 * first['share_of_margin']:.0f} %"
-        tiles.append(Tile("What governs it", [first["error"]], [f"{share} of it."]))
-    factor = present["factor_on_errors"]
-    if factor < 1.0:
-        answer = f"all errors times {factor:.3g}"
-        tiles.append(Tile("What to tighten", [answer], ["then all postures fit."]))
-    return tiles
-
-
-def _present_section(present: Mapping[str, Any]) -> str:
-    """Shares of the errors there are in the largest margin."""
-    rows: list[list[Cell]] = [
-        [one["error"], Value(one["value"], _error_unit(one["error"])),
-         one["share_of_margin"]]
-        for one in present["slopes"][:_LISTED]
-    ]  # fmt: skip
-    shares = {one["error"]: one["share_of_margin"] for one in present["slopes"]}
-    most = dict(list(shares.items())[:_LISTED])
-    return section(
-        "The errors there are",
-        bars(most, Axis("share of the largest margin"), "The steepest first.", np.nan),
-        table(["error", "size", Column("share of the margin")], rows, "errors"),
-    )
-
-
-def _error_unit(name: str) -> str:
-    """SI unit of an error such as ``leg1.link_a.TX``."""
-    return "rad" if name.rpartition(".")[2].startswith("R") else "m"
-
-
-def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Whether the tolerances hold, by proof and by fresh draws."""
-    text = f"Tolerances for a yield of {allocation['yield']:g}"
-    proven = allocation["proven_scale"]
-    if np.isfinite(proven):
-        text += f", proven when scaled by {proven:.4f}"
-    check = allocation["verification"]
-    if check:
-        text += f"; {check['draws']} fresh draws at all postures: {check['verdict']}"
-    return text + "."
-
-
-def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Yield, the tolerance that costs most, and those that could be loosest."""
-    tiles = []
-    check = allocation["verification"]
-    if check:
-        one = check["yield"]
-        low, high = (100 * one[end] for end in ("lower", "upper"))
-        tiles.append(Tile("Yield", [f"{100 * one['probability']:.4g} %"],
-                          [f"{low:.4g} to {high:.4g} %, fresh draws."]))  # fmt: skip
-    classes = allocation["tolerances"]
-    if allocation["cost"] == "reciprocal" and classes:
-        prices = [one["cost"] / one["tolerance"] for one in classes]
-        first = int(np.argmax(prices))
-        share = 100 * prices[first] / sum(prices)
-        tiles.append(Tile("What governs the price", [classes[first]["name"]],
-                          [f"{share:.0f} % of it."]))  # fmt: skip
-    tight = min(classes, key=lambda one: one["tolerance"] / one["loosest_allowed"])
-    tiles.append(Tile("What to tighten", [tight["name"]], [
-        "to plus or minus ", Value(tight["tolerance"], tight["unit"]), "."
-    ]))  # fmt: skip
-    return tiles
-
-
-def _allocation_section(allocation: Mapping[str, Any]) -> str:
-    """Tolerances by class, worst cases and price."""
-    rows: list[list[Cell]] = [
-        [one["name"], *(Value(one[k], one["unit"]) for k in
-                        ("tolerance", "loosest_allowed")), float(one["cost"])]
-        for one in allocation["tolerances"]
-    ]  # fmt: skip
-    worst: list[list[Cell]] = [
-        [NAMES[key], *(Value(v, UNITS[key], 6) for v in
-                       (allocation["limits"][key], one["found"], one["proven"]))]
-        for key, one in allocation["worst"].items()
-    ]  # fmt: skip
-    charts = "".join(
-        bars(some, Axis("tolerance, plus or minus", unit, {"type": "log"}), "", np.nan)
-        for unit in ("rad", "m")
-        if (some := {one["name"]: one["tolerance"] for one in allocation["tolerances"]
-                     if one["unit"] == unit})
-    )  # fmt: skip
-    head: list[str | Column] = ["class", "tolerance, plus or minus", "loosest allowed"]
-    return section(
-        "The tolerances there may be",
-        f"<div class=grid>{charts}</div>",
-        table([*head, Column("cost")], rows, "tolerances"),
-        paragraph("Price ", Value(allocation["price"], "", 5), "; at least ",
-                  Value(allocation["price_bound"], "", 5), "."),
-        table(["quantity", "limit", "worst found", "proven at most"], worst, "limits"),
-    )  # fmt: skip

@@ -264,7 +264,7 @@ def tolerances(
         )
     )
     postures = grid_postures(machine, grid)
-    results: dict = {"robot": machine.name, "postures": len(postures)}
+    results: dict = {"robot": machine.name, "postures": len(postures), "grid": grid}
     texts = []
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
@@ -289,8 +289,8 @@ def tolerances(
             _save_allocation(allocation, output, figure)
     write_json(results, json)
     if report is not None:
-        from assembly.statistics.report import tolerances_page
         from assembly.statistics.scenes import margin_map, tightest_robot
+        from assembly.statistics.tolerances_report import tolerances_page
 
         drawings = (margin_map, tightest_robot) if "present" in results else ()
         pictures = [draw(postures, results["present"]) for draw in drawings]
