@@ -20,7 +20,12 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
 from validation.crosscheck.link_models import link_models
-from validation.crosscheck.pair import Pair, exact_solution, scaled
+from validation.crosscheck.pair import (
+    Pair,
+    exact_solution,
+    hold_free_motions,
+    scaled,
+)
 from validation.crosscheck.pose_metric import PoseMetric
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
@@ -206,15 +211,22 @@ def crosscheck(
     held: list[float] = []  # motions held at one scale are held at all smaller ones
 
     def solve(s: float) -> Pair:
-        linear = solve_assembly(scaled(compared, s), s * wrench, gravity=s * g)
+        models = [compared] if clearances else [compared, hold_free_motions(compared)]
+        linear, *held_too = (
+            solve_assembly(scaled(p, s), s * wrench, gravity=s * g) for p in models
+        )
+        holding = held_too[0] if held_too else None
         simulated = simulate_assembly(
             compared, s, replace(model, hold=bool(held) and not clearances),
             load=s * force, gravity=s * g, couple=s * wrench[:3], time_limit=time_limit,
         )  # fmt: skip
         if simulated.held:
             held.append(s)
+        # what holds free motions in the simulation holds them in the other models too
+        if simulated.held and holding is not None:
+            linear = holding
         exact = exact_solution(linear, s * g)
-        return Pair(s, linear, simulated, exact, s**2 * between)
+        return Pair(s, linear, simulated, exact, s**2 * between, holding)
 
     def judge(pairs: tuple[Pair, ...], asked: int) -> Crosscheck:
         metric = (
