@@ -8,6 +8,7 @@ unique, and energies and springs are (:mod:`validation.crosscheck.clearance_metr
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -27,6 +28,11 @@ from validation.crosscheck.pair import (
     scaled,
 )
 from validation.crosscheck.pose_metric import PoseMetric
+from validation.crosscheck.resolution import (
+    Resolution,
+    resolution_text,
+    resolutions,
+)
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
     NO_SIGNAL,
@@ -110,6 +116,14 @@ class Crosscheck:
         """What must hold, by name."""
         return self.metric.checks
 
+    @cached_property
+    def resolutions(self) -> list[Resolution]:
+        """The smallest change of each number of the robot that would be noticed."""
+        assert isinstance(self.metric, PoseMetric | ClearanceMetric)
+        return resolutions(
+            self.posture, self.pairs, self.metric, self.load, self.gravity
+        )
+
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
@@ -144,6 +158,17 @@ class Crosscheck:
                 }
                 for name, check in self.checks.items()
             },
+            "smallest_changes_noticed": [
+                {
+                    "name": one.name,
+                    "kind": one.kind,
+                    "value": one.value,
+                    "relative": one.smallest,
+                    "check": one.by,
+                    "unproved": one.unproved,
+                }
+                for one in self.resolutions
+            ],
             "verdict": outcome,
             "passed": outcome == "passed",
         }
@@ -162,6 +187,7 @@ class Crosscheck:
         added = len(self.pairs) - self.asked
         if added:
             lines.append(f"scales added to tell: {added}")
+        lines += resolution_text(self.resolutions)
         return "\n".join([*lines, verdict_text(self)])
 
 
