@@ -26,7 +26,13 @@ from assembly.statistics.importance import (
     source_groups,
 )
 from assembly.statistics.importance_slopes import error_units, platform_gains
-from assembly.statistics.ranking import NOT_DISTINGUISHED, possible_ranks, rank_text
+from assembly.statistics.ranking import (
+    NOT_DISTINGUISHED,
+    leaders,
+    named_together,
+    possible_ranks,
+    rank_text,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -249,6 +255,9 @@ def importance_text(report: Mapping[str, Any]) -> str:
         lines.append(f"and {len(order) - _ROWS} more, see --json")
     if any(first < last for first, last in rank.values()):
         lines.append(NOT_DISTINGUISHED)
+    if rank:
+        largest = [name for name in order if name in leaders(rank)]
+        lines.append(f"largest: {', '.join(named_together(largest, rank))}")
     return "\n".join(lines)
 
 

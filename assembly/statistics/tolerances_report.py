@@ -88,10 +88,10 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
         share = f"{100 * first['share_of_margin']:.0f} %"
         tiles.append(Tile("What governs it", [first["error"]], [f"{share} of it."]))
     factor = present["factor_on_errors"]
-    if factor < 1.0:
-        answer = f"all errors times {factor:.3g}"
-        tiles.append(Tile("What to tighten", [answer], ["then all postures fit."]))
-    return tiles
+    answer, note = f"all errors times {factor:.3g}", "then all postures fit."
+    if factor >= 1.0:
+        answer, note = "nothing", "all postures fit with the errors there are."
+    return [*tiles, Tile("What to tighten", [answer], [note])]
 
 
 def _present_section(present: Mapping[str, Any]) -> str:

@@ -193,13 +193,15 @@ def told(units, left_out=0.0, rank=(1, 1)):
         "total_index": index, "first_index": index, "largest_share_left_out": 0.0,
         "rank": dict.fromkeys(platform, rank),
     }  # fmt: skip
-    return importance_text({
+    lines = importance_text({
         "base_draws": 64, "play": "least", "platform": platform,
         "quantities": {
             "translation": one, "energy": one | {"largest_share_left_out": left_out},
             "stress": one | {"reason": "it does not vary"},
         },
     }).splitlines()  # fmt: skip
+    assert lines[-1].startswith("largest: group0")
+    return lines[:-1]
 
 
 def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
@@ -235,3 +237,20 @@ def test_errors_with_a_rank_in_common_are_said_not_to_be_distinguished():
     assert [line.split()[-1] for line in lines[-3:-1]] == ["1-2", "1-2"]
     assert lines[-1].endswith("are not distinguished by these draws")
     assert "distinguished" not in told(["m", "m"])[-1]
+
+
+def test_the_largest_error_of_all_legs_is_named_as_one():
+    index = {f"leg{i}.hinge.RX": np.array([0.3, 0.2, 0.4]) for i in (1, 2, 3)}
+    index["leg1.tip.TX"] = np.array([0.1, 0.05, 0.15])
+    ranks = dict.fromkeys(list(index)[:3], (1, 3)) | {"leg1.tip.TX": (4, 4)}
+    platform = {
+        name: {"error_unit": "rad", "translation_part": 1e-6, "rotation_part": 1e-3,
+               "translation_gain": 0.4, "rotation_gain": 1.0}
+        for name in index
+    }  # fmt: skip
+    one = {"total_index": index, "largest_share_left_out": 0.0, "rank": ranks}
+    text = importance_text({
+        "base_draws": 64, "play": "least", "platform": platform,
+        "quantities": {"translation": one},
+    })  # fmt: skip
+    assert text.splitlines()[-1] == "largest: hinge.RX of all legs"

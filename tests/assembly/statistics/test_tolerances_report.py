@@ -127,3 +127,17 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert asked["postures"].text == "1: tx=0.4"
     assert asked["clearances"].text.startswith("play worst: clearances anywhere")
     assert asked["yield"].text == "1: every robot within tolerance"
+
+
+def test_errors_that_fit_everywhere_leave_nothing_to_tighten():
+    """A margin of 0.5: the errors could be twice as large."""
+    present = {
+        "postures": 2, "assemblable_share": 1.0, "factor_on_errors": 2.0,
+        "largest_margin": 0.5, "at": {"tx": 0.0}, "slopes": [],
+    }  # fmt: skip
+    results = {"robot": "bars", "postures": 2, "grid": "tx=0:1:1", "present": present}
+    page = tolerances_page(results, Provenance())
+    assert tiles(page)["What to tighten"][0] == "nothing"
+    tight = present | {"factor_on_errors": 0.5, "assemblable_share": 0.0}
+    page = tolerances_page(results | {"present": tight}, Provenance())
+    assert tiles(page)["What to tighten"][0] == "all errors times 0.5"
