@@ -284,8 +284,8 @@ def _screw_bound_text(bound: dict[str, Any]) -> str:
     text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
     if max(loose) > 1e-9:
         text += (
-            "; at the same energy clearances leave open up to "
-            f"{loose[0]:.3g} mrad, {loose[1]:.3g} um"
+            "; at the same energy clearances move it from there by up to "
+            f"{loose[0]:.4g} mrad, {loose[1]:.4g} um"
         )
     return text
 

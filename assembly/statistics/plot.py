@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.quantities import POSE_ERRORS
 from forcefit.inputs.errors import plot_label
@@ -88,7 +88,7 @@ def histogram_figure(data: "xarray.Dataset") -> "Figure":
         f"of the {solved.sizes['draw']} of {data.sizes['draw']} draws that assemble, "
         f"seed {data.attrs.get('seed', '')}"
         f"\npose errors: play {data.attrs['play']}: "
-        f"{CLEARANCE_MODELS[data.attrs['play']]}"
+        f"{play_means(data.attrs['play'], data.attrs.get('contact_length'))}"
     )
     return figure
 

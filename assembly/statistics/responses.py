@@ -24,6 +24,7 @@ _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 def respond(
     prepared: PostureMargins | OnePosture, sources: ErrorSources, values: NDArray,
     key: str = "energy", clearance_model: str = "worst",
+    contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """A quantity for given errors, and its slopes with each of them.
 
@@ -37,6 +38,8 @@ def respond(
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
             worst, value and slopes are those of the largest error found.  With uniform
             and contact positions the slopes are those of the solution of (22).
+        contact_length: [m] of the contact model, see
+            :class:`assembly.statistics.experiment.Experiment`.
 
     Returns:
         (k,) and (k, m); NaN where there is no solution.
@@ -55,10 +58,10 @@ def respond(
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
-        some = _selected(draws, solved)
+        some = draws.taken(solved)
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
-                prepared, some, errors[solved], key, clearance_model, solved
+                prepared, some, key, (clearance_model, contact_length), solved
             )
             by_wrench = np.zeros_like(wrenches[solved])
         else:
@@ -71,29 +74,26 @@ def respond(
 
 
 def _pose_error(
-    prepared: OnePosture, draws: Draws, errors: NDArray, key: str, clearance_model: str,
+    prepared: OnePosture, draws: Draws, key: str, model: tuple[str, float | None],
     numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
     """Size of a pose error, and its slopes with platform screw and clearances."""
-    part = 3 * POSE_ERRORS.index(key)
+    part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance_model == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
-        bounds, screws = bound_worst_errors(prepared, draws, errors, precision)
+        bounds, screws = bound_worst_errors(prepared, draws, draws.errors, precision)
         which = POSE_ERRORS.index(key)
         by_screw, by_clearance = worst_error_slopes(
             prepared, draws, key, screws[:, which]
         )
         return bounds[:, which, 0], by_screw, -by_clearance
     generators = [draw_generator(1, i, CLEARANCE_STREAM) for i in numbers.tolist()]
-    screws, _ = position_clearances(prepared, draws, clearance_model, generators)
+    screws, _ = position_clearances(
+        prepared, draws, clearance_model, generators, contact_length
+    )
     slopes = np.zeros_like(screws)
     size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])
     return size, slopes, None
-
-
-def _selected(draws: Draws, rows: NDArray) -> Draws:
-    """Some of the draws."""
-    return Draws(*(getattr(draws, name)[rows] for name in Draws.__dataclass_fields__))
 
 
 def _wrench_quantity(

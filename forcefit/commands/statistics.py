@@ -37,7 +37,15 @@ PlayOption = Annotated[
     str,
     typer.Option(
         help="Clearance positions for pose errors: worst (any, the largest error "
-        "counts) | uniform | contact | least (that of the solution)."
+        "counts) | uniform | contact (of a wrench of random direction; loads of "
+        "service say more: --load) | least (that of the solution)."
+    ),
+]
+ContactLengthOption = Annotated[
+    float | None,
+    typer.Option(
+        help="[m] --play contact: a random moment over it is as large as a random "
+        "force. Default: the longest body."
     ),
 ]
 
@@ -54,6 +62,7 @@ def statistics(
     ] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     play: PlayOption = "worst",
+    contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
@@ -105,7 +114,7 @@ def statistics(
     from assembly.statistics.summary import summarise, summary_text
     from assembly.sweeps.dataset import check_dataset
 
-    _check_clearance_model(play)
+    _check_clearance_model(play, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
     if stiffness is not None:
         _check_word("--stiffness", stiffness, ("contact", "exact"))
@@ -125,6 +134,7 @@ def statistics(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
         stiffness=stiffness or "", precision=precision_for(limits),
+        contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
     options = None
@@ -161,10 +171,19 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
-def _check_clearance_model(play: str) -> None:
+def _check_clearance_model(play: str, contact_length: float | None) -> None:
+    """Refuse an unknown model, and a length that it does not need or cannot use."""
     from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--play", play, tuple(CLEARANCE_MODELS))
+    if contact_length is None:
+        return
+    if play != "contact":
+        raise BadInput(
+            f"--contact-length: found with --play {play}, expected --play contact"
+        )
+    if not 0 < contact_length < float("inf"):
+        raise BadInput(f"--contact-length: found {contact_length}, expected > 0 m")
 
 
 @contextmanager
@@ -190,6 +209,7 @@ def tolerances(
         str, typer.Option(help="Present errors: compliant joints free | rigid.")
     ] = "free",
     play: PlayOption = "worst",
+    contact_length: ContactLengthOption = None,
     fresh: Annotated[
         int,
         typer.Option(help="Fresh draws that verify the tolerances.", min=0, max=10**9),
@@ -225,7 +245,7 @@ def tolerances(
     )
     from assembly.sweeps.dataset import check_dataset
 
-    _check_clearance_model(play)
+    _check_clearance_model(play, contact_length)
     _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure):
         raise BadInput("tolerances: --output and --figure need a --plan")
@@ -237,10 +257,14 @@ def tolerances(
     asked_plan = (
         None
         if plan is None
-        else replace(read_plan(plan, machine), clearance_model=play)
+        else replace(
+            read_plan(plan, machine),
+            clearance_model=play,
+            contact_length=contact_length,
+        )
     )
     postures = grid_postures(machine, grid)
-    results: dict = {"robot": machine.name, "postures": len(postures)}
+    results: dict = {"robot": machine.name, "postures": len(postures), "grid": grid}
     texts = []
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
@@ -265,8 +289,8 @@ def tolerances(
             _save_allocation(allocation, output, figure)
     write_json(results, json)
     if report is not None:
-        from assembly.statistics.report import tolerances_page
         from assembly.statistics.scenes import margin_map, tightest_robot
+        from assembly.statistics.tolerances_report import tolerances_page
 
         drawings = (margin_map, tightest_robot) if "present" in results else ()
         pictures = [draw(postures, results["present"]) for draw in drawings]
