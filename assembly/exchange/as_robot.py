@@ -95,6 +95,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         BadInput: no body can be the platform.
     """
     platform = mechanism.platform or guess_platform(mechanism)
+    mechanism = _without_base(mechanism)
     mechanism = _with_ends(replace(mechanism, platform=platform))
     carriers = {joint.parent for joint in mechanism.joints}
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
@@ -125,7 +126,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
         motion = {"joint": joint.kind, "actuated": joint.actuated}
-        name = joint.name if joint.name != BASE else f"{BASE}.joint"
+        name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
         after = turn.T @ joint.after
         seen = body.mass or body.name in met or body.name not in carriers
@@ -136,6 +137,19 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     closures = tuple((places[k.first][0], places[k.second][0]) for k in mechanism.loops)
     robot = Robot(mechanism.name, places[platform][0], tuple(frames), closures)
     return RobotAndMechanism(robot, mechanism, places)
+
+
+def _without_base(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with another name for a joint called as what stands still."""
+    names = {joint.name for joint in mechanism.joints}
+    if BASE not in names:
+        return mechanism
+    other = _unlike(f"{BASE}.joint", names)
+    joints = tuple(
+        replace(j, name=other) if j.name == BASE else j for j in mechanism.joints
+    )
+    taken = f'joint "{BASE}" is frame "{other}": "{BASE}" is what stands still'
+    return replace(mechanism, joints=joints, taken=(*mechanism.taken, taken))
 
 
 def guess_platform(mechanism: Mechanism) -> str:

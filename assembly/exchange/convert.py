@@ -1,4 +1,4 @@
-"""``forcefit convert``: robots of other programs in and out, each proved after writing.
+"""``forcefit convert``: robots of other programs in and out, read back after writing.
 
 ============  ==========================================================  ==========
 kind          read                                                        written
@@ -40,10 +40,12 @@ from assembly.exchange.loops_file import (
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
 from assembly.exchange.mjcf_writing import mjcf_text
+from assembly.exchange.mujoco_reading import Comparison, compare
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.sdf import read_sdf
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
+from assembly.exchange.xml_file import counted
 from assembly.files.robot_file import read_robot, robot_of, robot_table, write_robot
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Robot
@@ -75,6 +77,7 @@ class Conversion:
         open_after: [rad, m] likewise in the home that was found.
         drives_held: whether the drives stand where the file has them.
         difference: largest of any body's pose in 100 random postures, read back.
+        comparisons: with what another program reads in the files.
         left_out: what the new file cannot hold, in words.
         taken: what the files leave open, and what was taken, in words.
     """
@@ -87,6 +90,12 @@ class Conversion:
     difference: float
     left_out: tuple[str, ...]
     taken: tuple[str, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether no other program read another robot."""
+        return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:
         """Plain values for ``--json``."""
@@ -102,6 +111,7 @@ class Conversion:
                 "drives_held": self.drives_held,
             },
             "largest_difference": self.difference,
+            "compared": [comparison.table() for comparison in self.comparisons],
             "left_out": list(self.left_out),
             "taken": list(self.taken),
         }
@@ -113,7 +123,9 @@ class Conversion:
         lines = [
             f"{robot.name}: {len(robot.frames)} frames, "
             f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
-            f"read back in 100 random postures: bodies within {self.difference:.1e}",
+            f"read back in 100 random postures: bodies within {self.difference:.1e} "
+            "(by forcefit itself: nothing was lost in writing)",
+            *(comparison.text() for comparison in self.comparisons),
         ]
         if count:
             moved = "" if self.drives_held else "; the drives had to move"
@@ -189,7 +201,9 @@ def _from_others(
             raise BadInput(f"--points: found some, but {source} has no loops file")
         beside = with_points(beside, points)
     read = _READERS[ending]
-    mechanism, taken = read(source, beside), tuple[str, ...]()
+    mechanism, points_taken = read(source, beside), tuple[str, ...]()
+    comparison = compare(mechanism, source)
+    mechanism = _weighed(mechanism, comparison)
     before = loop_residual(mechanism, mechanism.home)
     home, held = mechanism.home, True
     if mechanism.loops:
@@ -199,17 +213,19 @@ def _from_others(
             if points is not None or beside is None or not beside.as_generated:
                 raise
             mechanism = read(source, with_points(beside, ["all"]))
+            mechanism = _weighed(mechanism, comparison)
             try:
                 home, held = close_loops(mechanism, str(source))
             except BadInput:
                 raise error from None
             before = loop_residual(mechanism, mechanism.home)
-            taken = (
+            points_taken = (
                 "every loop for a point (3d): all of them are said to be 6d, which is "
                 "what generators write, and so they cannot close "
                 f"({str(error).removeprefix(f'{source}: ')}); --points says which are",
             )
     mechanism = points_as_joints(mechanism, home)
+    guessed = mechanism.platform is None
     placed = robot_of_mechanism(mechanism)
     content = robot_table(placed.robot)
     root = (
@@ -218,11 +234,12 @@ def _from_others(
         else lay_over(content, overlay)
     )
     robot = robot_of(root, source.stem)
+    mechanism = placed.mechanism
     weight = mechanism.bodies[mechanism.root].mass
     left_out = list(mechanism.left_out)
     if weight:
         left_out.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
-    if mechanism.platform is None:
+    if guessed and robot.platform == placed.robot.platform:
         left_out.append(
             f"no platform is named: {robot.platform} was taken, the end of the longest "
             "chain (an overlay's platform says another)"
@@ -236,9 +253,25 @@ def _from_others(
         drives_held=held,
         difference=0.0,
         left_out=tuple(left_out),
-        taken=taken,
+        taken=points_taken + placed.mechanism.taken,
+        comparisons=(comparison,),
     )
     return conversion, placed
+
+
+def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
+    """Masses of meshes as the other program has them, or said to be left out."""
+    known = comparison.weights
+    bodies = dict(mechanism.bodies)
+    for name, (mass, centre) in known.items():
+        bodies[name] = replace(bodies[name], mass=mass, centre=centre)
+    unknown = [name for name in mechanism.unweighed if name not in known]
+    what = "masses of mesh shapes"
+    return replace(
+        mechanism, bodies=bodies,
+        taken=mechanism.taken + counted(f"{what}, by {comparison.reader}", list(known)),
+        left_out=mechanism.left_out + counted(what, unknown),
+    )  # fmt: skip
 
 
 def _declared(source: Path, overlay: Path | str | None) -> Conversion:
@@ -280,6 +313,11 @@ def _written(
                 write_text(text, trial.with_suffix(path.suffix))
             back = _read_back(trial)
             difference = largest_difference(replace(built, mechanism=back))
+            comparison = compare(built.mechanism, trial)
+            comparisons = (*conversion.comparisons, comparison)
+            conversion = replace(conversion, comparisons=comparisons)
+            if not comparison.agrees:
+                raise BadInput(f"{comparison.text()}; nothing is written")
     if not difference <= FAITHFUL:
         raise BadInput(
             f"{target}: what was written is another robot: bodies are off by "

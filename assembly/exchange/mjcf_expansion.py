@@ -1,0 +1,168 @@
+"""MJCF written out: other files included, copies made, other models attached.
+
+Sources:
+    MuJoCo documentation, XML reference: ``include`` puts in the elements of a file;
+    copy i of ``replicate`` stands i offsets and turns on, its names end in i with as
+    many digits as the count has; ``attach`` puts a body of another model, with that
+    model's angles, defaults and constraints, all names behind a prefix.
+"""
+
+import copy
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from assembly.exchange.mjcf_orientation import Angles
+from assembly.exchange.orientation import from_euler, to_quaternion
+from assembly.exchange.xml_file import Node, placed, read_xml
+from forcefit.inputs.errors import BadInput, quoted
+
+_DEEPEST = 10  # files in files
+_MOST_COPIES = 10_000
+_MOST_ELEMENTS = 200_000
+# keys whose values are names, of an element or of what it refers to
+_NAMES = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent",
+          "body", "body1", "body2", "site", "site1", "site2", "refsite", "slidersite",
+          "cranksite", "tendon", "tendon1", "tendon2", "geom", "mesh")  # fmt: skip
+_TIES = ("equality", "actuator", "tendon")
+UNIT, SEQUENCE = "attached.unit", "attached.sequence"
+
+
+def expanded(root: Node, depth: int = 0) -> Node:
+    """An MJCF file as one in which every body is written out.
+
+    Args:
+        root: of the file, changed in place.
+        depth: how many files lead to it.
+
+    Returns:
+        The root.
+
+    Raises:
+        BadInput: a file is missing or is no MJCF, files stand too deep, copies are too
+            many, or a model or body to be attached is not there.
+    """
+    if depth > _DEEPEST:
+        raise BadInput(f"{root.file}: found models more than {_DEEPEST} deep")
+    _include(root.element, root, Path(root.file).parent, 0)
+    angles = Angles.of(root)
+    for world in root.children("worldbody"):
+        _replicate(world.element, root, angles)
+    _attach(root, depth)
+    if sum(1 for _ in root.element.iter()) > _MOST_ELEMENTS:
+        raise BadInput(f"{root.file}: found more than {_MOST_ELEMENTS} elements")
+    return root
+
+
+def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
+    """Elements of other files in the place of ``include``."""
+    inside: list[Any] = []
+    for inner in element:
+        if inner.tag != "include":
+            _include(inner, root, folder, depth)
+            inside.append(inner)
+            continue
+        node = Node(inner, root.file)
+        if depth == _DEEPEST:
+            raise node.bad("file", f"found files more than {_DEEPEST} deep")
+        other = read_xml(folder / node.text("file"), "mujocoinclude", "mujoco")
+        _include(other.element, other, folder, depth + 1)
+        inside += other.element
+    element[:] = inside
+
+
+def _replicate(element: Any, root: Node, angles: Angles) -> None:
+    """Frames with copies in the place of ``replicate``, the innermost first."""
+    inside: list[Any] = []
+    for inner in element:
+        _replicate(inner, root, angles)
+        if inner.tag == "replicate":
+            inside += _copies(Node(inner, root.file), angles)
+        else:
+            inside.append(inner)
+    element[:] = inside
+
+
+def _copies(node: Node, angles: Angles) -> Iterator[Any]:
+    """The frames of one ``replicate``."""
+    count = node.number("count", "copies")
+    if not 1 <= count <= _MOST_COPIES or count % 1:
+        expected = f"expected a whole number from 1 to {_MOST_COPIES}"
+        raise node.bad("count", f"found {count:g}, {expected}")
+    turn = node.numbers("euler", 3, "angle", np.zeros(3)) * angles.unit
+    shift = node.numbers("offset", 3, "m", np.zeros(3))
+    step = placed(shift, from_euler(turn, angles.sequence))
+    T, digits = np.eye(4), len(str(int(count)))
+    for i in range(int(count)):
+        quaternion = to_quaternion(T[:3, :3])
+        pose = {"pos": _words(T[:3, 3]), "quat": _words(quaternion)}
+        frame = Element("frame", pose)
+        frame.extend(copy.deepcopy(list(node.element)))
+        for one in frame.iter():
+            if "name" in one.attrib:
+                one.set("name", f"{one.get('name')}{node.optional('sep')}{i:0{digits}}")
+        yield frame
+        T = T @ step
+
+
+def _words(values: Any) -> str:
+    """Numbers with all their digits."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _attach(root: Node, depth: int) -> None:
+    """Frames with bodies of other models in the place of ``attach``."""
+    files = {
+        model.text("name", Path(model.text("file")).stem): model.text("file")
+        for asset in root.children("asset")
+        for model in asset.children("model")
+    }
+    for outer in [
+        e for world in root.children("worldbody") for e in world.element.iter()
+    ]:
+        for place, inner in enumerate(list(outer)):
+            if inner.tag == "attach":
+                node = Node(inner, root.file)
+                model = node.text("model")
+                if model not in files:
+                    raise node.bad("model", f"found {quoted(model)}, no model asset")
+                other = read_xml(Path(root.file).parent / files[model], "mujoco")
+                outer[place] = _attached(node, root, expanded(other, depth + 1))
+
+
+def _attached(node: Node, root: Node, other: Node) -> Any:
+    """A frame with a body of another model; its constraints are added to the root."""
+    prefix, angles = node.optional("prefix"), Angles.of(other)
+    for element in other.element.iter():
+        for key in _NAMES:
+            if key in element.attrib:
+                element.set(key, prefix + element.get(key))
+    held = [body for world in other.children("worldbody") for body in world.element]
+    if node.has("body"):
+        wanted = prefix + node.text("body")
+        all_of_it = (one for body in held for one in body.iter("body"))
+        held = [one for one in all_of_it if one.get("name") == wanted][:1]
+        if not held:
+            raise node.bad("body", f"found {quoted(node.text('body'))}, no body of it")
+    for default in other.children("default"):
+        default.element.set("class", f"{prefix}main")
+        default.element.set("attached", "true")
+        root.element.append(default.element)
+    frame = Element("frame", {UNIT: repr(angles.unit), SEQUENCE: angles.sequence})
+    if other.child("default") is not None:
+        frame.set("childclass", f"{prefix}main")
+    frame.extend(held)
+    names = {one.get("name") for one in frame.iter()}
+    for section in other.children(*_TIES):
+        within = Element(section.tag)
+        for tie in section.element:
+            own = {k: v for one in tie.iter() for k, v in one.attrib.items()}
+            refers = {own[k] for k in own if k in _NAMES[3:]}
+            if refers <= names:
+                within.append(tie)
+                names.add(tie.get("name"))
+        root.element.append(within)
+    return frame
