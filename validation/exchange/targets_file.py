@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.robot_files import load_robot
 from assembly.model.robot import Robot
-from assembly.robots import BUILT_IN, load_robot
+from assembly.robots import BUILT_IN
 from forcefit.inputs.errors import quoted
 from forcefit.inputs.table import read_toml
 from validation.exchange.device_table import DATES, LENGTHS, Writing
