@@ -27,7 +27,7 @@ _MOST_ELEMENTS = 200_000
 _NAMES = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent",
           "body", "body1", "body2", "site", "site1", "site2", "refsite", "slidersite",
           "cranksite", "tendon", "tendon1", "tendon2", "geom", "mesh")  # fmt: skip
-_TIES = ("equality", "actuator", "tendon")
+_REFERENCES = _NAMES[3:]
 UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
@@ -48,10 +48,10 @@ def expanded(root: Node, depth: int = 0) -> Node:
     if depth > _DEEPEST:
         raise BadInput(f"{root.file}: found models more than {_DEEPEST} deep")
     _include(root.element, root, Path(root.file).parent, 0)
+    _attach(root, depth)  # before copies are made of what is attached
     angles = Angles.of(root)
     for world in root.children("worldbody"):
         _replicate(world.element, root, angles)
-    _attach(root, depth)
     if sum(1 for _ in root.element.iter()) > _MOST_ELEMENTS:
         raise BadInput(f"{root.file}: found more than {_MOST_ELEMENTS} elements")
     return root
@@ -80,14 +80,19 @@ def _replicate(element: Any, root: Node, angles: Angles) -> None:
     for inner in element:
         _replicate(inner, root, angles)
         if inner.tag == "replicate":
-            inside += _copies(Node(inner, root.file), angles)
+            ties = _ties_within(root, inner)
+            inside += _copies(Node(inner, root.file), angles, ties)
+            for section, tie in ties:
+                section.remove(tie)
         else:
             inside.append(inner)
     element[:] = inside
 
 
-def _copies(node: Node, angles: Angles) -> Iterator[Any]:
-    """The frames of one ``replicate``."""
+def _copies(
+    node: Node, angles: Angles, ties: list[tuple[Any, Any]]
+) -> Iterator[Any]:  # fmt: skip
+    """The frames of one ``replicate``; what ties their bodies is copied too."""
     count = node.number("count", "copies")
     if not 1 <= count <= _MOST_COPIES or count % 1:
         expected = f"expected a whole number from 1 to {_MOST_COPIES}"
@@ -101,11 +106,21 @@ def _copies(node: Node, angles: Angles) -> Iterator[Any]:
         pose = {"pos": _words(T[:3, 3]), "quat": _words(quaternion)}
         frame = Element("frame", pose)
         frame.extend(copy.deepcopy(list(node.element)))
-        for one in frame.iter():
-            if "name" in one.attrib:
-                one.set("name", f"{one.get('name')}{node.optional('sep')}{i:0{digits}}")
+        ending = f"{node.optional('sep')}{i:0{digits}}"
+        _end(frame, ("name",), ending)
+        for section, tie in ties:
+            section.append(copy.deepcopy(tie))
+            _end(section[-1], ("name", *_REFERENCES), ending)
         yield frame
         T = T @ step
+
+
+def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
+    """Lengthen names of an element and of all inside it."""
+    for one in element.iter():
+        for key in keys:
+            if key in one.attrib:
+                one.set(key, one.get(key) + ending)
 
 
 def _words(values: Any) -> str:
@@ -114,39 +129,58 @@ def _words(values: Any) -> str:
 
 
 def _attach(root: Node, depth: int) -> None:
-    """Frames with bodies of other models in the place of ``attach``."""
-    files = {
-        model.text("name", Path(model.text("file")).stem): model.text("file")
+    """Frames with parts of other models in the place of ``attach``."""
+    worlds = [world.element for world in root.children("worldbody")]
+    places = [
+        (outer, inner)
+        for world in worlds for outer in world.iter() for inner in outer
+        if inner.tag == "attach"
+    ]  # fmt: skip
+    if not places:
+        return
+    # copies, as each is changed; of this model as it is written
+    own = copy.deepcopy(root.element)
+    others = {
+        name: (file, element)
         for asset in root.children("asset")
         for model in asset.children("model")
+        for name, file, element in [_other(model, root, depth)]
     }
-    for outer in [
-        e for world in root.children("worldbody") for e in world.element.iter()
-    ]:
-        for place, inner in enumerate(list(outer)):
-            if inner.tag == "attach":
-                node = Node(inner, root.file)
-                model = node.text("model")
-                if model not in files:
-                    raise node.bad("model", f"found {quoted(model)}, no model asset")
-                other = read_xml(Path(root.file).parent / files[model], "mujoco")
-                outer[place] = _attached(node, root, expanded(other, depth + 1))
+    for outer, inner in places:
+        node, file, element = Node(inner, root.file), root.file, own
+        if node.has("model"):
+            name = node.text("model")
+            if name not in others:
+                raise node.bad("model", f"found {quoted(name)}, no model asset")
+            file, element = others[name]
+        elif not node.has("frame"):
+            raise node.bad("model", "missing; expected a model asset")
+        other = Node(copy.deepcopy(element), file)
+        outer[list(outer).index(inner)] = _attached(node, root, other)
+
+
+def _other(model: Node, root: Node, depth: int) -> tuple[str, str, Any]:
+    """Name, file and written-out element of a model asset."""
+    other = read_xml(Path(root.file).parent / model.text("file"), "mujoco")
+    name = model.optional("name") or other.optional("model") or Path(other.file).stem
+    return name, other.file, expanded(other, depth + 1).element
 
 
 def _attached(node: Node, root: Node, other: Node) -> Any:
-    """A frame with a body of another model; its constraints are added to the root."""
+    """A frame with a part of a model; its constraints are added to the root."""
     prefix, angles = node.optional("prefix"), Angles.of(other)
     for element in other.element.iter():
         for key in _NAMES:
             if key in element.attrib:
                 element.set(key, prefix + element.get(key))
     held = [body for world in other.children("worldbody") for body in world.element]
-    if node.has("body"):
-        wanted = prefix + node.text("body")
-        all_of_it = (one for body in held for one in body.iter("body"))
-        held = [one for one in all_of_it if one.get("name") == wanted][:1]
-        if not held:
-            raise node.bad("body", f"found {quoted(node.text('body'))}, no body of it")
+    for tag in ("body", "frame"):
+        if node.has(tag):
+            wanted = prefix + node.text(tag)
+            all_of_it = [one for body in held for one in body.iter(tag)]
+            held = [one for one in all_of_it if one.get("name") == wanted][:1]
+            if not held:
+                raise node.bad(tag, f"found {quoted(node.text(tag))}, no {tag} of it")
     for default in other.children("default"):
         default.element.set("class", f"{prefix}main")
         default.element.set("attached", "true")
@@ -155,14 +189,25 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
     if other.child("default") is not None:
         frame.set("childclass", f"{prefix}main")
     frame.extend(held)
-    names = {one.get("name") for one in frame.iter()}
-    for section in other.children(*_TIES):
+    for section, tie in _ties_within(other, frame):
         within = Element(section.tag)
-        for tie in section.element:
-            own = {k: v for one in tie.iter() for k, v in one.attrib.items()}
-            refers = {own[k] for k in own if k in _NAMES[3:]}
-            if refers <= names:
-                within.append(tie)
-                names.add(tie.get("name"))
+        within.append(tie)
         root.element.append(within)
     return frame
+
+
+def _ties_within(root: Node, part: Any) -> list[tuple[Any, Any]]:
+    """Constraints, tendons and actuators of a part alone, each with its section."""
+    names, ties = {one.get("name") for one in part.iter()}, []
+    for section in root.children("tendon", "equality", "actuator"):
+        for tie in section.element:
+            refers = {
+                value
+                for one in tie.iter()
+                for key, value in one.attrib.items()
+                if key in _REFERENCES
+            }
+            if refers and refers <= names:
+                ties.append((section.element, tie))
+                names.add(tie.get("name"))
+    return ties

@@ -19,9 +19,8 @@ from assembly.exchange.shapes import area, together, volume
 from assembly.exchange.xml_file import Node
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-_MASSLESS = ("plane", "hfield")
 _REGULAR = 1e-6  # [kg] bounds up to it only let a body without mass be moved
-_KINDS = (*_SIZES, *_MASSLESS, "mesh", "sdf")
+_KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +94,7 @@ def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
 def shape_mass(
     geom: Node, T: NDArray, rules: MassRules
 ) -> tuple[float, NDArray] | None:
-    """[kg] and (3,) [m] of a shape; None where a mesh' volume is not known here.
+    """[kg] and (3,) [m] of a shape; None where it is a mesh, whose volume is not known.
 
     Args:
         geom: the element, defaults filled in.
@@ -110,12 +109,12 @@ def shape_mass(
     """
     kind = geom.choice("type", _KINDS, "sphere")
     group = geom.number("group", "-", 0.0)
-    if kind in _MASSLESS or not rules.groups[0] <= group <= rules.groups[1]:
+    if kind == "plane" or not rules.groups[0] <= group <= rules.groups[1]:
         return 0.0, T[:3, 3]
     given = geom.number("mass", "kg") if geom.has("mass") else None
     if given is not None and given < 0:
         raise geom.bad("mass", f"found {given:g}, expected >= 0 [kg]")
-    if kind not in _SIZES:
+    if kind not in _SIZES or geom.has("mesh"):  # or a shape fitted to a mesh
         return (0.0, T[:3, 3]) if given == 0.0 else None
     if given is not None:
         return given, T[:3, 3]

@@ -133,7 +133,7 @@ class Ties:
                 _known(node, key, {name: name for name in self.rests}) for key in keys
             ] or [node.text("joint1")]
             leader = second[0] if second else None
-            c = node.numbers("polycoef", 5, "-", np.array([0.0, 1.0, 0, 0, 0])).tolist()
+            c = _polynomial(node)
             rest = self.rests[first]
             other = 0.0 if leader is None else self.rests[leader]
             rules = c if leader is not None else c[:1]
@@ -178,6 +178,16 @@ class Ties:
         for node in self.equalities:
             if node.tag == "tendon":
                 self.leave_out(f"equality tendon, {_LOADED}", _name(node, ["tendon1"]))
+
+
+def _polynomial(node: Node) -> list[float]:
+    """Five coefficients; those that are not written are the format's default."""
+    count = len(node.optional("polycoef").split())
+    default = [0.0, 1.0, 0.0, 0.0, 0.0]
+    if not count:
+        return default
+    given = node.numbers("polycoef", min(count, 5), "-").tolist()
+    return [*given, *default[count:]]
 
 
 def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +99,9 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     reader = f"MuJoCo {mujoco.__version__}"
     mujoco.set_mju_user_warning(lambda _: None)  # it would write a log file
     try:
-        model, whole = _model(mujoco, path)
+        with catch_warnings():
+            simplefilter("ignore")
+            model, whole = _model(mujoco, path)
         return _compared(mujoco, model, mechanism, Comparison(reader, name), whole)
     except Exception as error:  # of many kinds, from C++
         reason = (
@@ -130,6 +133,8 @@ def _settled(mujoco: Any, spec: Any) -> Any:
     """A model in which bodies keep their frames and may have no mass."""
     compiler = spec.compiler
     compiler.fusestatic = compiler.alignfree = 0
+    for joint in spec.joints:
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     compiler.balanceinertia = 1
     compiler.boundmass = max(compiler.boundmass, 1e-9)
     compiler.boundinertia = max(compiler.boundinertia, 1e-9)

@@ -61,6 +61,16 @@ KINDS = {
         <joint name="j" axis="0 1 0"/></body></replicate></replicate></worldbody>
         <equality><connect body1="arm_030" body2="arm_101" anchor="0 0 0"/></equality>
         """,
+    "parts of the model itself attached": """<default><default class="c"><joint
+        axis="1 0 0"/></default></default><worldbody><frame pos="1 0 0" euler="0 0 40">
+        <frame name="f" euler="0 20 0"><body name="a" childclass="c">[M]<joint/></body>
+        </frame></frame><body name="b">[M]<joint/><frame pos="0 1 0"><attach frame="f"
+        prefix="again_"/></frame></body></worldbody>""",
+    "a mass of a field, and of a sphere as large as a mesh": """<asset><hfield name="h"
+        nrow="2" ncol="2" size="0.8 0.8 0.8 0.3" elevation="1 0 1 1"/><mesh name="m"
+        vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody><body name="a">
+        <geom type="hfield" hfield="h"/></body><body name="b"><joint/>
+        <geom type="sphere" mesh="m"/></body></worldbody>""",
     "masses of shapes": """<compiler inertiagrouprange="0 2"/><default><geom
         density="500"/></default><worldbody><body name="a"><joint/>
         <geom type="box" size="0.1 0.2 0.3" pos="1 0 0"/><geom size="0.2" group="3"/>
@@ -140,6 +150,24 @@ def test_another_model_is_attached_with_its_own_angles_and_names(tmp_path):
     assert drives == ["L_k", "R_k"]
 
 
+def test_copies_of_an_attached_model_keep_what_ties_it(tmp_path):
+    file_of(tmp_path, """<worldbody><body name="x" pos="0 0 1"><geom size="0.1"/>
+        <joint name="j"/><body name="y" pos="0 1 0"><geom size="0.1"/><joint name="k"/>
+        </body></body></worldbody><equality><connect name="c" body1="y" body2="x"
+        anchor="0 0 0.1"/></equality><actuator><motor name="m" joint="k"/></actuator>
+        """, "kid.xml")  # fmt: skip
+    path = file_of(tmp_path, """<asset><model name="kid" file="kid.xml"/></asset>
+        <worldbody><replicate count="2" offset="1 0 0" sep="-"><attach model="kid"
+        prefix="p_"/></replicate></worldbody>""")  # fmt: skip
+    mechanism = read_mjcf(path)
+    answer = compare(mechanism, path)
+    assert (answer.why_not, answer.bodies, answer.loops) == ("", 4, 2)
+    assert answer.difference < 1e-12, answer.text()
+    assert [loop.name for loop in mechanism.loops] == ["p_c-0", "p_c-1"]
+    drives = [joint.name for joint in mechanism.joints if joint.actuated]
+    assert drives == ["p_k-0", "p_k-1"]
+
+
 def test_other_files_are_included(tmp_path):
     (tmp_path / "parts").mkdir()
     inner = '<mujocoinclude><body name="b" pos="0 1 0"><joint/><geom size="0.1"/>'
@@ -198,7 +226,7 @@ def test_joints_follow_by_polynomials_and_in_chains(tmp_path):
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a" ref="0.2"/><body name="B">[M]<joint name="b"/><body name="C">
         [M]<joint name="c" ref="0.3"/></body></body></body></worldbody><equality>
-        <joint joint1="c" joint2="b" polycoef="0 3 0 0 0"/>
+        <joint joint1="c" joint2="b" polycoef="0 3"/>
         <joint joint1="b" joint2="a" polycoef="0.1 2 0.5 0 0"/></equality><keyframe>
         <key name="home" qpos="0.7 0 0"/></keyframe>""")  # fmt: skip
     answer = convert(path, tmp_path / "robot.toml")
@@ -235,6 +263,10 @@ def test_a_drive_on_a_follower_leads(tmp_path):
         (
             '<worldbody><body name="a">[M]</body><attach model="m"/></worldbody>',
             'attach.model: found "m", no model asset',
+        ),
+        (
+            '<worldbody><frame name="f"/><attach frame="g" prefix="p"/></worldbody>',
+            'attach.frame: found "g", no frame of it',
         ),
         (
             TWO + '<equality><weld body1="a" body2="a"/></equality>',
