@@ -22,6 +22,7 @@ from assembly.exchange.mechanism import (
     chain,
 )
 from assembly.exchange.orientation import onto
+from assembly.exchange.springs import other_springs, springs_at_rest
 from assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.sections import declared_section
@@ -96,6 +97,9 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     """
     platform = mechanism.platform or guess_platform(mechanism)
     mechanism = _without_base(mechanism)
+    springs = springs_at_rest(mechanism)
+    left_out = mechanism.left_out + other_springs(mechanism)
+    mechanism = replace(mechanism, left_out=left_out)
     mechanism = _with_ends(replace(mechanism, platform=platform))
     carriers = {joint.parent for joint in mechanism.joints}
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
@@ -126,6 +130,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
         motion = {"joint": joint.kind, "actuated": joint.actuated}
+        motion["joint_stiffness"] = springs.get(joint.name)
         name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
         after = turn.T @ joint.after

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from assembly.exchange.coupling import Coupling
 from assembly.exchange.loops_file import LoopsFile, unknown_name
 from assembly.exchange.mechanism import (
-    Coupling,
     Joint,
     Loop,
     Mechanism,

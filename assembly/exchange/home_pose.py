@@ -7,7 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import Coupling, Mechanism
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    Mechanism,
+)
 from assembly.exchange.orientation import onto
 from assembly.exchange.tree import place_frames
 from assembly.model.robot import JOINTS

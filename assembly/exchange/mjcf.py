@@ -13,26 +13,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.coupling import leaders_first
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
-    HERE,
     WORLD,
     Body,
     Joint,
     Mechanism,
-    ball,
     body_poses,
-    leaders_first,
-    motion,
     parents_first,
-    slides,
 )
 from assembly.exchange.mjcf_expansion import SEQUENCE, UNIT, expanded
+from assembly.exchange.mjcf_joint import at_key, one_freedom, several_freedoms
 from assembly.exchange.mjcf_mass import MassRules, body_of, shape_mass, written_mass
 from assembly.exchange.mjcf_orientation import Angles, orientation, site_pose
-from assembly.exchange.mjcf_ties import Ties
-from assembly.exchange.orientation import from_quaternion
+from assembly.exchange.mjcf_ties import LOADED, Ties
 from assembly.exchange.xml_file import Node, counted, placed, read_xml
 from forcefit.inputs.errors import nearest, quoted
 
@@ -43,6 +39,7 @@ _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "defa
              "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
              "tendon", "actuator")  # fmt: skip
 _READ = ("name", "type", "pos", "axis", "ref", "class")  # of a joint
+_SPRING = ("stiffness", "springref")
 _COUNTS = {"ball": 4, "free": 7}  # of a joint's numbers in a key
 
 
@@ -112,12 +109,15 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     ties.tendons()
     joints = _at_key(root, reading, order)
     left_out = tuple(line for k, v in reading.extra.items() for line in counted(k, v))
+    free = [name for name, kind in reading.coordinates.items() if kind == "free"]
+    floating = counted("free joints that no loop ties to the ground", free)
     unweighed = tuple(reading.unweighed)
     if unweighed and reading.rules.total > 0:  # all masses depend on theirs
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
         platform=_platform(root, reading), unweighed=unweighed,
+        taken=() if closed else floating,
     )  # fmt: skip
     return with_loops(mechanism, loops, reading.parts, driven)
 
@@ -260,44 +260,19 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
         kind = "free"
         if inner.tag == "joint":
             kind = _KINDS[given.choice("type", tuple(_KINDS), "hinge")]
+            simple = kind != "ball" and len(given.optional("stiffness").split()) < 2
+            read = (*_READ, *_SPRING) if simple else _READ
             for key in given.element.attrib:
-                if key not in _READ:
-                    reading.extra.setdefault(f"joint {key}", []).append(name)
+                if key not in read:
+                    what = f"joint {key}{LOADED if key in _SPRING else ''}"
+                    reading.extra.setdefault(what, []).append(name)
         reading.coordinates[name] = kind
         if kind in _COUNTS:
-            yield from _several(given, name, kind, at, reading)
+            several = several_freedoms(given, name, kind, at.offset)
         else:
-            yield _one(given, name, kind, at)
-            reading.parts[name] = [name]
-
-
-def _several(
-    given: Node, name: str, kind: str, at: _Place, reading: _Reading
-) -> Iterator[Joint]:
-    """A ball joint, or the six freedoms of a body that nothing holds."""
-    freedoms = ball() if kind == "ball" else slides() + ball()
-    anchor = np.eye(4)
-    if kind == "ball":
-        anchor = at.offset @ placed(given.numbers("pos", 3, "m", _ZERO), np.eye(3))
-    reading.parts[name] = [f"{name}.{part}" for part, _, _ in freedoms]
-    for i, (part, one, axis) in enumerate(freedoms):
-        yield Joint(
-            f"{name}.{part}", one, "", "",
-            placement=anchor if i == 0 else HERE, axis=axis,
-            after=np.linalg.inv(anchor) if i == len(freedoms) - 1 else HERE,
-        )  # fmt: skip
-
-
-def _one(given: Node, name: str, kind: str, at: _Place) -> Joint:
-    """A hinge or a slide."""
-    pos = given.numbers("pos", 3, "m", _ZERO)
-    anchor = at.offset @ placed(pos, np.eye(3))
-    axis = given.unit_vector("axis", np.array([0.0, 0.0, 1.0]))
-    ref = given.number("ref", "angle or m", 0.0)
-    ref *= at.angles.unit if kind == "revolute" else 1.0
-    joint = Joint(name, kind, "", "", anchor, axis, np.linalg.inv(anchor))
-    # the coordinate at rest is ref: the joint's own zero lies before it
-    return replace(joint, placement=anchor @ motion(joint, -ref), position=ref)
+            several = [one_freedom(given, name, kind, at.offset, at.angles.unit)]
+        reading.parts[name] = [joint.name for joint in several]
+        yield from several
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
@@ -320,23 +295,7 @@ def _at_key(
         moved, at = list(joints), 0
         for name, count in counts.items():
             i = place[reading.parts[name][0]]
-            moved[i] = _moved(key, moved[i], values[at : at + count])
+            moved[i] = at_key(key, moved[i], values[at : at + count])
             at += count
         joints = tuple(moved)
     return joints
-
-
-def _moved(key: Node, joint: Joint, values: NDArray) -> Joint:
-    """A joint at its numbers of a key; the first of several takes up their motion."""
-    if len(values) == 1:
-        return replace(joint, position=float(values[0]))
-    quaternion = values[-4:]
-    if not quaternion.any():
-        raise key.bad("qpos", f"found a quaternion of zero for {quoted(joint.name)}")
-    turn = placed(
-        values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
-    )
-    # a free body's numbers are its place in the world, a ball's its turn from rest
-    return replace(
-        joint, placement=turn if len(values) == 7 else joint.placement @ turn
-    )

@@ -15,13 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import WORLD, Coupling, Loop
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    WORLD,
+    Loop,
+)
 from assembly.exchange.orientation import from_quaternion
 from assembly.exchange.xml_file import Node, placed
 from forcefit.inputs.errors import nearest, quoted
 from stiffness.screws import transform
 
-_LOADED = "not converted, though it may carry load"
+LOADED = ", not converted, though it may carry load"
 _DRIVEN_BY = ("joint", "jointinparent")
 
 
@@ -156,7 +160,7 @@ class Ties:
                 if key is None:
                     held = [k for k in ("tendon", "site", "body", "cranksite")
                             if node.has(k)]  # fmt: skip
-                    what = f"actuator of a {held[0] if held else node.tag}, {_LOADED}"
+                    what = f"actuator of a {held[0] if held else node.tag}{LOADED}"
                     self.leave_out(what, _name(node, held))
                     continue
                 name = node.text(key)
@@ -172,12 +176,10 @@ class Ties:
         """Leave out tendons and what holds them, by name."""
         for group in self.root.children("tendon"):
             for node in group.children():
-                self.leave_out(
-                    f"tendon, {_LOADED}", f"{node.tag} {_name(node)}".strip()
-                )
+                self.leave_out(f"tendon{LOADED}", f"{node.tag} {_name(node)}".strip())
         for node in self.equalities:
             if node.tag == "tendon":
-                self.leave_out(f"equality tendon, {_LOADED}", _name(node, ["tendon1"]))
+                self.leave_out(f"equality tendon{LOADED}", _name(node, ["tendon1"]))
 
 
 def _polynomial(node: Node) -> list[float]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from assembly.exchange.coupling import leaders_first
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
@@ -17,27 +18,23 @@ from assembly.exchange.mechanism import (
     Joint,
     Loop,
     Mechanism,
-    leaders_first,
     parents_first,
 )
 from assembly.exchange.sdf_frames import (
     FRAMES,
     MODEL,
     Frames,
-    Named,
     frames_of,
-    only_model,
 )
 from assembly.exchange.sdf_joint import joint_couplings, joint_ends, joint_parts
 from assembly.exchange.sdf_mass import link_body
-from assembly.exchange.ties import refuse_ties
+from assembly.exchange.ties import may_tie, refuse_ties
 from assembly.exchange.xml_file import Node, counted, read_xml
 from forcefit.inputs.errors import BadInput
 
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
          "link": ("pose", "inertial")}  # fmt: skip
 _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
-_OLD = 1.4  # until which axes are seen from the model
 
 
 def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
@@ -55,11 +52,8 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
         BadInput: a rule of the format is broken, or a joint is of no known type.
     """
     root = read_xml(path, "sdf")
-    model = only_model(root)
-    frames = frames_of(model)
-    for world in root.children("world"):
-        for node in world.children("joint"):
-            frames.named[node.text("name")] = Named(node, "")
+    frames = frames_of(root)
+    model = frames.model
     made = {name: link_body(frames, name, named) for name, named in frames.of("link")}
     if not made:
         raise BadInput(f"{path}: link: missing; expected at least one")
@@ -73,8 +67,7 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     held = []
     if stands_off and not tied:
         held = [Joint(f"{first}.joint", "fixed", WORLD, first, frames.pose(first))]
-    old = _version(root) <= _OLD
-    tree, parts, closed = _tree(frames, ends, bodies, first, held, old)
+    tree, parts, closed = _tree(frames, ends, bodies, first, held)
     base, order = parents_first(tree, bodies, str(path))
     couplings = [
         coupling
@@ -90,17 +83,9 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     return with_loops(mechanism, loops, parts, set())
 
 
-def _version(root: Node) -> float:
-    """Of the format; of none given the newest."""
-    try:
-        return float(root.optional("version"))
-    except ValueError:
-        return 2.0
-
-
 def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
-    first: str, held: list[Joint], old: bool,
+    first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
     """Joints that reach every body from the root, and loops of the others."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
@@ -118,13 +103,24 @@ def _tree(
             loops.append(Loop(name, tip, child))
         carried = tip or (parent if backwards else child)
         several, between = joint_parts(
-            frames, name, frames.named[name], ends[name], carried, backwards, old
+            frames, name, frames.named[name], ends[name], carried, backwards
         )
         reached |= {parent, child}
         bodies |= {body.name: body for body in between}
         parts[name] = [joint.name for joint in several]
         tree += several
     return tree, parts, loops
+
+
+def _of_axis(joint: Node, tag: str, part: Node) -> str:
+    """What of an axis is left out, in words, empty if it is converted."""
+    spring = part.child("spring_stiffness")
+    several = tag == "axis2" or joint.child("axis2") is not None
+    if several and spring is not None and spring.number("", "-") > 0:
+        return f"joint axis {part.tag}, not converted, though it may carry load"
+    springs_alone = all(one.tag.startswith("spring_") for one in part.children())
+    held = part.tag in _HELD_OF_AXIS or (part.tag == "dynamics" and springs_alone)
+    return "" if held else f"joint axis {part.tag}"
 
 
 def _taken(words: dict[str, str]) -> Iterator[str]:
@@ -145,11 +141,14 @@ def _left_out(frames: Frames) -> Iterator[str]:
         extra.setdefault(what, []).append(name)
 
     links = {name for name, _ in frames.of("link")} - {WORLD}
+    tied = {name for name, _ in frames.of("frame")}
+    joints = {name for name, _ in frames.of("joint")}
     for _, model in frames.of("model"):
         for node in model.node.children():
-            if node.tag not in (*FRAMES, "pose", "static", "model"):
-                refuse_ties(node, links)
-                add(f"element {node.tag}", node.optional("name"))
+            if node.tag not in (*FRAMES, "pose", "static", "model", "include"):
+                owners = {k: frames.link(k) for k in frames.named if k in tied}
+                refuse_ties(node, {**owners, **{link: link for link in links}})
+                add(f"element {node.tag}{may_tie(node, joints)}", node.optional("name"))
     for tag, held in _HELD.items():
         for name, named in frames.of(tag):
             for inner in named.node.children():
@@ -159,7 +158,8 @@ def _left_out(frames: Frames) -> Iterator[str]:
                     add("moments of inertia", name)
                 elif inner.tag in {"axis", "axis2"}:
                     for part in inner.children():
-                        if part.tag not in _HELD_OF_AXIS:
-                            add(f"joint axis {part.tag}", name)
+                        what = _of_axis(named.node, inner.tag, part)
+                        if what:
+                            add(what, name)
     for what, names in extra.items():
         yield from counted(what, names)

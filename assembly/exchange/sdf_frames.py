@@ -9,18 +9,21 @@ Sources:
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import WORLD
 from assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw
-from assembly.exchange.xml_file import Node, placed
+from assembly.exchange.xml_file import Node, placed, read_xml
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MODEL = "__model__"
 FRAMES = ("link", "joint", "frame")
+_AROUND = f"{WORLD}::"
 _NESTED = 20  # models inside models
+_OLD = 1.4  # version until which axes are seen from the model
 
 
 @dataclass(frozen=True)
@@ -29,11 +32,14 @@ class Named:
 
     Attributes:
         node: of a link, joint, frame or model.
-        scope: empty in the outermost model, such as ``"arm::"`` in one inside.
+        scope: empty in the outermost model, such as ``"arm::"`` in one inside,
+            ``"world::"`` in the world around it.
+        old: whether its file is of a version in which axes are seen from the model.
     """
 
     node: Node
     scope: str
+    old: bool = False
 
 
 @dataclass
@@ -56,14 +62,14 @@ class Frames:
 
     def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
         """The name from outside of a name in a model, or an error of an element."""
-        if name == WORLD:
+        if name == WORLD or (name, scope) == (MODEL, _AROUND):
             return WORLD
         own = f"{self.model.optional('name')}::"
         for full in (scope + name, f"{scope}{name}::{MODEL}"):
             if full in self.named:
                 return full
-        if not scope and own != "::" and name.startswith(own):
-            return self.name(name.removeprefix(own), scope, node, key)
+        if scope in {"", _AROUND} and own != "::" and name.startswith(own):
+            return self.name(name.removeprefix(own), "", node, key)
         here = [k.removeprefix(scope) for k in self.named if k.startswith(scope)]
         hint = nearest(name, [k for k in here if not k.endswith(MODEL)])
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
@@ -96,8 +102,6 @@ class Frames:
         node = self.named[name].node
         if node.tag == "joint":
             return word(node, "child")
-        if node.tag == "model" and name == MODEL:
-            return WORLD
         return (node.optional("attached_to") if node.tag == "frame" else "") or MODEL
 
     def link(self, name: str, asked: tuple[str, ...] = ()) -> str:
@@ -125,41 +129,114 @@ class Frames:
         raise model.bad("link", "missing; expected at least one")
 
 
-def frames_of(model: Node) -> Frames:
-    """All named frames of a model.
+def frames_of(root: Node) -> Frames:
+    """All named frames of a file's one model, and of the world around it.
 
     Args:
-        model: its element.
+        root: ``<sdf>``.
 
     Returns:
         The frames, none placed yet.
 
     Raises:
-        BadInput: a name is missing or found twice, or a model is in another file.
+        BadInput: a name is missing or found twice, or not one model is there.
     """
+    worlds = list(root.children("world"))
+    models = [m for group in (root, *worlds) for m in group.children("model")]
+    if not models:  # one that is elsewhere
+        given = [i for group in (root, *worlds) for i in group.children("include")]
+        models = given if len(given) == 1 else []
+    if len(models) != 1:
+        raise BadInput(f"{root.file}: found {len(models)} models, expected exactly one")
+    model, old = models[0], _is_old(root)
+    if model.tag == "include":
+        model, old = included(model)
     frames = Frames(model)
-    _gather(frames, model, "", "")
+    for node in (inner for world in worlds for inner in world.children()):
+        if node.tag in {"frame", "joint"}:
+            _take(frames, node, _AROUND, node.text("name"), old)
+    _gather(frames, model, "", _AROUND, old)
     return frames
 
 
-def _gather(frames: Frames, model: Node, scope: str, outer: str) -> None:
+def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
     """Take up what a model holds, models inside it too."""
     if scope.count("::") > _NESTED:
         raise model.bad("", f"found models more than {_NESTED} deep")
-    frames.named[scope + MODEL] = Named(model, outer)
-    for node in model.children():
-        if node.tag == "include":
-            raise node.bad("", "found it; expected the model written out in one file")
+    frames.named[scope + MODEL] = Named(model, outer, old)
+    nodes = sorted(model.children(), key=lambda node: node.tag != "link")
+    for node in nodes:
         if node.tag in FRAMES:
-            name = scope + node.text("name")
-            if name in frames.named:
+            _take(frames, node, scope, node.text("name"), old)
+            continue
+        inside, its = (node, old) if node.tag == "model" else (None, old)
+        if node.tag == "include":
+            inside, its = included(node)
+        if inside is not None:
+            within = f"{scope}{inside.text('name')}::"
+            if within + MODEL in frames.named:
                 raise node.bad("name", "found it twice; expected names that differ")
-            frames.named[name] = Named(node, scope)
-        elif node.tag == "model":
-            inside = f"{scope}{node.text('name')}::"
-            if inside + MODEL in frames.named:
-                raise node.bad("name", "found it twice; expected names that differ")
-            _gather(frames, node, inside, scope)
+            _gather(frames, inside, within, scope, its)
+
+
+def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
+    """Take up a link, joint or frame; a link's name counts before a joint's."""
+    full = scope + name
+    if full in frames.named and frames.named[full].node.tag != node.tag:
+        full += f"_{node.tag}"  # as libsdformat renames it
+    if full in frames.named:
+        raise node.bad("name", "found it twice; expected names that differ")
+    frames.named[full] = Named(node, scope, old)
+
+
+def _is_old(root: Node) -> bool:
+    """Whether a file is of a version in which axes are seen from the model."""
+    try:
+        return float(root.optional("version")) <= _OLD
+    except ValueError:
+        return False
+
+
+def included(node: Node) -> tuple[Node, bool]:
+    """The model of a file that another includes, and whether that is an old one.
+
+    Args:
+        node: ``<include>``, whose address is a file or folder beside its own file's
+            folder or beside one of the folders around it.
+
+    Returns:
+        The model with the name, pose and placement frame of the include.
+
+    Raises:
+        BadInput: no such file is there, or it is no file of one model.
+    """
+    if node.optional("merge") in {"true", "1"}:
+        raise node.bad("merge", "found it; expected a model with names of its own")
+    address = word(node, "uri")
+    path = address.removeprefix("model://").removeprefix("file://")
+    folder = Path(node.file).absolute().parent
+    around = [folder, *folder.parents[:2]] if not Path(path).is_absolute() else [folder]
+    places = [place / path for place in around]
+    places = [p / "model.sdf" if p.is_dir() else p for p in places]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        raise node.bad("uri", f"found {quoted(address)}, no file or folder near this")
+    root = read_xml(found, "sdf")
+    models = list(root.children("model"))
+    if len(models) != 1:
+        raise BadInput(f"{found}: found {len(models)} models, expected exactly one")
+    element = models[0].element
+    for tag in ("name", "placement_frame"):
+        inner = node.child(tag)
+        if inner is not None and inner.content:
+            element.set(tag, inner.content)
+    pose = node.child("pose")
+    if pose is not None:
+        own = element.find("pose")
+        if own is not None:
+            element.remove(own)
+        element.append(pose.element)
+    return models[0], _is_old(root)
 
 
 def word(node: Node, tag: str) -> str:
@@ -208,21 +285,3 @@ def own_pose(node: Node) -> NDArray:
     degrees = node.optional("degrees") in {"true", "1"}
     turn = values[3:] * (math.pi / 180 if degrees else 1.0)
     return placed(values[:3], from_roll_pitch_yaw(turn))
-
-
-def only_model(root: Node) -> Node:
-    """The model of a file, its world or none around it.
-
-    Args:
-        root: ``<sdf>``.
-
-    Returns:
-        Its one model.
-
-    Raises:
-        BadInput: none or several.
-    """
-    models = [m for g in (root, *root.children("world")) for m in g.children("model")]
-    if len(models) != 1:
-        raise BadInput(f"{root.file}: found {len(models)} models, expected exactly one")
-    return models[0]

@@ -5,10 +5,18 @@ Sources:
     model's frame, until 1.6 ``use_parent_model_frame`` says so, then ``expressed_in``.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import Body, Coupling, Joint, ball, chain
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    Body,
+    Joint,
+    ball,
+    chain,
+)
 from assembly.exchange.orientation import onto
 from assembly.exchange.sdf_frames import MODEL, Frames, Named, word
 from assembly.exchange.xml_file import Node
@@ -47,7 +55,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
 
 def joint_parts(
     frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
-    backwards: bool = False, old: bool = False,
+    backwards: bool = False,
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
     """A joint as joints of one freedom, from the child to the parent if backwards.
 
@@ -58,7 +66,6 @@ def joint_parts(
         ends: links of parent and child.
         carried: name of the body that stands on it.
         backwards: whether the tree reaches the child first.
-        old: whether the file is of 1.4 or before.
 
     Returns:
         The joints and the bodies between them.
@@ -69,7 +76,7 @@ def joint_parts(
     node = named.node
     kind = node.choice("type", _KINDS, "")
     at = frames.pose(name)
-    axes = [_axis(frames, named, tag, at, old) for tag in ("axis", "axis2")]
+    axes = [_axis(frames, named, tag, at) for tag in ("axis", "axis2")]
     freedoms = {
         "fixed": [("", "fixed", np.array(_Z))],
         "prismatic": [("", "prismatic", axes[0])],
@@ -88,18 +95,37 @@ def joint_parts(
     after = np.linalg.inv(at) @ frames.pose(child)
     if len(parts) == 1:
         ((_, one, axis),) = parts
-        return [Joint(name, one, parent, carried, placement, axis, after)], []
+        joint = Joint(name, one, parent, carried, placement, axis, after)
+        return [_with_spring(joint, node)], []
     return chain(name, parent, carried, placement, after, parts)
 
 
-def _axis(frames: Frames, named: Named, tag: str, at: NDArray, old: bool) -> NDArray:
+def _with_spring(joint: Joint, node: Node) -> Joint:
+    """The joint with the spring of its axis."""
+    axis = node.child("axis")
+    dynamics = None if axis is None else axis.child("dynamics")
+    if dynamics is None:
+        return joint
+    return replace(
+        joint,
+        stiffness=_number(dynamics, "spring_stiffness", 0.0),
+        rest=_number(dynamics, "spring_reference", 0.0),
+    )
+
+
+def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
     """(3,) direction in the joint's axes."""
     axis = named.node.child(tag)
     if axis is None:
         return np.array(_Z)
     xyz, in_model = axis.child("xyz"), axis.child("use_parent_model_frame")
     seen_from = "" if xyz is None else xyz.optional("expressed_in")
-    if in_model is None and old or in_model and in_model.content in {"1", "true"}:
+    if (
+        in_model is None
+        and named.old
+        or in_model
+        and in_model.content.lower() in {"1", "true"}
+    ):
         seen_from = seen_from or MODEL
     vector = np.array(_Z) if xyz is None or not xyz.content else xyz.unit_vector("")
     if not seen_from:
@@ -157,7 +183,7 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
     raise mimic.bad("axis", f"found {quoted(tag)}, no axis of {quoted(parts[0])}")
 
 
-def _number(mimic: Node, key: str, default: float) -> float:
+def _number(node: Node, key: str, default: float) -> float:
     """A number of an element inside."""
-    inner = mimic.child(key)
+    inner = node.child(key)
     return default if inner is None else inner.number("", "-")

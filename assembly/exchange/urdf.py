@@ -10,19 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
+from assembly.exchange.coupling import Coupling, leaders_first
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
     HERE,
     Body,
-    Coupling,
     Joint,
     Mechanism,
     chain,
-    leaders_first,
     parents_first,
 )
-from assembly.exchange.ties import refuse_ties
+from assembly.exchange.ties import may_tie, refuse_ties
 from assembly.exchange.urdf_joint import joint_freedoms, pose_of
 from assembly.exchange.urdf_loops import with_closing_joints
 from assembly.exchange.xml_file import Node, counted, read_xml
@@ -146,6 +145,10 @@ def _left_out(
 ) -> tuple[str, ...]:
     """What a URDF says and a robot of frames cannot hold."""
     links = list(root.children("link"))
+    owners = {name: name for name in bodies}
+    # Drake's frames on links
+    owners |= {f.optional("name"): f.optional("link") for f in root.children("frame")}
+    named = {*bodies, *(joint.text("name") for joint in joints)}
     extra: dict[str, list[str]] = {}
     for joint in joints:
         for inner in joint.children():
@@ -163,6 +166,10 @@ def _left_out(
         if other.tag.split(":")[-1] not in _CONVERTED:
             for inner in other.children() if other.tag == "gazebo" else (other,):
                 if inner.tag != "joint":
-                    refuse_ties(inner, bodies)
+                    refuse_ties(inner, owners)
+                said = may_tie(inner, named)
+                if said:
+                    name = inner.optional("name") or other.optional("reference")
+                    extra.setdefault(f"{inner.tag}{said}", []).append(name)
             extra.setdefault(f"element {other.tag}", []).append("")
     return tuple(line for what, names in extra.items() for line in counted(what, names))

@@ -182,6 +182,14 @@ def test_other_files_are_included(tmp_path):
         read_mjcf(path)
 
 
+def test_a_body_that_nothing_ties_is_said_to_float(tmp_path):
+    text = """<worldbody><body name="p">[M]<freejoint name="f"/><body name="q">[M]
+        <joint/></body></body></worldbody>"""
+    answer = convert(file_of(tmp_path, text), tmp_path / "robot.toml")
+    assert "free joints that no loop ties to the ground: 1 (f)" in answer.taken
+    assert len([f for f in answer.robot.frames if f.joint != "fixed"]) == 7
+
+
 def test_masses_are_scaled_to_their_total(tmp_path):
     """1 and 3 kg to 10 kg; MuJoCo warns about this key, so it is not asked here."""
     text = """<compiler settotalmass="10"/><worldbody><body name="a">[M]<joint/>

@@ -82,6 +82,49 @@ def test_poses_lead_through_models_and_frames(tmp_path):
     assert mechanism.root == WORLD
 
 
+def test_a_model_of_another_file_keeps_its_own_version(tmp_path):
+    """A hand of version 1.4, whose axis is seen from the hand, turned by 90 degrees
+    about x; the same robot written out, in which the axis says so itself."""
+    hand = (
+        f"""<link name="palm"/>{TILTED}{joint("j", "palm", "arm", Z_UP.format(""))}"""
+    )
+    folder = tmp_path / "hand"
+    folder.mkdir()
+    (folder / "model.sdf").write_text(
+        f'<sdf version="1.4"><model name="any"><pose>9 9 9 0 0 0</pose>{hand}'
+        "</model></sdf>"
+    )
+    pose = '<pose degrees="true">0 0 1 90 0 0</pose>'
+    text = f"""{ARM}<include><uri>model://hand</uri><name>grip</name>{pose}</include>
+        {joint("w", "base", "grip::palm", "", "fixed")}"""
+    mechanism = model(tmp_path, text)
+    assert axis_in_world(mechanism, "grip::j") == pytest.approx([0, -1, 0])
+    poses = body_poses(mechanism, mechanism.home)
+    assert poses["grip::arm"][:3, 3] == pytest.approx([0.3, 0, 1])
+
+
+def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(
+        f"""<sdf version="1.9"><world name="w"><frame name="table">
+        <pose>0 0 0.7 0 0 0</pose></frame><frame name="spot" attached_to="table">
+        <pose>1 0 0 0 0 0</pose></frame><model name="m"><pose relative_to="spot"/>
+        <link name="base"/><link name="arm"/>{joint("j", "base", "arm")}</model>
+        <joint name="bolt" type="fixed"><parent>world</parent><child>m::base</child>
+        </joint></world></sdf>"""
+    )
+    mechanism = read_sdf(path)
+    poses = body_poses(mechanism, mechanism.home)
+    assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
+
+
+def test_a_joint_may_share_a_link_s_name(tmp_path):
+    mechanism = model(
+        tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
+    )
+    assert {one.name for one in mechanism.joints} == {"fix", "arm_joint"}
+
+
 def test_joints_stand_on_frames_and_close_loops(tmp_path):
     """Grashof's four-bar, as a parallelogram: its coupler only shifts."""
     text = (
@@ -182,7 +225,10 @@ def test_axes_follow_axes(tmp_path):
             'drake:linear_bushing_rpy: found it between "base" and "a": it may tie',
         ),
         (joint("j", "base", "frme") + '<frame name="frame"/>', 'did you mean "frame"?'),
-        ("<include><uri>model://x</uri></include>", "include: found it; expected"),
+        (
+            "<include><uri>model://x</uri></include>",
+            'include.uri: found "model://x", no file or folder near this',
+        ),
         (
             '<link name="a"><inertial auto="true"/><collision name="c"><geometry>'
             "<mesh/></geometry></collision></link>" + joint("j", "base", "a"),

@@ -203,6 +203,12 @@ TIE = '<constraint type="rod"><from body="a"/><to body="c"/></constraint>'
     [
         (joint("k", "b", "c", Z) + TIE, 'constraint: found it between "a" and "c"'),
         (
+            joint("k", "b", "c", Z) + '<frame name="fa" link="a"/><frame name="fc" '
+            'link="c"/><drake:linear_bushing_rpy><drake:bushing_frameA name="fa"/>'
+            '<drake:bushing_frameC name="fc"/></drake:linear_bushing_rpy>',
+            'linear_bushing_rpy: found it between "fa" and "fc": it may tie them',
+        ),
+        (
             joint("k", "b", "c", Z) + f"<gazebo>{TIE}</gazebo>",
             'constraint: found it between "a" and "c"',
         ),
@@ -237,6 +243,17 @@ def test_what_cannot_be_converted_is_refused_by_name(text, message, tmp_path):
     with pytest.raises(BadInput) as error:
         read_urdf(path)
     assert message in str(error.value)
+
+
+def test_what_a_plugin_or_a_spring_of_gazebo_may_tie_is_said(tmp_path):
+    text = joint("j", "a", "b", Z) + joint("k", "b", "c", Z)
+    text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
+        </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>
+        <gazebo reference="k"><springStiffness>5</springStiffness></gazebo>"""
+    left_out = read_urdf(file_of(tmp_path, text, "abc")).left_out
+    tie = "plugin, not converted, though it may tie or move what it names: 1 (p)"
+    assert tie in left_out
+    assert "springStiffness, not converted, though it may carry load: 1 (k)" in left_out
 
 
 def test_a_loop_between_a_joint_and_its_own_link_is_refused(tmp_path):
