@@ -174,11 +174,24 @@ def guess_platform(mechanism: Mechanism) -> str:
         depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
     if len(depth) == 1:
         raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
-    carriers = {joint.parent for joint in mechanism.joints}
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
-    ends = [name for name in depth if name not in carriers]
+    # what only closes a loop is no body of the robot's own
+    closing = [j for j in mechanism.joints if _closes(j, mechanism)]
+    made = {joint.child for joint in closing}
+    met |= {joint.parent for joint in closing}
+    carriers = {j.parent for j in mechanism.joints if j.child not in made}
+    ends = [name for name in depth if name not in carriers | made]
     free = [name for name in ends if name not in met]
     return max(free or ends, key=lambda name: depth[name])
+
+
+def _closes(joint: Joint, mechanism: Mechanism) -> bool:
+    """Whether a joint is a part of one that closes a loop."""
+    return any(
+        loop.first == f"{loop.name}.tip"
+        and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
+        for loop in mechanism.loops
+    )
 
 
 def _with_ends(mechanism: Mechanism) -> Mechanism:

@@ -181,13 +181,14 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
             held = [one for one in all_of_it if one.get("name") == wanted][:1]
             if not held:
                 raise node.bad(tag, f"found {quoted(node.text(tag))}, no {tag} of it")
-    for default in other.children("default"):
-        default.element.set("class", f"{prefix}main")
-        default.element.set("attached", "true")
-        root.element.append(default.element)
+    # its own defaults, and none of this model's where it has none
+    for default in [d.element for d in other.children("default")] or [
+        Element("default")
+    ]:
+        default.attrib.update({"class": f"{prefix}main", "attached": "true"})
+        root.element.append(default)
     frame = Element("frame", {UNIT: repr(angles.unit), SEQUENCE: angles.sequence})
-    if other.child("default") is not None:
-        frame.set("childclass", f"{prefix}main")
+    frame.set("childclass", f"{prefix}main")
     frame.extend(held)
     for section, tie in _ties_within(other, frame):
         within = Element(section.tag)

@@ -22,6 +22,7 @@ from stiffness.screws import rotation_vector
 AGREED = 1e-9  # [rad, m, kg over the largest] what another program may differ by
 _POSTURES = 20
 _LIGHTEST = 1.01e-6  # [kg] what a body without a mass may get, to be moved at all
+_UNIT_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
@@ -152,12 +153,15 @@ def _bare_urdf(path: Path) -> str:
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
             raise ValueError(f"its URDF has no {element.tag} of this kind")
         if element.tag == "inertia":  # of thin rods refused, and not compared
-            element.attrib.update(ixx="1", iyy="1", izz="1", ixy="0", ixz="0", iyz="0")
+            element.attrib.update(_UNIT_INERTIA)
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
     for key in [key for key in root.attrib if ":" in key or key == "xmlns"]:
         del root.attrib[key]
+    for inertial in root.iter("inertial"):
+        if inertial.find("mass") is not None and inertial.find("inertia") is None:
+            inertial.append(Element("inertia", _UNIT_INERTIA))
     root.append(Element("mujoco"))
     return tostring(root, encoding="unicode")
 

@@ -137,7 +137,8 @@ def test_another_model_is_attached_with_its_own_angles_and_names(tmp_path):
         <weld name="w" body1="y" body2="z"/><connect name="c" body1="y" body2="x"
         anchor="0 0 0"/></equality><actuator><motor name="m" joint="k"/></actuator>
         """, "kid.xml")  # fmt: skip
-    path = file_of(tmp_path, """<asset><model name="kid" file="kid.xml"/></asset>
+    path = file_of(tmp_path, """<default><joint axis="0 1 0"/></default>
+        <asset><model name="kid" file="kid.xml"/></asset>
         <worldbody><body name="a" pos="1 0 0" euler="0 0 90"><geom size="0.1"/>
         <attach model="kid" body="x" prefix="L_"/></body><frame pos="2 0 0">
         <attach model="kid" prefix="R_"/></frame></worldbody>""")  # fmt: skip
@@ -156,9 +157,10 @@ def test_copies_of_an_attached_model_keep_what_ties_it(tmp_path):
         </body></body></worldbody><equality><connect name="c" body1="y" body2="x"
         anchor="0 0 0.1"/></equality><actuator><motor name="m" joint="k"/></actuator>
         """, "kid.xml")  # fmt: skip
-    path = file_of(tmp_path, """<asset><model name="kid" file="kid.xml"/></asset>
-        <worldbody><replicate count="2" offset="1 0 0" sep="-"><attach model="kid"
-        prefix="p_"/></replicate></worldbody>""")  # fmt: skip
+    path = file_of(tmp_path, """<default><joint axis="0 1 0"/></default>
+        <asset><model name="kid" file="kid.xml"/></asset><worldbody>
+        <replicate count="2" offset="1 0 0" sep="-"><attach model="kid" prefix="p_"/>
+        </replicate></worldbody>""")  # fmt: skip
     mechanism = read_mjcf(path)
     answer = compare(mechanism, path)
     assert (answer.why_not, answer.bodies, answer.loops) == ("", 4, 2)

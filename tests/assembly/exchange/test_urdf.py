@@ -112,6 +112,13 @@ def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
     assert coupler[:3, 3] == pytest.approx(crank, abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", CLOSING)
+def test_no_part_of_a_closing_joint_is_taken_for_the_platform(kind, tmp_path):
+    """The coupler is the end of the longest chain, whatever closes its loop."""
+    answer = convert(four_bar(CLOSING[kind][0], tmp_path), tmp_path / "out.toml")
+    assert answer.robot.platform == "c"
+
+
 def test_joints_of_drake_have_axes_of_their_own(tmp_path):
     """A universal turns about x, then y; a planar slides in x and y."""
     text = joint("u", "a", "b", "", "universal", "drake:joint")
