@@ -77,11 +77,15 @@ TIED_URDF = """
 <child>c</child></joint></gazebo></robot>
 """
 DMIG = """DMIG,KAAX,0,6,2,0
-DMIG,KAAX,1,1,,1,1,8.4+7,,2,1,-8.4+7
-DMIG KAAX 2 1 2 1 8.4E7
+DMIG,KAAX,7,1,,7,1,8.4+7,
+DMIG,KAAX,7,2,,7,2,1.344E+05,,7,6,-3.36E+04,
+DMIG KAAX 7 3 7 3 3.024E5 7 5 7.56E4
+DMIG KAAX 7 4 7 4 646.0
+DMIG,KAAX,7,5,,7,5,2.52E+04,,,+
+DMIG*   KAAX                           7               6
+*                      7               6 1.120000000D+04
 DMIG,K4AAX,0,6,2,0
-DMIG*   K4AAX                          1               1
-*                      1               1 1.680000000D+06
+DMIG,K4AAX,7,1,,7,1,1.6+6
 """
 TARGETS = """robot = "arm.toml"
 unit = "mm"
