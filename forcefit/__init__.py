@@ -23,7 +23,8 @@ _OWNERS = {
     "stiffness.report.library_build": ("build_library",),
     "stiffness.surface.interface": ("Interface", "parse_interface"),
     "assembly.exact.exact": ("solve_exact",),
-    "assembly.files.robot_file": ("read_robot", "write_robot"),
+    "assembly.exchange.convert": ("convert",),
+    "assembly.exchange.robot_files": ("load_robot", "read_robot", "write_robot"),
     "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
     "assembly.linear.energy": ("Assembly", "CannotAssemble", "solve_assembly"),
     "assembly.linear.mobility": ("mobility",),
@@ -38,7 +39,6 @@ _OWNERS = {
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),
-    "assembly.robots": ("load_robot",),
     "assembly.statistics.allocation": ("allocate",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),

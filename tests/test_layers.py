@@ -52,7 +52,7 @@ OWNERS = {
     "pandas": ("assembly/model/tables.py",),
     "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
-    "defusedxml": ("assembly/exchange/xml_file.py",),
+    "mujoco": ("assembly/exchange/mujoco_reading.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # of use to sweeps, statistics, files and drawings, not to one posture

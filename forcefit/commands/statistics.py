@@ -232,7 +232,7 @@ def tolerances(
     """
     from dataclasses import replace
 
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
     from assembly.statistics.replay import journalled

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.posture import POSE
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
-from assembly.robots import BUILT_IN, load_robot
+from assembly.robots import BUILT_IN
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
