@@ -133,6 +133,14 @@ def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
                 check_surface(points, triangles, "cube")
 
 
+def test_a_crowd_of_vertices_is_refused_before_their_pairs_fill_the_memory(rng):
+    """Two billion pairs of 1e-9 m would be 32 GB."""
+    points = np.concatenate([CUBE, 1e-9 * rng.normal(size=(60_000, 3))])
+    triangles = np.concatenate([CUBE_TRIANGLES, np.arange(8, 60_008).reshape(-1, 3)])
+    with pytest.raises(BadInput, match="dust: most of its 60008 vertices are nearer"):
+        check_surface(points, triangles, "dust")
+
+
 def test_a_wall_within_a_part_has_edges_of_three_triangles():
     """Two tetrahedra on one base that is there once."""
     points = np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]])
