@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames
@@ -147,3 +148,60 @@ def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
     expected = r"it moves hinge rz; the platform along \[0 0 1 -0.25 0.5 0\] \[rad, m\]"
     with pytest.raises(FreeMotion, match=expected):
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("cuts", [1, 3])
+def test_a_cantilever_carries_its_weight_at_its_start_and_nothing_at_its_tip(cuts):
+    """q L and q L^2 / 2 at the wall; between pieces of L / 3 what lies beyond."""
+    answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
+    step = L / cuts
+    for k in range(cuts):
+        row = answer.posture.robot.index(f"p{k}")
+        for wrench, beyond in (
+            (answer.tip_wrenches[row], L - step * (k + 1)),
+            (answer.start_wrenches[row], L - step * k),
+        ):
+            expected = [0, Q * beyond**2 / 2, 0, 0, 0, -Q * beyond]
+            scale = [Q * L**2] * 3 + [Q * L] * 3
+            np.testing.assert_allclose(wrench / scale, expected / np.array(scale),
+                                       atol=1e-9)  # fmt: skip
+    assert np.isnan(answer.start_wrenches[0]).all()
+
+
+def beam_on_two_pins():
+    """A beam of 0.8 m along x, free to turn about y at both ends."""
+    turn = [np.pi / 2, 0, 0]
+    link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO)
+    frames = (
+        Frame("a", rotation=turn, joint="revolute"),
+        Frame("b", "a", [L, 0, 0], joint="revolute", link=link),
+        Frame("end", "b"),
+        Frame("ground", translation=[L, 0, 0], rotation=turn),
+    )
+    return Robot("pinned", "end", frames, (("end", "ground"),))
+
+
+def test_a_pin_carries_no_moment_of_a_beams_own_weight():
+    """q L / 2 and no moment at both ends; K_E's own deformation knows q L^2 / 12."""
+    posture = home_posture(beam_on_two_pins())
+    answer = solve_assembly(posture, gravity=[0, 0, -G])
+    row = posture.robot.index("b")
+    half, scale = Q * L / 2, np.array([Q * L**2] * 3 + [Q * L] * 3)
+    up = [0, 0, 0, 0, half, 0]  # the beam's y points up
+    np.testing.assert_allclose(answer.tip_wrenches[row] / scale, up / scale, atol=1e-9)
+    down = [0, 0, 0, 0, -half, 0]
+    start = answer.start_wrenches[row]
+    np.testing.assert_allclose(start / scale, down / scale, atol=1e-9)
+    assert abs(answer.wrenches[row, 2]) == pytest.approx(Q * L**2 / 12, rel=1e-9)
+    np.testing.assert_allclose(
+        answer.tip_wrenches[row], answer.joint_wrenches[row], atol=1e-9 * Q * L
+    )
+
+
+def test_finite_motions_carry_the_same_weight_at_a_pin():
+    """The moment at the tip is zero exactly, the force q L / 2."""
+    posture = home_posture(beam_on_two_pins())
+    exact = solve_exact(posture, gravity=[0, 0, -G])
+    row = posture.robot.index("b")
+    assert np.abs(exact.tip_wrenches[row, :3]).max() < 1e-9 * Q * L**2
+    assert exact.tip_wrenches[row, 4] == pytest.approx(Q * L / 2, rel=1e-3)
