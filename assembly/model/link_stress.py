@@ -142,4 +142,6 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
             peaks[first : first + _CHUNK] = von_mises(stress).max(axis=1)
         return peaks
 
-    return LinkStress(frame.name, row, f"finite elements: {influence.region}", peak)
+    error = f"estimated error {influence.relative_error():.2g}"
+    method = f"finite elements, {error}: {influence.region}"
+    return LinkStress(frame.name, row, method, peak)

@@ -13,6 +13,7 @@ from stiffness.surface.primitives import (
     Cone,
     Plane,
     Shape,
+    Torus,
     fit_cone,
     fit_plane,
     fit_sphere,
@@ -22,6 +23,7 @@ from stiffness.surface.surface import Surface, directed_edges
 
 _SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
 _ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
+_CIRCLES = 4  # of corners about a torus's axis; any three lie on a torus
 _SEEDS = 12  # tries to recognise a shape in the rest of a part
 _TRIES = 120  # on one surface; the rest then keeps its facets
 
@@ -229,9 +231,23 @@ def _fit(graph: _TriangleGraph, part: NDArray) -> Shape | None:
         if len(few) < len(points) and not _lies_on(fit(few, normals), few, graph):
             continue
         shape = fit(points, normals)
-        if _lies_on(shape, points, graph):
+        if _lies_on(shape, points, graph) and _is_certain(shape, points, graph):
             return shape
     return None
+
+
+def _is_certain(shape: Shape, points: NDArray, graph: _TriangleGraph) -> bool:
+    """Whether points are on a torus by no coincidence."""
+    # three coaxial circles are always on one: a shoulder and the first facets of its
+    # fillet are no torus
+    if not isinstance(shape, Torus):
+        return True
+    offset = points - shape.point
+    along = offset @ shape.axis
+    distance = np.linalg.norm(offset - along[:, None] * shape.axis, axis=1)
+    arc = np.sort(shape.tube * np.arctan2(along, distance - shape.radius))
+    circles = 1 + int((np.diff(arc) > 10 * graph.tolerance).sum())
+    return circles >= _CIRCLES
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: _TriangleGraph) -> bool:
