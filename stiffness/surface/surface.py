@@ -17,6 +17,7 @@ UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
 _LARGEST_LINK = 20.0  # [m] diagonal; beyond it the unit is taken to be wrong
 _SMALLEST_LINK = 1e-3  # [m]
+_STATED = "stated in the file"
 _CROWD = 100  # vertices within 1e-7 of the size of one, on the mean; memory grows so
 
 
@@ -125,9 +126,10 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
         raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
     file, solid = named_solid(path)
     points, triangles = _read_triangles(file, solid)
+    scale = UNITS[unit]
     if file.suffix.lower() in STEP:
-        unit = "m"
-    return check_surface(points * UNITS[unit], triangles, str(path), unit)
+        scale, unit = 1.0, _STATED
+    return check_surface(points * scale, triangles, str(path), unit)
 
 
 def _read_triangles(path: Path, solid: str) -> tuple[NDArray, NDArray]:
@@ -199,7 +201,7 @@ def _check_coordinates(
         raise BadInput(f"{name}: {wrong.sum()} vertices are not finite numbers")
     size = math.hypot(*np.ptp(used, axis=0))
     if not _SMALLEST_LINK <= size <= _LARGEST_LINK:
-        hint = "mm" if size > _LARGEST_LINK and unit == "m" else "m"
+        hint = "mm" if size > _LARGEST_LINK and unit in {"m", _STATED} else "m"
         raise BadInput(
             f'{name}: the part is {size:.4g} m across with unit = "{unit}"; '
             f'is the file in "{hint}"?'

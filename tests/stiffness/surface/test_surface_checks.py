@@ -80,6 +80,19 @@ def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
     assert tenth == pytest.approx(0.1 * read_surface("bar.stp", "dm").diagonal)
 
 
+@pytest.mark.parametrize(("size", "unit"), [(1e-4, "m"), (100.0, "mm")])
+def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkeypatch):
+    """A part of 0.1 m whose numbers are metres under the head of millimetres."""
+    points, triangles = cylinder(0.2 * size, size)
+    monkeypatch.setattr(
+        surface_module, "_read_triangles", lambda *_: (points, triangles)
+    )
+    with pytest.raises(
+        BadInput, match=f'"stated in the file"; is the file in "{unit}"'
+    ):
+        read_surface("bar.step", "inch")
+
+
 @pytest.mark.parametrize("corner", [-1, 8])
 def test_a_corner_beyond_the_points_is_refused(corner):
     wrong = CUBE_TRIANGLES.copy()
