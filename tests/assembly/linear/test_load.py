@@ -168,6 +168,38 @@ def test_a_cantilever_carries_its_weight_at_its_start_and_nothing_at_its_tip(cut
     assert np.isnan(answer.start_wrenches[0]).all()
 
 
+def test_a_bent_chains_links_hand_on_what_lies_beyond(rng):
+    """Three beams in any directions: at each start the weights and moments of all that
+    lies beyond, the tip's load among them; at each tip the next one's start."""
+    link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
+    frames = tuple(
+        Frame(f"p{k}", f"p{k - 1}" if k else "base", rng.normal(size=3),
+              rng.normal(size=3), link=link)
+        for k in range(3)
+    )  # fmt: skip
+    robot = Robot("bent", "p2", frames)
+    posture, load = home_posture(robot), rng.normal(size=6) * [1, 1, 1, 9, 9, 9]
+    gravity = rng.normal(size=3)
+    answer = solve_assembly(posture, load, gravity=gravity)
+    T = posture.transforms
+    origins = np.concatenate([np.zeros((1, 3)), T[:, :3, 3]])
+    for k in range(3):
+        R, arm = T[k, :3, :3], origins[3] - origins[k]
+        force, moment = load[3:].copy(), load[:3] + np.cross(arm, load[3:])
+        for i in range(k, 3):
+            span = origins[i + 1] - origins[i]
+            W = RHO * 6e-4 * np.linalg.norm(span) * gravity
+            force += W
+            moment += np.cross((origins[i] + origins[i + 1]) / 2 - origins[k], W)
+        start = answer.start_wrenches[k]
+        np.testing.assert_allclose(R @ start[3:], force, rtol=1e-9)
+        np.testing.assert_allclose(R @ start[:3], moment, rtol=1e-9, atol=1e-9)
+        if k:
+            before, tip = T[k - 1, :3, :3], answer.tip_wrenches[k - 1]
+            np.testing.assert_allclose(before @ tip[3:], force, rtol=1e-9)
+            np.testing.assert_allclose(before @ tip[:3], moment, rtol=1e-9, atol=1e-9)
+
+
 def beam_on_two_pins():
     """A beam of 0.8 m along x, free to turn about y at both ends."""
     turn = [np.pi / 2, 0, 0]
