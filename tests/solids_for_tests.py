@@ -34,6 +34,41 @@ def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
     return points, triangles
 
 
+def shouldered_shaft(large, small, fillet, around, rows, step=(0.05, 0.12)):
+    """Points and triangles of a shaft along z whose radius steps down at a fillet.
+
+    Rings about 4 mm apart, each turned by half a facet against the one before.
+    """
+    shoulder, end = step
+    turn = np.linspace(0, np.pi / 2, rows + 1)
+    arc = np.column_stack([small + fillet - fillet * np.sin(turn),
+                           shoulder + fillet - fillet * np.cos(turn)])  # fmt: skip
+    outline = np.array([[large, 0], [large, shoulder], *arc, [small, end]])
+    rings = [outline[:1]]
+    for a, b in zip(outline, outline[1:], strict=False):
+        count = max(1, round(float(np.linalg.norm(b - a)) / 0.004))
+        rings.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
+    profile = np.concatenate(rings)
+    number = np.arange(around)
+    angle = 2 * np.pi / around * (number + 0.5 * (np.arange(len(profile))[:, None] % 2))
+    height = np.broadcast_to(profile[:, 1:], angle.shape)
+    points = np.stack([profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle),
+                       height], axis=-1).reshape(-1, 3)  # fmt: skip
+    points = np.concatenate([points, [[0, 0, 0], [0, 0, end]]])
+    following, triangles = (number + 1) % around, []
+    for k in range(len(profile) - 1):
+        a, b = k * around + number, k * around + following
+        c, d = a + around, b + around
+        pair = ((a, b, c), (b, d, c)) if k % 2 == 0 else ((a, b, d), (a, d, c))
+        triangles += [np.column_stack(corners) for corners in pair]
+    for tip, ring in ((False, number), (True, number + (len(profile) - 1) * around)):
+        center = np.full(around, len(points) - 2 + tip)
+        other = ring - number + following
+        sides = (center, ring, other) if tip else (center, other, ring)
+        triangles.append(np.column_stack(sides))
+    return points, np.concatenate(triangles)
+
+
 def box_cells(counts):
     """Six tetrahedra in each of nx by ny by nz boxes (Kuhn): grid points and cells."""
     sizes = np.array(counts) + 1

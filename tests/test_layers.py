@@ -32,8 +32,8 @@ SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
     "pytetwild": ("stiffness/mesh/mesh_worker.py",),
     "skfem": ("stiffness/mesh/lagrange.py",),
-    "meshio": ("stiffness/surface/surface_files.py",),
-    "gmsh": ("stiffness/surface/surface_files.py",),
+    "meshio": ("stiffness/surface/surface_worker.py",),
+    "gmsh": ("stiffness/surface/surface_worker.py",),
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
         "assembly/linear/reference.py",

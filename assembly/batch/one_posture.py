@@ -113,7 +113,7 @@ class OnePosture:
         return _solve_draws(self, errors)
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
-        """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
+        """(k, n, 6) [N m, N] of every link's spring, at its frame in its axes."""
         wrenches = np.tensordot(multipliers, self.wrench, axes=(1, 2))
         if self.loads is not None:
             wrenches += self.loads.frame_loads.body.reshape(-1, 6)
@@ -136,6 +136,13 @@ class OnePosture:
         if self.loads is None:
             return solve_assembly(posture)
         return solve_assembly(posture, self.loads.load, gravity=self.loads.gravity)
+
+    @property
+    def at_tips(self) -> NDArray:
+        """(n, 6) [N m, N] the part of :meth:`wrenches` that is links' own weight."""
+        if self.loads is None:
+            return np.zeros((len(self.posture.robot.frames), 6))
+        return self.loads.frame_loads.at_tips
 
 
 def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:

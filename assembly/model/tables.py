@@ -82,7 +82,7 @@ class ForcedAssembly(Protocol):
         """(n, 6) [rad, m]."""
 
     @property
-    def wrenches(self) -> NDArray:
+    def tip_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] through bodies."""
 
     @property
@@ -110,7 +110,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
         "clearance_screw": assembly.clearance_screws,
         "link_screw": assembly.link_screws,
         "joint_screw": assembly.joint_screws,
-        "wrench": assembly.wrenches,
+        "wrench": assembly.tip_wrenches,
         "joint_wrench": assembly.joint_wrenches,
     }
     single = {

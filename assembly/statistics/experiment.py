@@ -185,10 +185,13 @@ class Experiment:
         rows["platform_screw"] = screws
         wrenches = self.energies.wrenches(solved.multipliers)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
-            sizes = np.sqrt((wrenches[..., part] ** 2).sum(axis=-1))
+            through = wrenches[..., part] - self.energies.at_tips[..., part]
+            sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
         if self.links:
-            rows["stress"] = peak_stresses(self.posture.robot, wrenches)
+            rows["stress"] = peak_stresses(
+                self.posture.robot, wrenches, self.energies.at_tips
+            )
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:

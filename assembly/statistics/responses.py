@@ -7,7 +7,7 @@ from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
 from assembly.batch.many_margins import PostureMargins
 from assembly.model.error_distributions import ErrorSources, draw_generator
-from assembly.model.link_stress import LinkStress, stressed_links
+from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
@@ -101,17 +101,21 @@ def _wrench_quantity(
 ) -> tuple[NDArray, NDArray]:
     """The largest moment, force or stress, and its slopes with the wrenches."""
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
+    at_tips = prepared.at_tips
     if key != "stress":
-        sizes, own = _size(wrenches[:, :, _PARTS[key]])
+        sizes, own = _size((wrenches - at_tips)[:, :, _PARTS[key]])
         worst = sizes.argmax(axis=1)
         slopes[draws, worst, _PARTS[key]] = own[draws, worst]
         return sizes[draws, worst], slopes
     links = stressed_links(prepared.posture.robot)
-    peaks = np.stack([link.peak(wrenches[:, link.row]) for link in links], axis=1)
+    each = [link.peak(wrenches[:, link.row], at_tips[link.row]) for link in links]
+    peaks = np.stack(each, axis=1)
     worst = peaks.argmax(axis=1)
     for i, link in enumerate(links):
         some = np.flatnonzero(worst == i)
-        slopes[some, link.row] = _stress_slopes(link, wrenches[some, link.row])
+        slopes[some, link.row] = _stress_slopes(
+            link, wrenches[some, link.row], at_tips[link.row]
+        )
     return peaks[draws, worst], slopes
 
 
@@ -121,7 +125,9 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
 
-def _stress_slopes(link: LinkStress, wrenches: NDArray) -> NDArray:
+def _stress_slopes(
+    link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
+) -> NDArray:
     """(k, 6) slopes of the peak stress with a link's wrench."""
     # differences of the formula, not of the solution: a fibre's stress is the root of
     # a quadratic form, and central differences lose 1e-10 of its slope
@@ -131,6 +137,7 @@ def _stress_slopes(link: LinkStress, wrenches: NDArray) -> NDArray:
         for c in range(part.start, part.stop):
             change = step * np.eye(6)[c]
             slopes[:, c] = (
-                link.peak(wrenches + change) - link.peak(wrenches - change)
+                link.peak(wrenches + change, at_tip)
+                - link.peak(wrenches - change, at_tip)
             ) / (2 * step)
     return slopes

@@ -157,7 +157,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
     force = max(
-        (float(np.linalg.norm(results.assembly.wrenches[i, 3:])), frame.name)
+        (float(np.linalg.norm(results.assembly.tip_wrenches[i, 3:])), frame.name)
         for i, frame in enumerate(results.robot.frames)
     )
     tiles.append(Tile("Force to close it", [Value(force[0], "N")], [
