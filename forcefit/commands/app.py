@@ -130,6 +130,9 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
     # an option misspelt or missing: the parser's own kind of error
     if not hasattr(error, "format_message"):
         raise error
+    if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help
+        print(error.format_message(), file=sys.stderr)
+        return 2
     return _complain(_with_found(error.format_message(), error), 2)
 
 
