@@ -1,9 +1,9 @@
 """C++ of the packages, compiled where a compiler stands.
 
 Libraries are compiled at the first use of one of them, next to each other, for this
-very processor, and kept beside what numba keeps.  A library's name and what it says of
-itself hold a digest of its source, of the compiler's options and of the processor, so
-that none is used that is out of date.
+very processor or for the one that ``FORCEFIT_MARCH`` names, and kept beside what numba
+keeps.  A library's name and what it says of itself hold a digest of its source, of the
+compiler's options and of the processor, so that none is used that is out of date.
 Where no compiler stands, or it fails, there is no library, and callers use numba.
 """
 
@@ -33,8 +33,8 @@ _ROOT = Path(__file__).parents[2]
 # longer); of what -O3 adds only whole loops undone matter to speed, and the rest takes
 # a fifth longer
 _OPTIONS = (
-    "-std=c++17", "-O2", "-fpeel-loops", "-march=native", "-ffp-contract=off",
-    "-fno-math-errno", "-fvisibility=hidden", "-shared", "-fPIC",
+    "-std=c++17", "-O2", "-fpeel-loops", "-ffp-contract=off", "-fno-math-errno",
+    "-fvisibility=hidden", "-shared", "-fPIC",
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
 # what nearly every command that needs one of them needs
@@ -190,11 +190,16 @@ def digest_of(source: str) -> str:
     Returns:
         16 hexadecimal digits.
     """
-    parts = [" ".join(_OPTIONS), _processor()]
+    parts = [" ".join(_options()), _processor()]
     package = _ROOT / Path(source).parts[0]
     for file in (_ROOT / source, *sorted(package.glob("*/cpp/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _options() -> tuple[str, ...]:
+    """The compiler's options; an older processor's answers are had by naming it."""
+    return *_OPTIONS, f"-march={os.environ.get('FORCEFIT_MARCH', 'native')}"
 
 
 def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
@@ -212,7 +217,7 @@ def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
     command = [
-        compiler, *_OPTIONS, f'-DSOURCE_DIGEST="{digest}"', str(_ROOT / source),
+        compiler, *_options(), f'-DSOURCE_DIGEST="{digest}"', str(_ROOT / source),
         "-o", unfinished,
     ]  # fmt: skip
     try:
