@@ -21,6 +21,7 @@ from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
+from assembly.sweeps.point_table import point_table
 from assembly.sweeps.request import SweepOptions, ask_sweep
 from assembly.sweeps.sweep import run_sweep, sweep_in_memory
 from forcefit.inputs.errors import BadInput
@@ -86,6 +87,7 @@ __all__ = [
     "parse_interface",
     "place_robot",
     "platform_stiffness",
+    "point_table",
     "read_campaign",
     "read_commands",
     "read_library",
