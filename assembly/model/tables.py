@@ -191,6 +191,26 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
     return table
 
 
+def component_unit(unit: str, component: str) -> str:
+    """Unit of one component of a variable that mixes angles and lengths.
+
+    Args:
+        unit: of the variable, such as ``"rad, m"``.
+        component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
+            are rotation and translation.
+
+    Returns:
+        The unit of that component; the variable's where that is one already.
+    """
+    kinds = [label[:1].upper() for label in component.split(".")]
+    if unit.count(", ") == 1:
+        return unit.split(", ")[kinds[-1] in {"T", "F"}]
+    if " .. " in unit and len(kinds) == 2:
+        turns, moments = kinds[0] == "R", kinds[1] == "M"
+        return f"{'rad' if turns else 'm'}/{'(N m)' if moments else 'N'}"
+    return unit
+
+
 def _dataset(
     values: Mapping[str, Any], known: Mapping[str, tuple], *points: Any
 ) -> "xarray.Dataset":

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from assembly.model.tables import frame_table
+from assembly.model.tables import component_unit, frame_table
 from assembly.sweeps.dataset import open_dataset
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import TABLE, check_writable, whole_file
@@ -77,12 +77,12 @@ def write_point_table(
     """
     check_writable(path, TABLE)
     table = point_table(data, rows)
-    units, names = table.attrs["units"], [str(name) for name in table.index.names]
+    units = table.attrs["units"]
     heads = [
-        _head(".".join(filter(None, column)), _unit(units[column[0]], column[1]))
-        for column in table.columns
+        _head(f"{name}.{one}" if one else name, component_unit(units[name], one))
+        for name, one in table.columns
     ]
-    axes = [_head(name, units[name]) for name in names]
+    axes = [_head(str(name), units[name]) for name in table.index.names]
     table = table.set_axis(heads, axis=1).rename_axis(axes).reset_index()
     table.index.name = "id"
     with whole_file(path) as part:
@@ -93,15 +93,3 @@ def write_point_table(
 def _head(name: str, unit: str) -> str:
     """Head of a column."""
     return f"{name} [{unit}]" if unit else name
-
-
-def _unit(unit: str, component: str) -> str:
-    """Unit of one component of a variable that mixes angles and lengths."""
-    # components end in RX .. TZ or MX .. FZ, or are called rotation and translation
-    kinds = [label[:1].upper() for label in component.split(".")]
-    if unit.count(", ") == 1:
-        return unit.split(", ")[kinds[-1] in "TF"]
-    if " .. " in unit and len(kinds) == 2:
-        turns, moments = kinds[0] == "R", kinds[1] == "M"
-        return f"{'rad' if turns else 'm'}/{'(N m)' if moments else 'N'}"
-    return unit

@@ -219,6 +219,13 @@ def plot(
         str | None,
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to show, such as stiffness.FX, frequency.1, translation, "
+            "wrench.leg1.link_a.FZ; may be repeated. A variable alone: all components."
+        ),
+    ] = None,
 ) -> None:
     """Plot a saved file: maps, lines, histograms, tolerances."""
     from assembly.statistics.plot import KINDS, figure_of_draws
@@ -236,10 +243,10 @@ def plot(
         places[name] = value
     data = open_dataset(file)
     try:
-        figure = figure_of_draws(data, kind)
+        figure = figure_of_draws(data, kind, quantity or ())
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places), output)
+    save_figure(figure or figure_of(data, places, quantity or ()), output)
 
 
 def table(
