@@ -65,13 +65,29 @@ def verdict(results: StudyResults) -> str:
     return " ".join((*parts, _checks_text(results)))
 
 
+def by_force(results: StudyResults) -> bool:
+    """Whether it goes together, and only by force, whatever its clearances do.
+
+    Args:
+        results: of :func:`validation.study.study.run_study`.
+
+    Returns:
+        False too where it does not go together at all.
+    """
+    if results.solution["status"] != "ok":
+        return False
+    zone = results.solution["zone"]
+    needless = zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE
+    return not (needless or zone["assemblable"] or zone["assemblable_free"])
+
+
 def _assembly_text(results: StudyResults) -> str:
     """Whether clearances suffice, or the energy that is needed."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
-    if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-        return "It goes together without force, and needs no clearance for it"
-    if zone["assemblable"] or zone["assemblable_free"]:
+    if not by_force(results):
+        if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
+            return "It goes together without force, and needs no clearance for it"
         text = "It goes together by its clearances alone"
         return text + (
             "" if zone["assemblable"] else " if its compliant joints turn freely"

@@ -11,7 +11,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
-from validation.study.headline import covered, verdict, worst_clearance
+from validation.study.headline import by_force, covered, verdict, worst_clearance
 from validation.study.map_section import finite, mapped, maps_section
 from validation.study.platform_section import platform_section
 from validation.study.sections import (
@@ -130,7 +130,7 @@ def report_page(results: StudyResults) -> str:
         Page(
             title=study.title,
             verdict=verdict(results),
-            good=results.passed,
+            good=_good(results),
             tiles=_tiles(results),
             about=about,
             body=body,
@@ -139,6 +139,13 @@ def report_page(results: StudyResults) -> str:
             results=results_table(results),
         )
     )
+
+
+def _good(results: StudyResults) -> bool | None:
+    """Whether it is what one hopes for; neither where force must close it."""
+    if not results.passed:
+        return False
+    return None if by_force(results) else True
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
