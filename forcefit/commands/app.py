@@ -14,6 +14,7 @@ import typer
 
 from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
+from forcefit.commands.example import example
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, one_line, quoted
@@ -30,6 +31,7 @@ app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
 app.add_typer(validation.app, name="validation", help="Is it true?")
 app.add_typer(report.app, name="report", help="What changed between two runs?")
 app.command()(convert)
+app.command()(example)
 
 
 def _print_version(asked: bool) -> None:

@@ -259,9 +259,9 @@ def table(
         typer.Option(help="Axes of other rows than points, such as quantity,group."),
     ] = None,
 ) -> None:
-    """A saved file as CSV: a row for each point, a column for each component.
+    """Write a saved file as CSV, a row for each point.
 
-    The first column, id, counts the rows from 0; heads have the units in brackets.
+    There is a column for each component of every variable.  The first column, id, counts the rows from 0; heads have the units in brackets.
     """
     from assembly.sweeps.point_table import write_point_table
 
