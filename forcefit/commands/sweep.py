@@ -261,7 +261,8 @@ def table(
 ) -> None:
     """Write a saved file as CSV, a row for each point.
 
-    There is a column for each component of every variable.  The first column, id, counts the rows from 0; heads have the units in brackets.
+    There is a column for each component of every variable.  The first column, id,
+    counts the rows from 0; heads have the units in brackets.
     """
     from assembly.sweeps.point_table import write_point_table
 
