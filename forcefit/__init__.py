@@ -45,6 +45,7 @@ _OWNERS = {
     "assembly.statistics.summary": ("summarise",),
     "assembly.sweeps.dataset": ("open_dataset",),
     "assembly.sweeps.maps": ("figure_of",),
+    "assembly.sweeps.point_table": ("point_table",),
     "assembly.sweeps.request": ("SweepOptions", "ask_sweep"),
     "assembly.sweeps.sweep": ("run_sweep", "sweep_in_memory"),
     "validation.assumptions.assumptions": ("assumption_costs",),

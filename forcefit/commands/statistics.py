@@ -21,6 +21,7 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
+from forcefit.commands.sweep import CsvOption
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import (
     PICTURE,
@@ -98,6 +99,7 @@ def statistics(
         Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
     ] = None,
     report: ReportOption = None,
+    csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
     """Draw errors many times: yields, pose errors, what matters.
@@ -113,6 +115,7 @@ def statistics(
     from assembly.statistics.quantities import parse_limit
     from assembly.statistics.summary import summarise, summary_text
     from assembly.sweeps.dataset import check_dataset
+    from assembly.sweeps.point_table import write_point_table
 
     _check_clearance_model(play, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
@@ -148,6 +151,8 @@ def statistics(
         )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
+    if csv is not None:
+        write_point_table(data, csv)
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
@@ -221,6 +226,7 @@ def tolerances(
         Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
     ] = None,
     report: ReportOption = None,
+    csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
     """How tight errors must be; with a plan, how loose they may be.
@@ -247,8 +253,8 @@ def tolerances(
 
     _check_clearance_model(play, contact_length)
     _check_word("--compliant", compliant, ("free", "rigid"))
-    if plan is None and (output or figure):
-        raise BadInput("tolerances: --output and --figure need a --plan")
+    if plan is None and (output or figure or csv):
+        raise BadInput("tolerances: --output, --figure and --csv need a --plan")
     if output is not None:
         check_dataset(output, "tolerances")
     if figure is not None:
@@ -286,7 +292,7 @@ def tolerances(
             allocation = allocate(postures, asked_plan, fresh, update, replay)
             results["allocation"] = allocation_of(allocation)
             texts.append(allocation_text(results["allocation"]))
-            _save_allocation(allocation, output, figure)
+            _save_allocation(allocation, output, figure, csv)
     write_json(results, json)
     if report is not None:
         from assembly.statistics.scenes import margin_map, tightest_robot
@@ -305,15 +311,19 @@ def tolerances(
 
 
 def _save_allocation(
-    allocation: "Allocation", output: Path | None, figure: Path | None
-) -> None:
-    """The tolerances as a data set and as a picture, where asked for."""
+    allocation: "Allocation", output: Path | None, figure: Path | None,
+    csv: Path | None,
+) -> None:  # fmt: skip
+    """The tolerances as a data set, a picture and a table, where asked for."""
     from assembly.statistics.allocated_tolerances import tolerance_dataset
     from assembly.statistics.plot import allocation_figure
     from assembly.sweeps.dataset import save_dataset
+    from assembly.sweeps.point_table import write_point_table
 
     data = tolerance_dataset(allocation)
     if output is not None:
         save_dataset(data, output)
     if figure is not None:
         save_figure(allocation_figure(data), figure)
+    if csv is not None:
+        write_point_table(data, csv)

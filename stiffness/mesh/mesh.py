@@ -10,7 +10,6 @@ never makes the same mesh twice.
 
 import hashlib
 import io
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 from forcefit.native.libraries import load_library
@@ -58,7 +58,8 @@ def mesh_solid(
         envelope: [1] share of the diagonal by which the mesher may leave a surface
             that has fewer triangles than this one and leaves it by as much.
         time_limit: [s] for the mesher.
-        cache: folder; the user's cache if absent.
+        cache: folder; that of :func:`forcefit.inputs.cache_folder.cache_folder` if
+            absent.
 
     Returns:
         The solid.
@@ -71,25 +72,14 @@ def mesh_solid(
     edge = surface.diagonal / 20 if edge is None else edge
     key = f"{_FORMAT} {surface.digest()} {edge / surface.diagonal:.4e} {envelope:.4e}"
     name = hashlib.sha256(key.encode()).hexdigest()[:32]
-    path = (cache_folder() if cache is None else Path(cache)) / f"mesh-{name}.npz"
-    mesh = _from_cache(path)
+    folder = cache_folder() if cache is None else Path(cache)
+    path = None if folder is None else folder / f"mesh-{name}.npz"
+    mesh = None if path is None else _from_cache(path)
     if mesh is None:
         mesh = _tetrahedralize(surface, edge, envelope, time_limit)
-        _to_cache(path, *mesh)
+        if path is not None:
+            _to_cache(path, *mesh)
     return fit_to_patches(*mesh, surface, patches)
-
-
-def cache_folder() -> Path:
-    """Where meshes are kept: ``$FORCEFIT_CACHE`` or the user's cache folder."""
-    if given := os.environ.get("FORCEFIT_CACHE"):
-        return Path(given)
-    if sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Caches"
-    else:
-        root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return root / "forcefit"
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:

@@ -23,6 +23,7 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.surface.surface import UNITS
 from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales
+from validation.study.service import Service, read_service
 
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
 
@@ -45,6 +46,7 @@ class Study:
         asked: those of them that the file asks for by name, by a grid or by scales.
         folder: to write.
         files: that were read: the study's own, a robot's, a surface's.
+        service: what is asked of the robot at work; None for nothing.
     """
 
     title: str
@@ -60,6 +62,7 @@ class Study:
     asked: tuple[str, ...]
     folder: Path
     files: tuple[Path, ...] = ()
+    service: Service | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -87,8 +90,10 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     by_key = {"maps": "grid", "crosscheck": "scales"}
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
+    service = read_service(root, robot)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     wanted = tuple(c for c in checks if c in named | asked_by_key)
+    wanted += ("service",) if service is not None else ()
     asked = root.text("output", f"{path.stem}_study")
     title = root.text("title", f"{robot.name}: forced assembly")
     root.finish()
@@ -113,6 +118,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
         asked=wanted,
         folder=folder,
         files=_files(path, root, meshes),
+        service=service,
     )
 
 
