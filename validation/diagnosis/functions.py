@@ -29,10 +29,12 @@ from assembly.effects.functions import AXES
 from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
 from validation.diagnosis import shapes as forms
+from assembly.measurement.variables import LOADS
 from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
     Sensitivities,
+    is_turn,
     places_of,
     variables_of,
 )
@@ -47,6 +49,8 @@ Variables = tuple[str, ...]
 Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
+_HEAVY = 10.0  # times the largest load: an unknown one is smaller
+_FORCE = 1000.0  # [N] likewise, where none is recorded
 _REMEMBERED = 8  # columns of forms whose products are kept
 _WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
@@ -179,10 +183,13 @@ class Functions:
                 combined.append((kind, part))
             else:
                 singles.append((part.where, part.components[0], kind))
+        singles += [("load", force, "screw") for force in LOADS[3:]]
+        combined.append(("screw", CandidatePart("load", LOADS[3:], "")))
         singles.sort(key=self._preference)
         self.places: list[tuple[Where, ...]] = []
         self.equal: list[list[tuple[Where, ...]]] = []
         answers, known = [], {}
+        number: dict[Where, int] = {}
         rng = np.random.default_rng(0)
         probes = rng.normal(size=(_PROBES, *self._over_sigma.shape))
         probes *= rng.normal(size=(_PROBES, 1, 1))
@@ -195,19 +202,20 @@ class Functions:
             key = tuple(np.round(seen * np.sign(seen[0]), _DIGITS))
             if key in known:
                 self.equal[known[key]].append((where,))
+                number[where] = known[key]
                 continue
+            number[where] = len(self.places)
             known[key] = len(self.places)
             self.places.append((where,))
             self.equal.append([])
             answers.append(a)
         rows = self._over_sigma.shape
         self._answers = np.array(answers).reshape(len(answers), *rows)
-        number = {p[0]: i for i, p in enumerate(self.places)}
         self.members: list[tuple[int, ...]] = [(i,) for i in range(len(self.places))]
         for kind, part in combined:
             own = [(part.where, c, kind) for c in part.components]
-            seen_ones = tuple(number[w] for w in own if w in number)
-            if len(seen_ones) > 1:
+            seen_ones = tuple(dict.fromkeys(number[w] for w in own if w in number))
+            if len(seen_ones) > 1 and set(seen_ones) not in map(set, self.members):
                 self.places.append(tuple(w for w in own if w in number))
                 self.equal.append([])
                 self.members.append(seen_ones)
@@ -216,7 +224,7 @@ class Functions:
         for size in sorted({len(m) for m in self.members}):
             where = np.array([i for i, m in enumerate(self.members) if len(m) == size])
             mem = np.array([self.members[i] for i in where])
-            turns = [[AXES.index(self.places[i][0][1]) < 3 for i in m] for m in mem]
+            turns = [[is_turn(self.places[i][0][1]) for i in m] for m in mem]
             self._groups.append((where, mem, np.array(turns)))
         pairs = {pair for m in self.members for pair in combinations(m, 2)}
         self._pairs = {pair: k for k, pair in enumerate(sorted(pairs))}
@@ -232,6 +240,9 @@ class Functions:
     def _most(self, where: Where) -> float:
         """Plausible size of an unknown: displacement, or per wrench there."""
         name, component, kind = where
+        if name == "load":
+            forces = np.abs(self.conditions.load[:, 3:])
+            return _HEAVY * float(forces.max()) or _FORCE
         axis = AXES.index(component)
         most = self.plausible[axis // 3]
         if kind == "screw":
@@ -425,12 +436,9 @@ class Functions:
         listed: list[tuple[Candidate, float]] = []
         count = max(len(self.variables), 1)
         base = -math.log(2.0 * count)
-        for kind, parts in self._parts_together():
-            name = parts[0].variable
-            tried = forms.first(self.conditions, name)
-            if kind == "compliance":
-                tried += forms.uneven(self.conditions, name)
-            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
+        for kind, parts, tried in self._parts_together():
+            own = parts[0].variables
+            listed += [(Candidate(parts, kind, s), self.prior(own, s)) for s in tried]
         cubic = CandidateShape("powers", ("2",))
         joints = [
             w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
@@ -443,7 +451,34 @@ class Functions:
         made = [self.element(one, prior) for one, prior in listed]
         return [e for e in made if e is not None and e.most > SIZES[0]]
 
-    def _parts_together(self) -> list[tuple[str, tuple[CandidatePart, ...]]]:
-        """Beams together and drives together, of every variable."""
-        every = places_of(self.campaign.robot, self.variables)
-        return [(kind, parts) for kind, parts in every if len(parts) > 1]
+    def _parts_together(
+        self,
+    ) -> Iterator[tuple[str, tuple[CandidatePart, ...], list[CandidateShape]]]:
+        """Beams together and drives together, of every variable and of its own angle."""
+        for kind, parts in places_of(self.campaign.robot, self.variables):
+            if len(parts) > 1:
+                tried = forms.first(self.conditions, parts[0].variable)
+                if kind == "compliance":
+                    tried += forms.uneven(self.conditions, parts[0].variable)
+                yield kind, parts, tried
+        drives = [f for f in self.campaign.robot.frames if f.actuated]
+        if len(drives) < 2:
+            return
+        own = [(f.name, (AXES[f.own_axis],)) for f in drives]
+        for name in self.variables:
+            if name.startswith("q."):
+                continue
+            parts = tuple(CandidatePart(w, c, name) for w, c in own)
+            yield "screw", parts, forms.first(self.conditions, name)
+            both = forms.of_two(self.conditions, "approach", name)
+            if "approach" in self.variables and both is not None and name != "approach":
+                parts = tuple(CandidatePart(w, c, *both[0]) for w, c in own)
+                yield "screw", parts, both[1]
+        turning = [w for w, _ in own if is_angle(self.campaign.robot, f"q.{w}")]
+        if "approach" in self.variables and len(turning) == len(own):
+            parts = tuple(CandidatePart(w, c, f"q.{w}", "approach") for w, c in own)
+            both = forms.of_two(self.conditions, *parts[0].variables)
+            yield "screw", parts, both[1] if both else []
+        if len(turning) == len(own):
+            parts = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)
+            yield "screw", parts, [forms.of_direction(parts[0].variable)]
