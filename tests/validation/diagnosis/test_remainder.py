@@ -240,7 +240,7 @@ def test_powers_are_orthonormal_over_the_rows(sensitivities):
     """1, q, q^2, q^3, so that none stands for the one below it; T says which."""
     s, q = sensitivities
     shape = CandidateShape("powers", ("0", "1", "2", "3"))
-    columns, mixed = s.basis("q.one", shape)
+    columns, mixed = s.basis(("q.one",), shape)
     np.testing.assert_allclose(columns.T @ columns / 12, np.eye(4), atol=1e-10)
     powers = q[:, None] ** np.arange(4)
     np.testing.assert_allclose(powers @ mixed, columns, atol=1e-8)
@@ -248,7 +248,7 @@ def test_powers_are_orthonormal_over_the_rows(sensitivities):
 
 def test_a_single_power_has_mean_square_one(sensitivities):
     s, q = sensitivities
-    columns, mixed = s.basis("q.one", CandidateShape("powers", ("2",)))
+    columns, mixed = s.basis(("q.one",), CandidateShape("powers", ("2",)))
     assert mixed.shape == (1, 1)
     assert mixed[0, 0] == pytest.approx(1 / np.sqrt(np.mean(q**4)), rel=1e-6)
     np.testing.assert_allclose(columns[:, 0], q**2 * mixed[0, 0], rtol=1e-6)
