@@ -227,7 +227,10 @@ class Sensitivities:
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
-        numbers = [AXES.index(c) if c in AXES else k for c, k in zip(components, kinds, strict=True)]
+        numbers = [
+            AXES.index(c) if c in AXES else k
+            for c, k in zip(components, kinds, strict=True)
+        ]
         return np.repeat(numbers, counts)
 
     def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:

@@ -27,6 +27,7 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.small_terms import small_terms
+from validation.diagnosis.together import together
 
 _VISIBLE = 4.0  # squared whitened change of the readings
 
@@ -71,7 +72,7 @@ class Columns:
         )
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
         self.functions = Functions(campaign, self.sensitivities)
-        self.explicit = self.functions.explicit()
+        self.explicit = together(self.functions)
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Hypotheses that show; of those that do the same, the first."""
@@ -110,7 +111,9 @@ class Columns:
         ]
         return np.hstack(own)
 
-    def again(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> list[Element]:
+    def again(
+        self, elements: Sequence[Element], xs: Sequence[NDArray]
+    ) -> list[Element]:
         """Effects to first order about values that they have together.
 
         Args:

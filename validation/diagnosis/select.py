@@ -19,7 +19,8 @@ from assembly.effects import LIBRARY
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
-from validation.diagnosis.functions import Asked, Found, Weighted
+from validation.diagnosis.functions import Asked, Found
+from validation.diagnosis.places import Weighted
 from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
@@ -211,7 +212,7 @@ class Search:
         cells = self.fit.cells.copy()
         cells[cells] = self.fit.glanced
         root = self.fit.root[self.fit.glanced]
-        self.weighted: Weighted = self.functions.weighted(cells, root)
+        self.weighted: Weighted = self.functions.places.weighted(cells, root)
         pool = [*self.columns.library, *self.columns.explicit]
         self.dense = Dense(pool, self.fit.cells, self.fit.root)
 
@@ -226,7 +227,9 @@ class Search:
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._with_less(sources):
             for worth, element in self._candidates(
-                state, functions=state in sources[:_LOOKED], products=products and state is sources[0]
+                state,
+                functions=state in sources[:_LOOKED],
+                products=products and state is sources[0],
             ):
                 elements = (*state.elements, element)
                 key = frozenset(elements)
@@ -295,14 +298,13 @@ class Search:
             names.append("approach")
         return self.functions.products(dict.fromkeys(names))
 
-    def look(
-        self, state: State, asked: Sequence[Asked], most: int = 3
-    ) -> list[Found]:
+    def look(self, state: State, asked: Sequence[Asked], most: int = 3) -> list[Found]:
         """The best functions beside a model, by what they would be worth in all rows."""
         found = self.functions.look(state.glance, self.weighted, FREEDOM, asked, most)
         more = len(self.fit.glanced) / self.fit.glanced.sum()
         scaled = [
-            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior) for f in found
+            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior)
+            for f in found
         ]
         return sorted(scaled, key=lambda one: -one.worth)
 
@@ -365,13 +367,17 @@ class Search:
         means = [state.sizes.mean[state.own(k)] for k, _ in own]
         xs = [_within(e, e.values(d)) for (_, e), d in zip(own, means, strict=True)]
         effects = [e for _, e in own]
-        key = tuple(e.origin for e in effects), tuple(
-            float(f"{v:.3g}") for x in xs for v in x
+        key = (
+            tuple(e.origin for e in effects),
+            tuple(float(f"{v:.3g}") for x in xs for v in x),
         )
         if key not in self._about:
             settled = all(_has_shapes(e) for e in effects)
             if settled:
-                d = [(x - e.begin)[e.slots] / e.scale for e, x in zip(effects, xs, strict=True)]
+                d = [
+                    (x - e.begin)[e.slots] / e.scale
+                    for e, x in zip(effects, xs, strict=True)
+                ]
                 linear = sum(
                     (e.columns @ y for e, y in zip(effects, d, strict=True)),
                     start=np.zeros(len(self.fit.cells)),
@@ -505,7 +511,9 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         values=np.concatenate([np.zeros(0), *values]),
         functions=tuple(functions),
         prior=SmallPrior(
-            small.spring[kept], small.frame[kept], small.axis[kept],
+            small.spring[kept],
+            small.frame[kept],
+            small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
         noise=Noise(tau, tau_std),
@@ -580,7 +588,9 @@ def label(one: Candidate) -> str:
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
     kind = "" if one.kind == "screw" else "compliance of "
-    return f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )
 
 
 def _learned(

@@ -88,7 +88,9 @@ def of_two(
     if any(angles):
         order = (first, second) if angles[0] else (second, first)
         waves = [
-            CandidateShape("scaled_waves", tuple(f"{k}.{w}" for w in ("sine", "cosine")))
+            CandidateShape(
+                "scaled_waves", tuple(f"{k}.{w}" for w in ("sine", "cosine"))
+            )
             for k in (1, 2, 3)
         ]
         return order, [*waves, CandidateShape("scaled_waves", _ANGLE)]
@@ -125,7 +127,9 @@ def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
 def _weight(shape: CandidateShape) -> float:
     """Of a form within its family."""
     if shape.form.endswith("waves"):
-        orders = [abs(int(part)) for name in shape.names for part in name.split(".")[:-1]]
+        orders = [
+            abs(int(part)) for name in shape.names for part in name.split(".")[:-1]
+        ]
         return 1.0 / max(*orders, 1)
     return 1.0
 

@@ -1,6 +1,6 @@
 """A model of the search: its elements, geometry and springs, sizes, and its score.
 
-    score = ln p(z) at the sizes found - their cost + bounds + ln prior of the model
+score = ln p(z) at the sizes found - their cost + bounds + ln prior of the model
 """
 
 import math
@@ -207,7 +207,10 @@ class Fitting:
         most = np.repeat([e.most for e in elements], counts)
         while True:
             beside = across[used]
-            gram = np.block([[self._gram[np.ix_(used, used)], beside], [beside.T, inner]])
+            gram = np.block([
+                [self._gram[np.ix_(used, used)], beside],
+                [beside.T, inner],
+            ])
             sizes = best_sizes(
                 gram, np.append(small_z[used], with_z), float(z @ z), self.count, FREEDOM,
                 np.append(small.group[used], _GROUPS + element),

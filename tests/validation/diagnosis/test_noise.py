@@ -16,7 +16,9 @@ def test_blunders_are_told_from_noise():
 
 def test_noise_alone_hardly_has_blunders():
     rng = np.random.default_rng(1)
-    called = [(good_readings(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)]
+    called = [
+        (good_readings(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
+    ]
     # beyond 4.4 sigma lies one reading in 80 000: one campaign of 600 in 130
     assert np.mean(called) < 0.03
 

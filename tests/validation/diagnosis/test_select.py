@@ -100,7 +100,9 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     search = Search(columns, z, np.ones(len(z), dtype=bool), np.ones(len(z)))
     search.prepare()
     looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
-    made = [columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked]
+    made = [
+        columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
+    ]
     dense = Dense(made, search.fit.cells, search.fit.root)
     alone = dense.gains(search.empty[-1].taken, FREEDOM)
     together = np.array([f.worth - f.log_prior for f in looked])
@@ -114,7 +116,7 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
     campaign = replace(campaign, measured=measured)
     known = Columns(campaign, with_second_order(conditions_of(campaign)))
-    assert (("drive", "rz", "screw"),) not in known.functions.places
-    assert (("tip", "tx", "screw"),) in known.functions.places + [
-        p for equal in known.functions.equal for p in equal
+    assert (("drive", "rz", "screw"),) not in known.functions.places.names
+    assert (("tip", "tx", "screw"),) in known.functions.places.names + [
+        p for equal in known.functions.places.equal for p in equal
     ]
