@@ -1,4 +1,4 @@
-"""Everything a search may use, of a campaign's design alone: no reading is looked at."""
+"""Everything a search may use, of a campaign's design alone: no reading is seen."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -83,7 +83,8 @@ def _likeliest(
     worths, whose = [], []
     for own in parts.values():
         gains = averaged_gains(
-            np.concatenate([p.gram for p in own]), np.concatenate([p.along for p in own]),
+            np.concatenate([p.gram for p in own]),
+            np.concatenate([p.along for p in own]),
             np.concatenate([p.most for p in own]), False, taken, freedom,
         )  # fmt: skip
         sizes = [len(p.where) for p in own]
@@ -92,7 +93,10 @@ def _likeliest(
         whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
     worth, names = np.concatenate(worths), np.concatenate(whose)
     order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
-    return [(float(worth[i]), *map(int, names[i])) for i in order]
+    return [
+        (float(worth[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
+        for i in order
+    ]
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
@@ -138,7 +142,7 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """ln of the prior of a form of variables, at one place."""
+        """Ln of the prior of a form of variables, at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
@@ -223,7 +227,11 @@ class Functions:
                 c, size = mem.shape
                 if size > 1 and size * m > _WIDEST:
                     continue
-                B = whole[mem[:, 0]] if size == 1 else self.places.joined(mem, whole, cross)
+                B = (
+                    whole[mem[:, 0]]
+                    if size == 1
+                    else self.places.joined(mem, whole, cross)
+                )
                 y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
                 b = along[mem, part].reshape(c, size * m)
                 norm = _by_kind(np.repeat(turns, m, axis=1), B)

@@ -71,7 +71,7 @@ class Products:
         return Products(left, self.log_det + log_det)
 
     def log_evidence(self, count: int, freedom: float = math.inf) -> float:
-        """ln p(z) of n readings, all unknowns eliminated."""
+        """Ln p(z) of n readings, all unknowns eliminated."""
         return log_evidence(float(self.matrix[-1, -1]), self.log_det, count, freedom)
 
     def posterior(
@@ -88,7 +88,7 @@ class Products:
 def log_evidence(
     squares: float, log_det: float, count: int, freedom: float = math.inf
 ) -> float:
-    """ln p(z), of n readings with z' C^-1 z and ln det C; tau about 1 by ``freedom``."""
+    """Ln p(z) of n readings, from z' C^-1 z and ln det C; tau about 1."""
     if math.isinf(freedom):
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)
@@ -117,7 +117,7 @@ class Taken:
 
 
 def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken:
-    """What is left beside columns (n, k) with prior std (k,) and orthonormal flat ones."""
+    """What columns (n, k) of prior std (k,), and orthonormal flat ones, leave."""
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -198,5 +198,8 @@ def size_cost(determined: float) -> float:
 
     Args:
         determined: number of well determined unknowns that share it.
+
+    Returns:
+        Logarithm of the maximum over the average, of a range of :data:`SIZES`.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

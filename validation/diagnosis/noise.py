@@ -1,7 +1,7 @@
 """Noise: its scale beside the stated sigma, and blunders.
 
-A reading is good, with N(0, tau^2), or with a probability of one in five
-thousand a blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
+A reading is good, with N(0, tau^2), or with a probability of one in five thousand a
+blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -44,7 +44,8 @@ def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
         clearly: whether blunders must be far off, as where effects may be left.
 
     Returns:
-        (n,) 1 of those that are likelier good; ones where so many are far off that it is no matter of blunders.
+        (n,) 1 of those that are likelier good; ones where so many are far off that it
+        is no matter of blunders.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):

@@ -94,7 +94,9 @@ class Places:
         for size in sorted({len(m) for m in self.members}):
             which = [i for i, m in enumerate(self.members) if len(m) == size]
             members = np.array([self.members[i] for i in which])
-            turns = [[is_turn(self.names[i][0][1]) for i in m] for m in members.tolist()]
+            turns = [
+                [is_turn(self.names[i][0][1]) for i in m] for m in members.tolist()
+            ]
             self.sizes.append((np.array(which), members, np.array(turns)))
         pairs = {pair for m in self.members for pair in combinations(m, 2)}
         self._pairs = {pair: k for k, pair in enumerate(sorted(pairs))}

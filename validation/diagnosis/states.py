@@ -166,6 +166,9 @@ class Fitting:
             elements: of it.
             mode: whether geometry and springs are in use.
             start: from whose sizes to go on.
+
+        Returns:
+            The model, found once.
         """
         key = frozenset(elements), mode
         if key not in self._states:
@@ -212,7 +215,8 @@ class Fitting:
                 [beside.T, inner],
             ])
             sizes = best_sizes(
-                gram, np.append(small_z[used], with_z), float(z @ z), self.count, FREEDOM,
+                gram, np.append(small_z[used], with_z), float(z @ z),
+                self.count, FREEDOM,
                 np.append(small.group[used], _GROUPS + element),
                 np.append(small.given[used], given), np.append(small.most[used], most),
                 begin,

@@ -10,7 +10,8 @@ from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense
 from validation.diagnosis.noise import FREEDOM
-from validation.diagnosis.select import Search, select
+from validation.diagnosis.search import Search
+from validation.diagnosis.select import select
 from validation.diagnosis.signatures import conditions_of
 
 ROWS = 40
