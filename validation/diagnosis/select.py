@@ -16,7 +16,13 @@ from assembly.effects import LIBRARY
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.noise import Noise, good_readings, scale
+from validation.diagnosis.noise import (
+    Noise,
+    findings,
+    good_readings,
+    scale,
+    scatter_of_repeats,
+)
 from validation.diagnosis.search import Search, Update, names_of
 from validation.diagnosis.states import State
 
@@ -175,7 +181,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
             small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
-        noise=Noise(tau, tau_std),
+        noise=Noise(tau, tau_std, _findings(search, (tau, tau_std), good)),
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
@@ -183,6 +189,21 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         blocks=blocks,
         gain=best.score - search.begin.score,
     )
+
+
+def _findings(
+    search: Search, scale: tuple[float, float], good: NDArray
+) -> tuple[str, ...]:
+    """What repeats and the scale say of the noise."""
+    columns, fit = search.columns, search.fit
+    row, component = (axis[fit.cells] for axis in np.nonzero(columns.campaign.cells))
+    repeat = columns.campaign.repeat[row]
+    point = np.zeros(len(row), dtype=int)
+    if columns.campaign.point is not None:
+        point = np.unique(columns.campaign.point, return_inverse=True)[1][row]
+    group = (repeat * (point.max(initial=0) + 1) + point) * 6 + component
+    kept = good > 0.5
+    return findings(*scale, scatter_of_repeats(fit.given[kept], group[kept]))
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:

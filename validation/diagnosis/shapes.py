@@ -15,6 +15,7 @@ from assembly.measurement.variables import variable
 from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle
 
 _DEPTHS = 0.03, 0.1, 0.3, 1.0  # of a variable's range: what slips after it
+_ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 _HIGH = 12  # waves a turn that are looked for one by one
 _CLOCKS = "time", "cov.time"
 _JUMPS, _MANY_JUMPS = 10, 91  # levels of time at which something may jump
@@ -47,7 +48,7 @@ def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
     if name in _CLOCKS:
         shapes = [s for s in shapes if s.form != "step"]
         shapes += _steps(conditions, name, _MANY_JUMPS)
-    more = [*first(conditions, name), *_reversals(conditions, name)]
+    more = [*first(conditions, name), *_reversals(conditions, name, _ALL_DEPTHS)]
     return list(dict.fromkeys([*shapes, *more]))
 
 
@@ -58,14 +59,16 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
     return [CandidateShape("step", ("size",), (("at", float(v)),)) for v in levels]
 
 
-def _reversals(conditions: Conditions, name: str) -> list[CandidateShape]:
+def _reversals(
+    conditions: Conditions, name: str, depths: Sequence[float] = _DEPTHS
+) -> list[CandidateShape]:
     """Forms that remember from where a variable came."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
     plays = [
         CandidateShape("play", ("size",), (("depth", depth * size),))
-        for depth in _DEPTHS
+        for depth in depths
     ]
     return [CandidateShape("reversal", ("0",)), *plays]
 

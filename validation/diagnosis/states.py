@@ -109,7 +109,7 @@ class Fitting:
         number = np.unique(rows, return_inverse=True)[1]
         order = np.random.default_rng(0).permutation(number.max(initial=0) + 1)
         self.glanced = order[number] < _GLANCED
-        self.root = np.sqrt(weights)
+        self.given, self.root = z, np.sqrt(weights)
         flat = columns.flat[cells] * self.root[:, None]
         flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         left, size, _ = np.linalg.svd(flat, full_matrices=False)
