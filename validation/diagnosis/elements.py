@@ -230,3 +230,14 @@ class Dense:
 def effect_prior(effects: int, ways: int) -> float:
     """Ln of the prior of a way in which one of so many effects may act."""
     return -math.log(2.0) - math.log(max(effects, 1)) - math.log(max(ways, 1))
+
+
+def label(one: Candidate) -> str:
+    """A function in words."""
+    where = " and ".join(f"{p.where} {', '.join(p.components)}" for p in one.parts)
+    of = ", ".join(one.parts[0].variables)
+    given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
+    kind = "" if one.kind == "screw" else "compliance of "
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )

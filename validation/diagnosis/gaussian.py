@@ -127,15 +127,18 @@ def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken
     return Taken(np.hstack([flat, U]), held, float(z @ held))
 
 
-def leave_block_out(taken: Taken, blocks: NDArray) -> tuple[NDArray, NDArray]:
+def leave_block_out(
+    taken: Taken, blocks: NDArray, tau: float = 1.0
+) -> tuple[NDArray, NDArray]:
     """Readings of each block foretold by a fit to all others, sizes held.
 
     Args:
         taken: of n readings.
         blocks: (n,) whose each reading is.
+        tau: of the noise.
 
     Returns:
-        (n,) errors, and (number of blocks,) ln densities with tau = 1.
+        (n,) errors, and (number of blocks,) ln densities.
     """
     errors, densities = np.empty_like(taken.held), []
     for name in np.unique(blocks):
@@ -143,8 +146,9 @@ def leave_block_out(taken: Taken, blocks: NDArray) -> tuple[NDArray, NDArray]:
         U = taken.across[own]
         left = np.eye(len(own)) - U @ U.T
         errors[own] = np.linalg.solve(left, taken.held[own])
-        size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi)
-        densities.append(0.5 * (size - float(errors[own] @ taken.held[own])))
+        size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi * tau**2)
+        square = float(errors[own] @ taken.held[own]) / tau**2
+        densities.append(0.5 * (size - square))
     return errors, np.array(densities)
 
 

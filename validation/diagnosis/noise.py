@@ -84,13 +84,16 @@ def scatter_of_repeats(z: NDArray, group: NDArray) -> tuple[float, int]:
     return float(np.sqrt(squares / max(freedom, 1))), freedom
 
 
-def findings(tau: float, tau_std: float, repeats: tuple[float, int]) -> tuple[str, ...]:
+def findings(
+    tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool
+) -> tuple[str, ...]:
     """What noise has to say for itself.
 
     Args:
         tau: true over stated sigma, by what a model leaves.
         tau_std: its standard deviation.
-        repeats: :func:`scatter_of_repeats`.
+        repeats: :func:`scatter_of_repeats`, of what is left.
+        memory: whether the model depends on the rows before.
 
     Returns:
         Sentences; none where all is as stated.
@@ -104,6 +107,8 @@ def findings(tau: float, tau_std: float, repeats: tuple[float, int]) -> tuple[st
             f"not repeatable: rows of one configuration and load differ by {rms:.2g} "
             "times the stated sigma, by memory, time or something not recorded"
         )
+    if memory:
+        told.append("memory: what is read depends on the rows before")
     return tuple(told)
 
 

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from assembly.effects import LIBRARY
+from assembly.effects.forms import FORMS
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
+from validation.diagnosis.elements import label
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
@@ -24,11 +26,13 @@ from validation.diagnosis.noise import (
     scatter_of_repeats,
 )
 from validation.diagnosis.search import Search, Update, names_of
-from validation.diagnosis.states import State
+from validation.diagnosis.states import State, foretold
 
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
 _LISTED = 20  # models
+_FEWEST = 5  # blocks, from which functions must foretell
+_SURE = 2.0  # standard errors by which one must foretell blocks left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +151,7 @@ def select(
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     """The answer from all models seen."""
-    states = _unlike(states)
+    states = _confirmed(search, _unlike(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     best, fit = states[0], search.fit
@@ -181,7 +185,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
             small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
-        noise=Noise(tau, tau_std, _findings(search, (tau, tau_std), good)),
+        noise=Noise(tau, tau_std, _findings(search, best, (tau, tau_std), good)),
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
@@ -192,9 +196,9 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
 
 
 def _findings(
-    search: Search, scale: tuple[float, float], good: NDArray
+    search: Search, best: State, scale: tuple[float, float], good: NDArray
 ) -> tuple[str, ...]:
-    """What repeats and the scale say of the noise."""
+    """What repeats, memory and the scale say of the noise."""
     columns, fit = search.columns, search.fit
     row, component = (axis[fit.cells] for axis in np.nonzero(columns.campaign.cells))
     repeat = columns.campaign.repeat[row]
@@ -203,7 +207,10 @@ def _findings(
         point = np.unique(columns.campaign.point, return_inverse=True)[1][row]
     group = (repeat * (point.max(initial=0) + 1) + point) * 6 + component
     kept = good > 0.5
-    return findings(*scale, scatter_of_repeats(fit.given[kept], group[kept]))
+    repeats = scatter_of_repeats(best.left[kept], group[kept])
+    forms = {e.candidate.shape.form for e in best.elements if not e.name}
+    memory = any(FORMS[form].remembers for form in forms)
+    return findings(*scale, repeats, memory=memory)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
@@ -214,6 +221,24 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
         for s in states
     ]
     return float(weights[has].sum())
+
+
+def _confirmed(search: Search, states: list[State]) -> list[State]:
+    """Models without the likeliest whose functions foretell nothing."""
+    blocks = search.columns.block[search.fit.cells]
+    while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
+        best = states[0]
+        lost = False
+        for e in best.elements:
+            if not e.name:
+                rest = tuple(x for x in best.elements if x is not e)
+                without = search.fit.state(rest, best.mode, best)
+                gain, error = foretold(best, without, blocks)
+                lost = lost or gain < _SURE * error
+        if not lost:
+            break
+        states = states[1:]
+    return states
 
 
 def _unlike(states: Sequence[State]) -> list[State]:
@@ -263,17 +288,6 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
         total[effects, labels] = total.get((effects, labels), 0.0) + float(weight)
     models = [Model(*names, weight) for names, weight in total.items()]
     return tuple(sorted(models, key=lambda m: -m.probability)[:_LISTED])
-
-
-def label(one: Candidate) -> str:
-    """A function in words."""
-    where = " and ".join(f"{p.where} {', '.join(p.components)}" for p in one.parts)
-    of = ", ".join(one.parts[0].variables)
-    given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
-    kind = "" if one.kind == "screw" else "compliance of "
-    return (
-        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
-    )
 
 
 def _learned(
