@@ -6,7 +6,7 @@ described, and every name has the probability of the models that contain it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from scipy.special import logsumexp
 
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
-from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import label
 from validation.diagnosis.hypotheses import Hypothesis
@@ -26,99 +25,15 @@ from validation.diagnosis.noise import (
     scatter_of_repeats,
 )
 from validation.diagnosis.search import Search, Update, names_of
+from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
 from validation.diagnosis.states import State, foretold
 
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
 _LISTED = 20  # models
+_HEARD = 60  # models that are compared
 _FEWEST = 5  # blocks, from which functions must foretell
 _SURE = 2.0  # standard errors by which one must foretell blocks left out
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """A function that was found.
-
-    Attributes:
-        candidate: where, of what, in which form.
-        equivalent: places and variables that do as well.
-        gain: logarithm of how much likelier it makes the readings.
-        std: (m,) prior size of its unknowns, as :class:`.Sensitivities` counts them.
-        probability: that some function of this variable acts.
-    """
-
-    candidate: Candidate
-    equivalent: tuple[tuple[CandidatePart, ...], ...]
-    gain: float
-    std: NDArray
-    probability: float
-
-
-@dataclass(frozen=True, eq=False)
-class SmallPrior:
-    """Geometry and springs in use.
-
-    Attributes:
-        spring: (k,) bool.
-        frame, axis: (k,) row of the frame in the campaign's robot, component there.
-        std: (k,) [rad, m, or per wrench] prior standard deviation.
-    """
-
-    spring: NDArray
-    frame: NDArray
-    axis: NDArray
-    std: NDArray
-
-
-@dataclass(frozen=True)
-class Model:
-    """A model by its names.
-
-    Attributes:
-        effects: of the library.
-        functions: each in words.
-        probability: after the readings were looked at.
-    """
-
-    effects: tuple[str, ...]
-    functions: tuple[str, ...]
-    probability: float
-
-
-@dataclass(frozen=True, eq=False)
-class Selected:
-    """What a search found.
-
-    Attributes:
-        hypotheses: of the best model, the measuring frame first where it is not known.
-        values: (k,) of their unknowns, one hypothesis after the other.
-        functions: of the best model.
-        prior: geometry and springs in use.
-        noise: its scale.
-        weights: (n,) probability of every cell that it is no blunder.
-        models: the likely ones, best first.
-        probability: of every effect of the library that some model has.
-        unknowns: [-] well determined, the measuring frame's among them.
-        blocks: configurations, or spans of time.
-        gain: log posterior of the best model over the model without elements.
-    """
-
-    hypotheses: tuple[Hypothesis, ...]
-    values: NDArray
-    functions: tuple[Learned, ...]
-    prior: SmallPrior
-    noise: Noise
-    weights: NDArray
-    models: tuple[Model, ...]
-    probability: dict[str, float]
-    unknowns: float
-    blocks: int
-    gain: float
-
-    @property
-    def enough(self) -> bool:
-        """Whether there are more blocks of rows than a model needs unknowns."""
-        return self.blocks >= self.unknowns + 2
 
 
 def select(
@@ -228,14 +143,16 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
     blocks = search.columns.block[search.fit.cells]
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
-        lost = False
-        for e in best.elements:
-            if not e.name:
-                rest = tuple(x for x in best.elements if x is not e)
-                without = search.fit.state(rest, best.mode, best)
-                gain, error = foretold(best, without, blocks)
-                lost = lost or gain < _SURE * error
-        if not lost:
+        learned = [e for e in best.elements if not e.name]
+        # one by one, and all of them: two may hide one another's faults
+        rests = [tuple(x for x in best.elements if x is not e) for e in learned]
+        rests.append(tuple(x for x in best.elements if x.name))
+        gains = [
+            foretold(best, search.fit.state(rest, best.mode, best), blocks)
+            for rest in rests
+            if learned
+        ]
+        if all(gain >= _SURE * error for gain, error in gains):
             break
         states = states[1:]
     return states
@@ -250,7 +167,9 @@ def _unlike(states: Sequence[State]) -> list[State]:
     Returns:
         Models, best first.
     """
-    ordered = sorted(states, key=lambda s: -s.score)[:60]
+    every = sorted(states, key=lambda s: -s.score)
+    bare = [s for s in every if not _functions(s)]  # what stays if none is confirmed
+    ordered = [*every[:_HEARD], *(s for s in bare[:_LISTED] if s not in every[:_HEARD])]
     kept: list[State] = []
     for state in ordered:
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)

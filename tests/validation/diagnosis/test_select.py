@@ -121,3 +121,11 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
     assert (("tip", "tx", "screw"),) in known.functions.places.names + [
         p for equal in known.functions.places.equal for p in equal
     ]
+
+
+@pytest.mark.parametrize("size", [6.0, 25.0])
+def test_one_row_alone_teaches_no_function(columns, size):
+    readings = np.zeros((ROWS, 6))
+    readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
+    selected = found(columns, readings)
+    assert selected.functions == ()
