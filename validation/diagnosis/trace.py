@@ -35,9 +35,11 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import weights_of
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
-from validation.diagnosis.select import Selected, advantage, folds, select
+from validation.diagnosis.select import select
+from validation.diagnosis.selected import Selected
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.states import foretold
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
 
 Update = Callable[[str, int, int], None]
@@ -191,18 +193,16 @@ def trace(
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """The search; where rows follow one another, time itself explains the least.
-
-    It varies with whatever changed meanwhile, and says nothing of another day: it is
-    believed only where it predicts other spans of time clearly better.
-    """
+    """The search; where rows follow one another, time itself explains the least."""
+    # it varies with whatever changed meanwhile, and says nothing of another day: it is
+    # believed only where it predicts other spans of time clearly better
     whole = select(columns, z, cells, update)
     if not columns.has_clocks:
         return whole
     timeless = select(columns.without_clocks(), z, cells, update)
     blocks = columns.block[cells]
-    both = [folds(s.states[0], blocks) for s in (whole, timeless)]
-    return whole if advantage(*both) > _CLEARLY else timeless
+    gain, error = foretold(whole.states[0], timeless.states[0], blocks)
+    return whole if gain > _CLEARLY * error else timeless
 
 
 def _traced(
