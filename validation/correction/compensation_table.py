@@ -124,7 +124,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """[m, rad] length of what a diagnosis left beyond noise, None if it is not known."""
+    """[m, rad] length of what a diagnosis left beyond noise, None if not known."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]

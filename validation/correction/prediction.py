@@ -37,7 +37,8 @@ class Foretold:
             deviation; NaN where neither the table nor the robot's file says it.
         extrapolated: (R,) names of what leaves the range in which the robot was
             identified, else empty.
-        registration: ``"known"``, ``"of the robot file"`` or ``"fitted to these rows"``.
+        registration: ``"known"``, ``"of the robot file"``, ``"fitted to these rows"``
+            or ``"none"``.
         point: where the robot was identified, if readings are of another point.
     """
 

@@ -1,9 +1,11 @@
 """Everything a search may use, of a campaign's design alone: no reading is looked at."""
 
+import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import blocks_of
-from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -28,6 +30,7 @@ from validation.diagnosis.signatures import (
 )
 from validation.diagnosis.small_terms import small_terms
 
+FUNCTION = "function"
 _VISIBLE = 4.0  # squared whitened change of the readings
 
 
@@ -49,6 +52,7 @@ class Columns:
     def __init__(
         self, campaign: Campaign, conditions: Conditions,
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
+        odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         """Take all derivatives.
 
@@ -57,7 +61,10 @@ class Columns:
             conditions: of its rows, with the registration if that was found and with
                 what finite geometric errors add.
             update: told what is done, how much of it and of how much.
+            odds: factors on the prior odds of effects, of ``"function"``, and of
+                ``"geometry"`` and ``"springs"``, by name; 0 leaves something out.
         """
+        self.odds = odds
         self.campaign, self.conditions = campaign, conditions
         self.row = np.nonzero(campaign.cells)[0]
         self.block = blocks_of(campaign)[0][self.row]
@@ -66,17 +73,20 @@ class Columns:
         self.device: Hypothesis | None = device_frame(conditions) if unknown else None
         self.library = self._library(update)
         self.response = responses(conditions)
-        self.nuisance: Nuisance = nuisance(
-            small_terms(campaign, conditions, self.response), self._named()
-        )
+        terms = small_terms(campaign, conditions, self.response)
+        terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
+        self.nuisance: Nuisance = nuisance(terms, self._named())
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
-        self.functions = Functions(campaign, self.sensitivities)
+        any_function = odds.get(FUNCTION, 1.0) > 0.0
+        self.functions = Functions(campaign, self.sensitivities, any_function)
         self.explicit = self.functions.explicit()
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Hypotheses that show; of those that do the same, the first."""
         listed = hypotheses(self.conditions, loaded_components(self.campaign))
         shown: dict[object, Signature] = {}
+        listed = with_declared(listed, self.campaign.robot)
+        listed = [h for h in listed if self.odds.get(h.effect, 1.0) > 0.0]
         for k, h in enumerate(listed):
             if not (self.device and _moves_base(h)):
                 signature = self.tangents.at_start(h)
@@ -86,10 +96,15 @@ class Columns:
         ways = Counter(s.hypothesis.effect for s in shown.values())
         robot = self.campaign.robot
         made = [
-            effect_element(s, robot, effect_prior(len(ways), ways[s.hypothesis.effect]))
+            effect_element(s, robot, self._prior(s.hypothesis.effect, ways))
             for s in shown.values()
         ]
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
+
+    def _prior(self, effect: str, ways: Counter[str]) -> float:
+        """Ln of the prior of one way in which an effect may act."""
+        prior = effect_prior(len(ways), ways[effect])
+        return prior + math.log(self.odds.get(effect, 1.0))
 
     def _named(self) -> NDArray:
         """(N, c) columns of single unknowns of springs that have a name."""
@@ -110,7 +125,9 @@ class Columns:
         ]
         return np.hstack(own)
 
-    def again(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> list[Element]:
+    def again(
+        self, elements: Sequence[Element], xs: Sequence[NDArray]
+    ) -> list[Element]:
         """Effects to first order about values that they have together.
 
         Args:

@@ -3,6 +3,7 @@
 Steps, each opened once:
 
 1. rows that judge are chosen (:mod:`.holdout`); nothing reads them until step 5;
+   set-up blunders are looked for in the others (:mod:`.setup_blunders`);
 2. effects and functions are searched for in the other rows (:mod:`.trace`);
 3. all unknown numbers of the machine are fitted together, through the function that
    predicts with the saved file (:mod:`.fit`); effects that the readings do not support
@@ -11,17 +12,23 @@ Steps, each opened once:
 5. the errors of the fitted robots on the held-out rows, and the verdict.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects import LIBRARY
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut, hidden, hold_out
 from validation.diagnosis.judge import Judged, judge
+from validation.diagnosis.setup_blunders import setup_blunders
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.trace import Traced, trace
 
 Update = Callable[[str, int, int], None]
@@ -44,6 +51,7 @@ def diagnose(
     campaign: Campaign,
     *,
     finite: bool = False,
+    odds: Mapping[str, float] = MappingProxyType({}),
     update: Update = lambda what, done, total: None,
 ) -> Diagnosis:
     """Trace a campaign's residual to the effect that the declared model lacks.
@@ -52,6 +60,8 @@ def diagnose(
         campaign: measured deviations.
         finite: whether motions of the declared model are finite in the search; they
             are too if the robot's file has the effect ``geometric_stiffening``.
+        odds: factors on the prior odds of effects by name, of ``"function"`` (any
+            function), ``"geometry"`` and ``"springs"``; 0 leaves something out.
         update: told what is done, how much of it and of how much.
 
     Returns:
@@ -61,28 +71,36 @@ def diagnose(
         BadInput: the measuring frame is not known and cannot be found.
     """
     held = hold_out(campaign)
+    judging = held.rows if held.how == "split" else np.zeros(len(campaign), dtype=bool)
+    seen = hidden(campaign, judging)
+    blunders = setup_blunders(
+        seen.take(seen.cells.any(axis=1)),
+        conditions_of(seen).take(seen.cells.any(axis=1)),
+    )
+    if blunders:  # anything else that is found would stand for them
+        odds = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
+
+    def found(rows: NDArray) -> _Found:
+        part = hidden(campaign, ~rows)
+        return _Found(*trace(part, rows, update, finite=finite, odds=odds))
+
     folds = []
     for k, rows in enumerate(held.folds):
         if held.how == "folds":
             update("folds", k, len(held.folds))
-        folds.append(_found(campaign, _fitted_rows(held, rows), update, finite))
+        folds.append(found(_fitted_rows(held, rows)))
     best = folds[0]
     if held.how == "folds":
         update("folds", len(held.folds), len(held.folds))
-        every = np.ones(len(campaign), dtype=bool)
-        best = _found(campaign, every, update, finite)
+        best = found(np.ones(len(campaign), dtype=bool))
     judged = [
         Judged(one.fit, one.traced.used, rows)
         for one, rows in zip(folds, held.folds, strict=True)
     ]
-    return judge(campaign, best.traced, best.fit, held, judged)
+    diagnosis = judge(campaign, best.traced, best.fit, held, judged)
+    return replace(diagnosis, setup=blunders)
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
     """(R,) bool, rows that are fitted where others judge; all where none is spared."""
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows
-
-
-def _found(campaign: Campaign, fitted: NDArray, update: Update, finite: bool) -> _Found:
-    """Search and fit in some rows; readings of others are not there."""
-    return _Found(*trace(hidden(campaign, ~fitted), fitted, update, finite=finite))

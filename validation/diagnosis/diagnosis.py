@@ -19,6 +19,7 @@ from validation.diagnosis.lack_of_fit import LackOfFit
 from validation.diagnosis.next_measurement import NextMeasurement
 from validation.diagnosis.noise_in_time import NoiseInTime
 from validation.diagnosis.sequence import Errors, Step
+from validation.diagnosis.setup_blunders import SetupBlunder
 from validation.diagnosis.structure import Trend
 from validation.diagnosis.trace import Traced
 
@@ -65,6 +66,7 @@ class Diagnosis:
         next: the measurement that would decide, if the verdict is ambiguous.
         needed: rows that would decide, if there are not enough.
         remarks: numbers that no machine has, and readings that no sensor gives.
+        setup: what of the campaign is set up wrongly; nothing else was looked for then.
         wording: the function that puts a diagnosis into words.
     """
 
@@ -98,6 +100,7 @@ class Diagnosis:
     needed: str
     remarks: tuple[str, ...]
     wording: Callable[["Diagnosis"], str]
+    setup: tuple[SetupBlunder, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 

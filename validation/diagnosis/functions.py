@@ -18,7 +18,7 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
 
@@ -44,8 +44,11 @@ from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
 
 Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
+Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _PROBES = 3  # random directions by which equal places are known
 _DIGITS = 6
+_REMEMBERED = 8  # columns of forms whose products are kept
+_WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
 
 
@@ -78,6 +81,7 @@ class Weighted:
         squares: (S, R).
         beside: (pairs, R) products of components of one combination.
         cells: their rows and components.
+        known: products of columns of a form at all places, and of pairs of these.
     """
 
     rows: NDArray
@@ -85,6 +89,19 @@ class Weighted:
     squares: NDArray
     beside: NDArray
     cells: tuple[NDArray, NDArray]
+    known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
+
+    def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
+        """(S, m, m) B'B at all places and (pairs, m, m), of columns P (R, m)."""
+        if key in self.known:
+            return self.known[key]
+        m = columns.shape[1]
+        outer = (columns[:, :, None] * columns[:, None, :]).reshape(-1, m * m)
+        whole = (self.squares @ outer).reshape(-1, m, m)
+        cross = (self.beside @ outer).reshape(-1, m, m)
+        if m <= _REMEMBERED:
+            self.known[key] = whole, cross
+        return whole, cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,17 +149,20 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 class Functions:
     """Places, variables and forms of a campaign's functions."""
 
-    def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
+    def __init__(
+        self, campaign: Campaign, sensitivities: Sensitivities, some: bool = True
+    ) -> None:
         """List them; what does the same to the readings counts once.
 
         Args:
             campaign: of which commands, loads, covariates and sigma are read.
             sensitivities: of its rows.
+            some: whether any function may act.
         """
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self._over_sigma = np.where(campaign.cells, 1 / campaign.sigma, 0.0)
-        self.variables = variables_of(self.conditions)
+        self.variables = variables_of(self.conditions) if some else []
         self.plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         self._list_places()
         self.shapes_of = lru_cache(maxsize=None)(self._shapes_of)
@@ -261,7 +281,7 @@ class Functions:
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
-    def first_look(self) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    def first_look(self) -> list[Asked]:
         """Variables, and forms that show whether they count."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
@@ -270,7 +290,7 @@ class Functions:
 
     def products(
         self, names: Iterable[str]
-    ) -> list[tuple[Variables, tuple[CandidateShape, ...]]]:
+    ) -> list[Asked]:
         """Products of some variables with any others."""
         asked: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -286,7 +306,7 @@ class Functions:
 
     def look(
         self, taken: Taken, weighted: Weighted, freedom: float,
-        asked: Sequence[tuple[Variables, tuple[CandidateShape, ...]]], most: int,
+        asked: Sequence[Asked], most: int,
     ) -> list[Found]:  # fmt: skip
         """The best functions of some variables and forms beside what is known.
 
@@ -300,7 +320,7 @@ class Functions:
         Returns:
             Functions, best first.
         """
-        if not len(self.places):
+        if not len(self.places) or not asked:
             return []
         row, component = weighted.cells
         count = taken.across.shape[1]
@@ -338,12 +358,12 @@ class Functions:
         for k, own in enumerate(columns):
             part = slice(ends[k], ends[k + 1])
             m = own.shape[1]
-            outer = (own[:, :, None] * own[:, None, :]).reshape(len(own), m * m)
-            whole = (weighted.squares @ outer).reshape(S, m, m)
-            cross = (weighted.beside @ outer).reshape(-1, m, m)
+            whole, cross = weighted.products((variables, shapes[k]), own)
             prior = self.prior(variables, shapes[k])
             for where, mem, turns in self._groups:
                 c, size = mem.shape
+                if size > 1 and size * m > _WIDEST:
+                    continue
                 B = whole[mem[:, 0]] if size == 1 else self._joined(mem, whole, cross)
                 y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
                 b = along[mem, part].reshape(c, size * m)

@@ -24,7 +24,7 @@ from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.prediction import predicted, residual_of
 from validation.diagnosis.sequence import errors_of, pooled, stages
 from validation.diagnosis.signatures import whiten
-from validation.diagnosis.structure import trends
+from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.text import text
 from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import NOT_ENOUGH, Kept, by_names, verdict
@@ -121,16 +121,28 @@ def judge(
         held=held,
         outliers=outliers,
         conditions=traced.conditions,
-        open=predicted(campaign).undetermined | predicted(campaign, fit.robot).undetermined,
+        open=_open(campaign, fit),
         residual_before=declared,
         residual_after=left,
-        trends=tuple(trends(campaign.take(used), traced.conditions.take(used), left[used]))
-        if decision == "outside_library" else (),
+        trends=_trends(campaign, traced, left) if decision == "outside_library" else (),
         next=_next(campaign, traced, fit) if decision == "ambiguous" else None,
         needed=_needed(campaign, traced, fit) if decision == NOT_ENOUGH else "",
         remarks=remarks + _impossible(campaign),
         wording=text,
     )  # fmt: skip
+
+
+def _open(campaign: Campaign, fit: MachineFit) -> NDArray:
+    """(R,) bool, rows where clearances leave the pose free, declared or as found."""
+    found = predicted(campaign, fit.robot).undetermined
+    return np.asarray(predicted(campaign).undetermined | found)
+
+
+def _trends(campaign: Campaign, traced: Traced, left: NDArray) -> tuple[Trend, ...]:
+    """What the residual of the fitted rows varies with."""
+    used = traced.used
+    conditions = traced.conditions.take(used)
+    return tuple(trends(campaign.take(used), conditions, left[used]))
 
 
 def _believed(campaign: Campaign, traced: Traced) -> Campaign:

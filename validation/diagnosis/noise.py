@@ -1,7 +1,7 @@
 """Noise: its scale beside the stated sigma, and blunders.
 
-A reading is good, with N(0, tau^2), or with a probability of one in five hundred
-a blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
+A reading is good, with N(0, tau^2), or with a probability of one in five
+thousand a blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
-_BLUNDERS = 0.002  # of the readings, before they are looked at
+_BLUNDERS = 2e-4  # of the readings, before they are looked at
 _WIDTH = 30.0  # times tau
 _CLEAR = 10.0  # times tau: what no effect does to a few readings alone
 _MANY = 0.03  # more far off than this share are no blunders but an effect

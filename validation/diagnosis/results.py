@@ -86,6 +86,7 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
             "between_repeats": diagnosis.lack.repeats,
         },
         "remarks": list(diagnosis.remarks),
+        "setup_blunders": [asdict(one) for one in diagnosis.setup],
         "outliers": ids[diagnosis.outliers].tolist(),
         "open": ids[diagnosis.open].tolist(),
         "structure": [
@@ -167,8 +168,12 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Effects of the machine found with their parameters, as in the public format.
 
-    Of an effect that the robot's file declares, the value is what the saved robot has;
-    what was declared and the difference found are given with it.
+    Args:
+        diagnosis: a diagnosis.
+
+    Returns:
+        Of an effect that the robot's file declares, the value is what the saved robot
+        has; what was declared and the difference found are given with it.
     """
     robot = diagnosis.campaign.robot
     bare, shown = robot.without_effects(), []

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from assembly.effects import LIBRARY
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
-from validation.diagnosis.functions import Found, Weighted
+from validation.diagnosis.functions import Asked, Found, Weighted
 from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
@@ -188,9 +189,7 @@ class Search:
 
     def run(self, update: Update) -> list[State]:
         """All models seen, best first."""
-        self.weighted: Weighted = self.functions.weighted(self.fit.cells, self.fit.root)
-        pool = [*self.columns.library, *self.columns.explicit]
-        self.dense = Dense(pool, self.fit.cells, self.fit.root)
+        self.prepare()
         self._keep(self.empty)
         front = [self.begin]
         for level in range(MOST):
@@ -208,6 +207,15 @@ class Search:
                 break
             self._grown([best], products=False)
         return sorted(self.seen.values(), key=lambda s: -s.score)
+
+    def prepare(self) -> None:
+        """Products of all candidates with one another, once for all models."""
+        cells = self.fit.cells.copy()
+        cells[cells] = self.fit.glanced
+        root = self.fit.root[self.fit.glanced]
+        self.weighted: Weighted = self.functions.weighted(cells, root)
+        pool = [*self.columns.library, *self.columns.explicit]
+        self.dense = Dense(pool, self.fit.cells, self.fit.root)
 
     def _keep(self, states: Iterable[State]) -> None:
         """Remember models that support what they claim."""
@@ -272,9 +280,9 @@ class Search:
                 break
         found: list[Found] = []
         if functions:
-            found = self._look(state, self.functions.first_look())
+            found = self.look(state, self.functions.first_look())
         if products:
-            found += self._look(state, self._products(found))
+            found += self.look(state, self._products(found))
         found.sort(key=lambda one: -one.worth)
         made = [(one.worth, self._element(one)) for one in found[:_BEAM]]
         best += [(w, e) for w, e in made if e is not None and e not in state.elements]
@@ -282,15 +290,23 @@ class Search:
         begin = state.score - MORE
         return [(begin + w, e) for w, e in best[: _BEAM + 2]]
 
-    def _products(self, found: Sequence[Found]) -> list:
+    def _products(self, found: Sequence[Found]) -> list[Asked]:
         """Products of the variables of the best functions, and of directions."""
         names = list(dict.fromkeys(one.variables[0] for one in found))[:4]
         if "approach" in self.functions.variables:
             names.append("approach")
         return self.functions.products(dict.fromkeys(names))
 
-    def _look(self, state: State, asked: list, most: int = 3) -> list[Found]:
-        return self.functions.look(state.taken, self.weighted, FREEDOM, asked, most)
+    def look(
+        self, state: State, asked: Sequence[Asked], most: int = 3
+    ) -> list[Found]:
+        """The best functions beside a model, by what they would be worth in all rows."""
+        found = self.functions.look(state.glance, self.weighted, FREEDOM, asked, most)
+        more = len(self.fit.glanced) / self.fit.glanced.sum()
+        scaled = [
+            replace(f, worth=more * (f.worth - f.log_prior) + f.log_prior) for f in found
+        ]
+        return sorted(scaled, key=lambda one: -one.worth)
 
     def _element(self, found: Found) -> Element | None:
         """A function's element, made once."""
@@ -316,7 +332,7 @@ class Search:
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)
         if len(one.parts) == 1:
-            found = self._look(base, [(variables, tuple(priors))], most=4)
+            found = self.look(base, [(variables, tuple(priors))], most=4)
             return [self._element(f) for f in found]
         tried = [Candidate(one.parts, one.kind, shape) for shape in priors]
         made = [
@@ -497,15 +513,22 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         noise=Noise(tau, tau_std),
         weights=good,
         models=_models(states, weights),
-        probability={
-            name: float(sum(w for w, n in zip(weights, names, strict=True) if name in n))
-            for name in sorted(effects)
-        },
+        probability={n: _probability(n, states, weights) for n in sorted(effects)},
         unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
         blocks=blocks,
         gain=best.score - search.begin.score,
         states=tuple(states),
     )
+
+
+def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
+    """Of an effect; finite motions beside others are part of these, and no claim."""
+    has = [
+        any(e.name == name for e in s.elements)
+        and (len(s.elements) == 1 or not LIBRARY[name].finite)
+        for s in states
+    ]
+    return float(weights[has].sum())
 
 
 def _unlike(states: Sequence[State]) -> list[State]:

@@ -23,6 +23,10 @@ def sentence(diagnosis: Diagnosis) -> str:
         unsure = f" +- {diagnosis.uncertainty:.2f}"
     kept = f"on {where} the residual is {diagnosis.before.normalised:.2f} sigma before"
     both = f"{kept}, {after.normalised:.2f}{unsure} after (1 is noise)"
+    if diagnosis.setup:
+        return "The campaign is set up wrongly: " + "; ".join(
+            one.sentence for one in diagnosis.setup
+        )
     small_ones = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
     if diagnosis.verdict == "none_needed":
         return (
@@ -86,8 +90,8 @@ def noise_text(diagnosis: Diagnosis) -> str:
     text = f"readings scatter {tau:.2f} +- {std:.2f} times the sigma stated"
     if diagnosis.lack.sigma_too_small:
         text += (
-            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is too "
-            "small, or there is memory, a change in time, or something not recorded"
+            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is "
+            "too small, or there is memory, a change in time, or something not recorded"
         )
     return text
 

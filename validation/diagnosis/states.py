@@ -23,6 +23,7 @@ MORE = math.log(2.0)  # an element more is half as likely
 IN_USE = math.log(10.0), math.log(10.0)  # geometry, springs: one campaign in ten
 _GROUPS = 4
 _RANK = 1e-9
+_GLANCED = 500  # rows by which functions are looked for first, drawn once
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,18 @@ class State:
         columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
         X = np.hstack(columns)
         return take_out(X, self.sizes.std, z, f.flat)
+
+    @cached_property
+    def glance(self) -> Taken:
+        """The same in the rows of a first look."""
+        f = self.fit
+        if f.glanced.all():
+            return self.taken
+        columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
+        X, z = np.hstack(columns)[f.glanced], f.readings(self.elements)[f.glanced]
+        flat = np.linalg.qr(f.flat[f.glanced])[0]
+        X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
+        return take_out(X, self.sizes.std, z, flat)
 
     @cached_property
     def fitted(self) -> NDArray:
@@ -92,6 +105,10 @@ class Fitting:
             weights: (n,) precision of each beside that of a good one.
         """
         self.columns, self.cells, self.weights = columns, cells, weights
+        rows = columns.row[cells]
+        number = np.unique(rows, return_inverse=True)[1]
+        order = np.random.default_rng(0).permutation(number.max(initial=0) + 1)
+        self.glanced = order[number] < _GLANCED
         self.root = np.sqrt(weights)
         flat = columns.flat[cells] * self.root[:, None]
         flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)

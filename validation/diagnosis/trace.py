@@ -10,9 +10,10 @@ Steps:
 It is given the rows to be fitted, and reads no others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,8 +134,9 @@ class Traced:
 
 
 def trace(
-    campaign: Campaign, fitted: NDArray, update: Update, *, finite: bool = False
-) -> tuple[Traced, MachineFit]:
+    campaign: Campaign, fitted: NDArray, update: Update, *, finite: bool = False,
+    odds: Mapping[str, float] = MappingProxyType({}),
+) -> tuple[Traced, MachineFit]:  # fmt: skip
     """Search for the effects and functions that a declared model lacks.
 
     Args:
@@ -142,6 +144,7 @@ def trace(
         fitted: (R,) bool, the rows that are read.
         update: told what is done, how much of it and of how much.
         finite: whether motions of the declared model are finite.
+        odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
 
     Returns:
         What was found, and the machine that has it.
@@ -159,7 +162,7 @@ def trace(
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
-    columns = Columns(campaign, conditions, update)
+    columns = Columns(campaign, conditions, update, odds)
     cells = fitted[columns.row]
     for turn in range(_TURNS):
         read = predict(conditions).deviation

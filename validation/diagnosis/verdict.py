@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
+from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.select import Selected
 
 NOT_ENOUGH = "not_enough_rows"
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one is a rival
 _LISTED = 0.02  # probability from which an alternative is listed
-FUNCTION = "function"  # among the names of a model that has one
 
 Sets = tuple[tuple[tuple[str, ...], float], ...]
 
