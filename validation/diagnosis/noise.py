@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
 _BLUNDERS = 2e-4  # of the readings, before they are looked at
 _WIDTH = 30.0  # times tau
+_LEFT_OUT = 1e-12  # weight of a blunder
 _CLEAR = 10.0  # times tau: what no effect does to a few readings alone
-_MANY = 0.03  # more far off than this share are no blunders but an effect
+_MANY = 0.05  # more far off than this share are no blunders but an effect
 _MEDIAN = 0.4549  # of the chi-square of one degree of freedom
 
 
@@ -58,8 +59,8 @@ def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def weights_of(good: NDArray) -> NDArray:
-    """(n,) precision of readings, of one that is good."""
-    return good + (1 - good) / _WIDTH**2
+    """(n,) weights of readings; a blunder has none, however far off it is."""
+    return np.maximum(good, _LEFT_OUT)
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:
