@@ -16,6 +16,7 @@ def found(effects, small=()):
     parts = [
         SimpleNamespace(
             device=False,
+            session=None,
             hypothesis=SimpleNamespace(effect=name, public=lambda robot, x: x),
             values=values,
         )
@@ -24,6 +25,7 @@ def found(effects, small=()):
     return SimpleNamespace(
         unknowns=SimpleNamespace(effects=parts, small=small),
         own=lambda one: (one.values, None, None),
+        robot=SimpleNamespace(effects=effects),
     )
 
 
