@@ -7,6 +7,7 @@ the text comes along as ``wording``, so that this module needs none of them.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
@@ -45,8 +46,8 @@ class Diagnosis:
         declared: the same for the declared model.
         before: on the held-out rows without outliers, with the declared model.
         after: likewise, with machines fitted without these rows; whatever the verdict.
-        saved: errors of the saved robot on all rows without outliers, most of which it
-            was fitted to.
+        saved: errors of the saved robot on all rows without outliers, to which it was
+            fitted.
         noise: by sigma.
         with_outliers: before and after with the held-out rows called outliers.
         uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
@@ -108,6 +109,11 @@ class Diagnosis:
     def robot(self) -> Robot:
         """The machine found, as fitted."""
         return self.fit.robot
+
+    @property
+    def fitted(self) -> NDArray:
+        """(R,) bool, rows to which the machine that is saved was fitted."""
+        return np.asarray(self.traced.used | (self.held.rows & ~self.outliers))
 
     @property
     def better(self) -> bool:
