@@ -21,6 +21,12 @@ from validation.diagnosis.sentence import (
 from validation.diagnosis.structure import Trend
 
 
+def test_a_product_of_two_variables_names_both():
+    numbers = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
+    function = Function("drive", ("rz",), ("q.drive", "cov.bed"), "powers", numbers)
+    assert formula(function) == "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"
+
+
 @pytest.mark.parametrize(
     ("form", "parameters", "expected"),
     [
@@ -90,7 +96,7 @@ SAID = [
     ({"verdict": "none_needed"}, "is noise as far as this design can tell (7.00 sigma"),
     ({"verdict": "explained"}, "lacks a and b and springs; on held-out rows the"),
     ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
-    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on rows"),
+    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on held"),
     ({"verdict": "outside_library"}, "sigma stay, which vary with x0, x1, x2; on held"),
     ({"verdict": "outside_library", "trends": ()}, "rows 2.50 sigma stay; on held"),
     ({"verdict": "not_enough_rows"}, "too few to tell a cause from chance; on held"),
@@ -110,6 +116,7 @@ def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected)
             unknowns=SimpleNamespace(small=(SimpleNamespace(name="springs"),))
         ),
         "held": HeldOut("split", (np.array([False, True]),), ""), "uncertainty": 0.25,
+        "setup": (),
         "trends": tuple(Trend(f"x{k}", 0.1, 0.0) for k in range(5)),
     } | changes)  # fmt: skip
     assert expected in sentence(one)
