@@ -7,7 +7,10 @@ from assembly.kinematics.posture import place_robot
 from assembly.model.robot import BeamLink, Frame, Robot
 from tests.planar_arm_for_tests import SIGMA
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.claims import parameters_of
+from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.unknowns import Acting, Unknowns
 
 LENGTH = 0.8
 
@@ -66,3 +69,17 @@ def gives_way(M, k):
     across = np.cross([0, 0, 1], along(bar()))
     seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
     return bar([0, 0, M, 0, 0, 0], seen)
+
+
+def machine(campaign, *hypotheses, start=0.0):
+    """The bar with the unknowns of some hypotheses, fitted to all of its rows."""
+    parts = [Acting(h, np.full(len(h.slots), start)) for h in hypotheses]
+    unknowns = Unknowns(campaign.robot, tuple(parts))
+    return fit_machine(campaign, unknowns, np.ones(len(campaign), bool))
+
+
+def numbers(fit):
+    """Name, value and standard deviation of the first effect's parameters."""
+    one = fit.unknowns.effects[0]
+    x, C, _ = fit.own(one)
+    return parameters_of(fit.unknowns.robot, one, x, C)

@@ -72,11 +72,11 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Stiffnesses from compliances."""
+    """Stiffnesses from compliances; below 0 of what is declared too soft."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()
-        if c > RIGID
+        if abs(c) > RIGID
     }
 
 

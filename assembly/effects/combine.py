@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from assembly.effects.effect import Values
+from assembly.effects.effect import RIGID, Values
 from assembly.effects.registration import BASE
 from stiffness.screws import rotation_matrix, rotation_vector
 
@@ -48,8 +48,10 @@ def _sum(declared: Values, found: Values) -> dict[str, float]:
 
 def _in_series(declared: Values, found: Values) -> dict[str, float]:
     """Stiffnesses of springs in series; absent means rigid."""
-    soft = {k: 1 / v + 1 / declared.get(k, math.inf) for k, v in found.items()}
-    return dict(declared) | {k: 1 / c for k, c in soft.items()}
+    both = {k: 1 / v for k, v in declared.items()}
+    for k, v in found.items():
+        both[k] = both.get(k, 0.0) + 1 / v
+    return {k: 1 / c for k, c in both.items() if c > RIGID}
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:

@@ -26,9 +26,9 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Stiffnesses from compliances; a rigid drive is none of the effect's."""
+    """Stiffnesses from compliances; below 0 of a drive that is declared too soft."""
     ends = len(".compliance")
-    return {name[:-ends]: 1 / c for name, c in values.items() if c > RIGID}
+    return {name[:-ends]: 1 / c for name, c in values.items() if abs(c) > RIGID}
 
 
 DRIVE_COMPLIANCE = Effect(

@@ -129,6 +129,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
     if far.any():
         q = np.where(far[:, None], targets.coordinates[:, driven], q)
         standing = machine.at(q, targets)[0]
+    reason = _astray(robot, standing.error, reason)
     last = standing.campaign
     spread = deviation_spread(
         robot, lambda other: machine.conditions(replace(last, robot=other))
@@ -193,6 +194,18 @@ def _too_far(
             f"{unit}, larger than the robot ({most[k]:.3g} {unit})"
         )
     return beyond.any(axis=1), reason
+
+
+def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
+    """(R,) texts, with one for rows that stay (R, 6) farther off than the robot."""
+    size, reason = size_of(robot), reason.copy()
+    off = np.linalg.norm(error[:, 3:], axis=1)
+    for row in np.flatnonzero((off > size) & (reason == "")):
+        reason[row] = (
+            f"no command brings it nearer than {off[row]:.3g} m, larger than the robot "
+            f"({size:.3g} m)"
+        )
+    return reason
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:

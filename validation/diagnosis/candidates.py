@@ -342,7 +342,8 @@ def places_of(
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
-    single += [("reading", (axis,)) for axis in AXES] + [("reading", AXES)]
+    single += [(p, (axis,)) for p in ("base", "reading") for axis in AXES]
+    single.append(("reading", AXES))
     for name in (*(f.name for f in robot.frames), "base"):
         single += [(name, TURN), (name, SHIFT)]
     own = tuple((f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated)

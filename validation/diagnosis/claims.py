@@ -5,11 +5,15 @@ that change, the chance of as large a change without it is small, and none of it
 unknowns that give it its name is at a bound.
 """
 
+from types import MappingProxyType
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from assembly.effects import LIBRARY
+from assembly.effects.combine import combined
+from assembly.effects.effect import Values
 from assembly.model.robot import Robot
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.unknowns import Acting
@@ -17,6 +21,7 @@ from validation.diagnosis.unknowns import Acting
 _CHANCE = 1e-3  # probability of as large an effect where there is none
 _AT_BOUND = 1e-3  # of a bound's distance from the start: the unknown is at the bound
 _STEP = 1e-4  # of an unknown's size, for derivatives of public parameters
+_NOTHING: Values = MappingProxyType({})
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
@@ -64,21 +69,29 @@ def _at_lower(one: Acting, x: NDArray) -> NDArray:
 
 
 def parameters_of(
-    robot: Robot, one: Acting, x: NDArray, C: NDArray
+    robot: Robot, one: Acting, x: NDArray, C: NDArray, declared: Values = _NOTHING
 ) -> list[tuple[str, float, float]]:
-    """Public name, value and standard deviation of an effect's parameters.
+    """Public name, value and standard deviation of a machine's parameters.
 
     Args:
         robot: without effects.
         one: the effect.
         x: (k,) values of its unknowns.
         C: (k, k) their covariance.
+        declared: parameters of the same effect in the robot's file.
 
     Returns:
-        Parameters in the units of the public format.
+        Parameters that were found, in the units of the public format: of the machine,
+        with what was declared.
     """
     h = one.hypothesis
-    value = h.public(robot, x)
+
+    def public(x: NDArray) -> dict[str, float]:
+        found = h.public(robot, x)
+        both = combined({h.effect: declared}, {h.effect: found})[h.effect]
+        return {name: both[name] for name in found if name in both}
+
+    value = public(x)
     J = np.zeros((len(value), len(x)))
     phase = np.array([name.endswith(".phase") for name in value], dtype=bool)
     for i, slot in enumerate(h.slots):
@@ -87,8 +100,8 @@ def parameters_of(
         for sign in (1.0, -1.0):
             moved = x.copy()
             moved[i] += sign * step
-            public = h.public(robot, moved)
-            ends.append(np.array([public.get(name, np.nan) for name in value]))
+            there = public(moved)
+            ends.append(np.array([there.get(name, np.nan) for name in value]))
         change = ends[0] - ends[1]
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)

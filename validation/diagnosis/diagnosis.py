@@ -7,6 +7,7 @@ the text comes along as ``wording``, so that this module needs none of them.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
@@ -22,9 +23,6 @@ from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.setup_blunders import SetupBlunder
 from validation.diagnosis.structure import Trend
 from validation.diagnosis.trace import Traced
-
-_SURELY = 3.0  # standard deviations by which a scale of noise is surely above 1
-_MORE = 0.1  # and by how much, to be worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +43,8 @@ class Diagnosis:
         declared: the same for the declared model.
         before: on the held-out rows without outliers, with the declared model.
         after: likewise, with machines fitted without these rows; whatever the verdict.
-        saved: errors of the saved robot on all rows without outliers, most of which it
-            was fitted to.
+        saved: errors of the saved robot on all rows without outliers, to which it was
+            fitted.
         noise: by sigma.
         with_outliers: before and after with the held-out rows called outliers.
         uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
@@ -110,16 +108,15 @@ class Diagnosis:
         return self.fit.robot
 
     @property
+    def fitted(self) -> NDArray:
+        """(R,) bool, rows to which the machine that is saved was fitted."""
+        return np.asarray(self.traced.used | (self.held.rows & ~self.outliers))
+
+    @property
     def better(self) -> bool:
         """Whether the machine found predicts the held-out rows better than declared."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
-
-    @property
-    def more_scatter(self) -> bool:
-        """Whether readings scatter clearly more than stated."""
-        tau, std = self.noise_scale
-        return self.lack.sigma_too_small or tau > 1.0 + _SURELY * std + _MORE
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""

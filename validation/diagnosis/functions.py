@@ -81,7 +81,7 @@ def _likeliest(
     parts: Mapping[int, Sequence[_Scored]], taken: Taken, freedom: float
 ) -> list[tuple[float, int, int, int]]:
     """Worth, and which variables, form and place, of all that show; best first."""
-    worths, whose = [], []
+    worths, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
     for own in parts.values():
         gains = averaged_gains(
             np.concatenate([p.gram for p in own]),

@@ -5,7 +5,7 @@ that share one number (all of them, or those of one kind: ``leg1.rod``, ``leg2.r
 Each of these is a hypothesis of its own, with as many unknowns as it has slots.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -192,7 +192,7 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
 
     Returns:
         The same, but for contact laws in joints that have one; a drift has the time
-        constant that the file declares.
+        constant that the file declares, and springs may be stiffer than declared.
     """
     contacts = {
         key.removesuffix(".coefficient")
@@ -205,8 +205,24 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
             continue
         if h.effect == "drift" and constant is not None:
             h = replace(h, slots=tuple(_held(s, constant) for s in h.slots))
+        if h.effect in _SPRINGS and h.effect in robot.effects:
+            soft = {k: 1 / v for k, v in robot.effects[h.effect].items()}
+            h = replace(h, slots=tuple(_stiffer(s, soft) for s in h.slots))
         kept[h] = None
     return list(kept)
+
+
+_SPRINGS = ("drive_compliance", "base_compliance")
+
+
+def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
+    """A slot of compliances, which may be less by those declared, by public name."""
+    names = [
+        n.removesuffix(".compliance").replace("compliance.", "stiffness.")
+        for n in slot.names
+    ]
+    least = -min(soft.get(name, 0.0) for name in names)
+    return replace(slot, unknown=replace(slot.unknown, lower=least))
 
 
 def _held(slot: Slot, constant: float) -> Slot:

@@ -73,7 +73,7 @@ def judge(
     outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
     rows = held.rows & ~outliers
     steps = pooled(campaign, every, rows)
-    fit, correlated = _with_noise_in_time(traced, fit)
+    fit, correlated = _with_noise_in_time(traced.fitting, fit)
     left = residual_of(campaign, fit.robot)
     lack = _lack_of_fit(campaign, traced, fit, left)
     names = _names(fit)
@@ -93,6 +93,9 @@ def judge(
     if remarks and decision in {"explained", "learned"}:
         decision, claimed = "outside_library", ()
     declared = _declared_residual(campaign, traced, FINITE in names)
+    if held.how == "split":  # what is saved is fitted to all rows, now that they judged
+        fit, correlated = _of_all_rows(campaign, traced, fit, used | rows)
+        left = residual_of(campaign, fit.robot)
     return Diagnosis(
         campaign=campaign,
         verdict=decision,
@@ -185,11 +188,22 @@ def _outlying_held(
     return outliers
 
 
+def _of_all_rows(
+    campaign: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
+) -> tuple[MachineFit, NoiseInTime | None]:
+    """The same unknowns fitted to some more rows, of the noise found in the others."""
+    believed = _believed(campaign, traced)
+    more = campaign.cells & ~traced.campaign.cells
+    sigma = np.where(more, believed.sigma * traced.selected.noise.tau, believed.sigma)
+    believed = replace(believed, sigma=sigma)
+    fit = fit_machine(believed, fit.unknowns, rows, fit.x)
+    return _with_noise_in_time(believed.take(rows), fit)
+
+
 def _with_noise_in_time(
-    traced: Traced, fit: MachineFit
+    fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
     """The fit with the covariance that noise correlated in time leaves, if it is."""
-    fitting = traced.fitting
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise

@@ -16,6 +16,7 @@ from scipy.stats import chi2
 FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
 _BLUNDERS = 2e-4  # of the readings, before they are looked at
 _WIDTH = 30.0  # times tau
+_LEFT_OUT = 1e-12  # weight of a blunder
 _CLEAR = 10.0  # times tau: what no effect does to a few readings alone
 _MANY = 0.03  # more far off than this share are no blunders but an effect
 _UNLIKE = 4.0  # standard deviations from the stated sigma
@@ -63,8 +64,8 @@ def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def weights_of(good: NDArray) -> NDArray:
-    """(n,) precision of readings, of one that is good."""
-    return good + (1 - good) / _WIDTH**2
+    """(n,) weights of readings; a blunder has none, however far off it is."""
+    return np.maximum(good, _LEFT_OUT)
 
 
 def scatter_of_repeats(z: NDArray, group: NDArray) -> tuple[float, int]:

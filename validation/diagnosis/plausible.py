@@ -113,6 +113,9 @@ def _parameters(
         if one.device:
             continue
         values = one.hypothesis.public(bare, fit.own(one)[0])
+        if one.session is None:  # with what the robot's file declares
+            machine = fit.robot.effects.get(one.hypothesis.effect, {})
+            values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0
         if "time_constant" in values:
             span = float(np.ptp(campaign.covariates["time"]))

@@ -1,7 +1,6 @@
 """A diagnosis for machines, in the public format."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -64,6 +63,7 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "noise_scale": {
             "value": diagnosis.noise_scale[0],
             "std": diagnosis.noise_scale[1],
+            "findings": list(diagnosis.traced.selected.noise.findings),
         },
         "noise_in_time": None
         if diagnosis.noise_in_time is None
@@ -186,17 +186,18 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             continue
         name, h = one.hypothesis.effect, one.hypothesis
         x, C, _ = diagnosis.fit.own(one)
-        parameters = parameters_of(bare, one, x, C)
+        declared = robot.effects.get(name, {}) if one.session is None else {}
+        parameters = parameters_of(bare, one, x, C, declared)
+        differences = h.public(bare, x)
         acting = {n for p, *_ in parameters for n in (p, p.rpartition(".")[0])}
-        declared = robot.effects.get(name, {})
-        saved = diagnosis.robot.effects.get(name, {})
         shown.append({
             "name": name,
             # frames found rigid or tight have no parameter
             "where": [frame for frame in h.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
-                _parameter(p, (value, std), declared, saved, unit(name, p))
+                _parameter(p, value, std, unit(name, p))
+                | _found(declared.get(p), differences[p], value)
                 for p, value, std in parameters
             ],
         })
@@ -220,22 +221,20 @@ def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _parameter(
-    name: str, found: tuple[float, float], declared: Mapping[str, float],
-    saved: Mapping[str, float], unit: str,
-) -> dict[str, Any]:  # fmt: skip
-    """A parameter: the machine's value, and what was declared of it."""
-    difference, std = found
-    value = saved.get(name, difference)
-    one = {
-        "name": name, "value": value, "std": std,
-        "interval_90": [value - 1.645 * std, value + 1.645 * std], "unit": unit,
+def _parameter(name: str, value: float, std: float, unit: str) -> dict[str, Any]:
+    """A parameter of the machine."""
+    interval = [value - 1.645 * std, value + 1.645 * std]
+    return {
+        "name": name, "value": value, "std": std, "interval_90": interval, "unit": unit,
     }  # fmt: skip
-    if name in declared:
-        one["found"] = {
-            "declared": declared[name], "difference": difference, "corrected": value,
-        }  # fmt: skip
-    return one
+
+
+def _found(declared: float | None, difference: float, value: float) -> dict[str, Any]:
+    """What was declared of a parameter, and the difference found for it, if it was."""
+    if declared is None:
+        return {}
+    told = {"declared": declared, "difference": difference, "corrected": value}
+    return {"found": told}
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:

@@ -108,7 +108,7 @@ def _record(diagnosis: Diagnosis) -> dict[str, Any]:
         "digest": digest(campaign),
         "verdict": diagnosis.verdict,
         "rows": len(campaign),
-        "rows_fitted": int(diagnosis.traced.used.sum()),
+        "rows_fitted": int(diagnosis.fitted.sum()),
         "held_out": diagnosis.held.how,
         "held_out_rows": int(diagnosis.held.rows.sum()),
     }

@@ -1,6 +1,7 @@
 """What a diagnosis says, in sentences."""
 
 import math
+from collections.abc import Sequence
 
 from numpy.typing import NDArray
 
@@ -84,18 +85,6 @@ def calibration_text(tally: Calibration) -> str:
     )
 
 
-def noise_text(diagnosis: Diagnosis) -> str:
-    """That readings scatter more than stated, and what that may be."""
-    tau, std = diagnosis.noise_scale
-    text = f"readings scatter {tau:.2f} +- {std:.2f} times the sigma stated"
-    if diagnosis.lack.sigma_too_small:
-        text += (
-            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is "
-            "too small, or there is memory, a change in time, or something not recorded"
-        )
-    return text
-
-
 def open_text(open_: NDArray) -> str:
     """In which rows clearances leave the pose undetermined, and what is then predicted.
 
@@ -114,12 +103,12 @@ def open_text(open_: NDArray) -> str:
 
 def formula(function: Function) -> str:
     """A function in words, by component: numbers times what they multiply."""
-    name = function.variables[0].rpartition(".")[2]
+    names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
         numbers = parameters_of(function, component)
         terms = [
-            f"{numbers[key]:.4g} {_column_text(function.form, key, name)}".rstrip()
+            f"{numbers[key]:.4g} {_column_text(function.form, key, names)}".rstrip()
             for key in columns_of(function, component)
         ]
         words.append(f"{component} = {' + '.join(terms)}")
@@ -127,13 +116,14 @@ def formula(function: Function) -> str:
     return "; ".join(words) + times
 
 
-def _column_text(form: str, key: str, name: str) -> str:
+def _column_text(form: str, key: str, names: Sequence[str]) -> str:
     """What a column of a form is, in words."""
     head, _, word = key.rpartition(".")
     if form == "powers":
-        return {"0": "", "1": name}.get(key, f"{name}^{key}")
+        orders = zip(names, key.split("."), strict=False)
+        return " ".join(n if o == "1" else f"{n}^{o}" for n, o in orders if o != "0")
     if form == "waves" and head == "0":
         return ""
-    if form == "waves":
-        return f"{'sin' if word == 'sine' else 'cos'}({head} {name})"
-    return f"{form}.{key}({name})"
+    if form == "waves" and len(names) == 1:
+        return f"{'sin' if word == 'sine' else 'cos'}({head} {names[0]})"
+    return f"{form}.{key}({', '.join(names)})"

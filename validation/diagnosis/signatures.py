@@ -171,7 +171,10 @@ class Tangents:
         # the exact model is a hundred times slower than the linear one
         load = np.linalg.norm(self.conditions.load, axis=1)
         size = np.linalg.norm(predict(self.conditions).deviation[:, :3], axis=1)
+        read = np.asarray(self.campaign.cells.any(axis=1))
+        load, size = np.where(read, load, -1.0), np.where(read, size, -1.0)
         rows = np.unique([*np.argsort(-load)[:_PROBED], *np.argsort(-size)[:_PROBED]])
+        rows = rows[read[rows]]
         some, part = self.campaign.take(rows), self.conditions.take(rows)
         changed = apply_effects(part, {hypothesis.effect: {}})
         change = predict(changed).deviation - predict(part).deviation

@@ -6,7 +6,6 @@ of one size for all rotations and one for all translations that the readings are
 for (:mod:`validation.diagnosis.evidence`).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,49 +136,6 @@ def _term(
         sure=bool(np.isfinite(known[shown]).any()),
         most=most,
     )
-
-
-def added(
-    campaign: Campaign, response: Responses, conditions: Conditions,
-    terms: Sequence[SmallTerm], values: Sequence[NDArray],
-) -> NDArray:  # fmt: skip
-    """What geometric errors and springs add to the readings of any rows.
-
-    Args:
-        campaign: of R rows.
-        response: of its readings.
-        conditions: its conditions.
-        terms: found on these rows or on others of the same robot; others than
-            geometry and springs are passed over.
-        values: (k,) of each term.
-
-    Returns:
-        (R, 6) [rad, m].
-    """
-    total = np.zeros((len(conditions), 6))
-    own = np.array([
-        conditions.robot.index(frame.name) for frame in campaign.robot.frames
-    ])
-    for term, x in zip(terms, values, strict=True):
-        if term.name not in {GEOMETRY, SPRINGS}:
-            continue
-        rows = own[term.frame]
-        amount = np.broadcast_to(x, (len(conditions), len(x)))
-        if term.name == SPRINGS:
-            amount = amount * response.wrenches[:, rows, term.axis]
-        total += np.einsum("rik,rk->ri", response.screws[:, :, rows, term.axis], amount)
-    return total
-
-
-def screws_of(
-    campaign: Campaign, terms: Sequence[SmallTerm], values: Sequence[NDArray]
-) -> NDArray:
-    """(n, 6) [rad, m] geometric errors of all frames among small unknowns."""
-    errors = np.zeros((len(campaign.robot.frames), 6))
-    for term, x in zip(terms, values, strict=True):
-        if term.name == GEOMETRY:
-            errors[term.frame, term.axis] = x
-    return errors
 
 
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:

@@ -216,9 +216,10 @@ def _traced(
     sigma[campaign.cells] *= selected.noise.tau / np.sqrt(weights)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
-    count = np.bincount(columns.row, minlength=len(campaign))
-    share = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
-    outliers = (share > 0.5 * np.maximum(count, 1)) | impossible_rows(campaign)
+    # the row of a blunder is left out whole: what else was read then is doubtful, and
+    # errors and verdicts are by row
+    blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
+    outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
         campaign=replace(campaign, sigma=sigma),
         unregistered=declared,

@@ -35,6 +35,7 @@ from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_error
 
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
+_HELD = 1e-12  # plausible sizes, of an unknown whose value the file declares
 _STEP = 1e-4  # of an unknown's size, for its derivative
 
 
@@ -136,7 +137,8 @@ class Unknowns:
     def std(self) -> NDArray:
         """(k,) standard deviation of the prior; of effects so wide that it is flat."""
         wide = [
-            _WIDE * slot.unknown.scale
+            (_HELD if slot.unknown.upper == slot.unknown.lower else _WIDE)
+            * slot.unknown.scale
             for e in self.effects
             for slot in e.hypothesis.slots
         ]
@@ -210,6 +212,7 @@ class Unknowns:
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
         response = responses(conditions)
         J = np.zeros((len(campaign), 6, len(x)))
+        lower, upper = self.bounds
         own_rows = np.array([conditions.robot.index(f.name) for f in robot.frames])
         middle = predict(conditions).deviation if self.effects else np.zeros(0)
         for part, own in zip(self.parts, self.slices, strict=True):
@@ -225,6 +228,8 @@ class Unknowns:
                 J[:, :, own] = there.changes(part.candidate)
             else:
                 for k in range(own.start, own.stop):
+                    if lower[k] == upper[k]:
+                        continue
                     moved, step = self._moved(x, k, part)
                     there_robot = replace(campaign, robot=self.robot_at(moved))
                     other = replace(conditions_of(there_robot), exact=False)

@@ -15,7 +15,7 @@ from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.carrying import _inverse
 from validation.correction.prediction import foretell
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import corrected
+from validation.diagnosis.saving import corrected
 
 SIGMA = 2e-5
 HOUR = 3600.0

@@ -151,3 +151,53 @@ def test_a_simulated_machine_is_brought_where_it_should_be(name, tmp_path):
     after = distances(robot, effects, targets, found.coordinates, program="springs")
     assert before.max() > 1e-4
     assert after.max() < 1e-6
+
+
+SLIDE = """
+name = "slide"
+platform = "head"
+[[frame]]
+name = "rail"
+parent = "base"
+translation = [0, 0, 1.0]
+[[frame]]
+name = "carriage"
+parent = "rail"
+joint = "prismatic"
+actuated = true
+[[frame]]
+name = "head"
+parent = "carriage"
+translation = [0.2, 0, 0]
+[[effect]]
+name = "function"
+where = "carriage"
+components = ["tz"]
+variables = ["q.carriage"]
+form = "powers"
+parameters = { "0" = OFF }
+"""
+
+
+@pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
+def test_a_correction_larger_than_the_robot_is_refused(off, tmp_path, run):
+    """A slide that is off by metres is a wrong function: its command stays."""
+    robot, table = written(
+        tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"
+    )
+    out, answer = tmp_path / "out.csv", tmp_path / "out.json"
+    code, text, error = run("validation", "compensate", robot, table, "-o", out,
+                            "--json", answer)  # fmt: skip
+    assert error == ""
+    (row,) = rows_of(out)
+    told = json.loads(answer.read_text())["without_answer"]
+    if abs(off) < 1:
+        assert (code, told) == (0, [])
+        assert float(row["q.carriage"]) == pytest.approx(0.3 - off, abs=1e-9)
+        return
+    assert code == 1
+    assert float(row["q.carriage"]) == 0.3
+    ((label, reason),) = [one.values() for one in told]
+    assert label == "a"
+    assert "larger than the robot" in reason
+    assert reason in text

@@ -66,7 +66,7 @@ def test_a_campaign_is_foretold_under_its_names(tmp_path, run):
     code, text, _ = run("validation", "predict", robot_file(tmp_path), str(folder),
                         "-o", str(out))  # fmt: skip
     assert code == 0
-    assert "rms of measured minus foretold" in text
+    assert "rms of measured minus predicted" in text
     rows = rows_of(out)
     assert list(rows[0]) == ["id", "meas.A.tx", "meas.B.ty"]
     # the point A stands 0.1 m further along the tool

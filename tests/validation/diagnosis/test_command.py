@@ -63,13 +63,13 @@ def test_the_command_writes_results_report_and_robot(small, tmp_path, run):
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 
-def test_a_robot_is_saved_only_where_an_effect_is_claimed(tmp_path, run):
+def test_a_robot_is_saved_only_where_something_is_found(tmp_path, run):
     folder = measure(tmp_path / "campaign", configurations=8, passes=3)
     status, _, err = run(
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"
     )
     assert status == 1
-    assert "none_needed" in err
+    assert "nothing was found that the declared robot lacks" in err
     assert not (tmp_path / "r.toml").exists()
 
 

@@ -13,7 +13,7 @@ from assembly.model.robot import Frame, Robot
 from tests.planar_arm_for_tests import SIGMA
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.kept_aside import errors_of
+from validation.diagnosis.sequence import errors_of
 
 TURNING = {"joint": "revolute", "actuated": True}
 ARM = Robot("arm", "tool", (
@@ -66,24 +66,20 @@ def test_large_errors_of_frames_are_explained_as_finite_motions(found):
     assert found.before.normalised > 500
     assert found.after.normalised == pytest.approx(1.0, abs=0.3)
     assert not found.lack.significant
-    (term,) = found.behind.terms
-    assert term.name == "geometry"
+    (part,) = found.fit.unknowns.parts
+    assert part.name == "geometry"
 
 
 def test_each_step_to_what_is_found_is_judged_on_the_same_rows(found):
-    """Declared, geometry; no springs and no effects: as the step before."""
-    steps = {rung.term: rung for rung in found.ladder}
-    assert list(steps) == ["declared", "geometry", "springs", "library effects"]
-    aside = ~found.split.fitted
-    before = errors_of(found.campaign, found.residual_before, aside)
-    assert steps["declared"].error.position == pytest.approx(before.position, rel=0.1)
-    assert steps["geometry"].unknowns == pytest.approx(found.behind.unknowns)
-    assert steps["geometry"].error.normalised == pytest.approx(
-        found.after.normalised, rel=1e-3
-    )
-    for name in ("springs", "library effects"):
-        assert steps[name].unknowns == 0
-        assert steps[name].error == steps["geometry"].error
+    """Declared and geometry; steps that are not there are left out."""
+    declared, geometry = found.sequence
+    assert (declared.term, geometry.term) == ("declared", "geometry")
+    rows = found.held.rows & ~found.outliers
+    before = errors_of(found.campaign, found.campaign.measured, rows)
+    assert declared.error.position == pytest.approx(before.position)
+    told = float(found.fit.determined.sum())
+    assert geometry.unknowns == pytest.approx(told, rel=0.2)  # of folds, smaller
+    assert geometry.error == found.after
 
 
 def test_errors_are_root_mean_squares_over_measured_cells(found):

@@ -1,11 +1,11 @@
-"""Errors on rows kept aside: which of two models foretells them better."""
+"""Rows that judge: which they are, and which of two models foretells them better."""
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
 from tests.campaigns_for_tests import campaign_of
-from validation.diagnosis.holdout import gain_over_blocks, split
+from validation.diagnosis.holdout import gain_over_blocks, hidden, hold_out
 
 BLOCKS = np.repeat(np.arange(15), 6)
 
@@ -52,7 +52,56 @@ def test_the_scatter_of_two_blocks_is_that_of_two_numbers():
     assert gain_over_blocks(before, before - less, np.zeros(4))[1] == 0.0
 
 
-@pytest.mark.parametrize(("rows", "kept"), [(1, 0), (2, 1), (3, 1), (7, 1), (9, 2)])
-def test_a_quarter_is_kept_aside_and_one_row_of_few(rows, kept):
-    parts = split(campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows)))
-    assert np.sum(~parts.fitted) == kept
+def held_in(campaign):
+    """Rows held out, fold by fold."""
+    return [np.flatnonzero(fold).tolist() for fold in hold_out(campaign).folds]
+
+
+@pytest.mark.parametrize(("configurations", "how", "judge"), [
+    (60, "split", 15), (80, "split", 20), (240, "split", 60), (1000, "split", 100),
+    (59, "folds", 59), (9, "folds", 9),
+])  # fmt: skip
+def test_whole_configurations_judge(configurations, how, judge):
+    """A quarter of 60, 60 of some hundreds, a tenth of many; each in a fold of few."""
+    repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
+    campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
+    held = hold_out(campaign)
+    assert (held.how, len(held.folds)) == (how, 1 if how == "split" else 5)
+    judging = [set(repeat[fold]) for fold in held.folds]
+    assert sum(len(names) for names in judging) == judge
+    for fold, names in zip(held.folds, judging, strict=True):
+        assert not names & set(repeat[~fold])
+    assert len(set.union(*judging)) == judge
+    again = hold_out(campaign)
+    assert all(map(np.array_equal, again.folds, held.folds))
+
+
+def test_few_configurations_are_held_out_by_spans_of_time():
+    """Sixteen spans of three rows, each whole and in one fold; order of time counts."""
+    order = np.random.default_rng(0).permutation(48)
+    campaign = campaign_of(
+        np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order
+    )
+    held = hold_out(campaign)
+    assert "5 folds over 16 spans of time" in held.words
+    spans = [np.unique(order[fold] // 3, return_counts=True) for fold in held.folds]
+    assert np.array_equal(np.sort(np.concatenate([s for s, _ in spans])), np.arange(16))
+    assert all((counts == 3).all() for _, counts in spans)
+
+
+@pytest.mark.parametrize(("rows", "folds"), [(1, 1), (2, 2), (3, 3), (7, 5)])
+def test_of_few_rows_every_one_judges(rows, folds):
+    campaign = campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows))
+    parts = held_in(campaign)
+    assert len(parts) == folds
+    assert sorted(sum(parts, [])) == list(range(rows))
+    assert (hold_out(campaign).how == "none") == (rows == 1)
+
+
+def test_hidden_rows_have_no_readings_and_keep_their_commands():
+    campaign = campaign_of(np.ones((4, 6)), loads=np.arange(24.0).reshape(4, 6))
+    rows = np.array([True, False, False, True])
+    there = hidden(campaign, rows)
+    assert np.array_equal(np.isnan(there.measured).all(axis=1), rows)
+    assert np.array_equal(there.loads, campaign.loads)
+    assert np.array_equal(there.cells.any(axis=1), ~rows)

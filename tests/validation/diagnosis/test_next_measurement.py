@@ -16,11 +16,11 @@ from tests.bar_for_tests import (
     bar,
     fit_of,
     gives_way,
+    machine,
 )
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import next_measurement as module
 from validation.diagnosis.next_measurement import next_measurement
-from validation.diagnosis.refit import refit
 from validation.diagnosis.signatures import conditions_of
 
 
@@ -35,9 +35,7 @@ def test_another_temperature_tells_heat_from_length():
     plain = bar(link=BEAM, **heat)
     campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
     here = conditions_of(campaign)
-    longer, warmer = (
-        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
-    )
+    longer, warmer = machine(campaign, LONGER), machine(campaign, WARMER)
     # a rival that is the fit itself, or nothing else, cannot be told from it
     found = next_measurement(campaign, here, longer, [longer, warmer])
     assert found.covariates == {"temperature": T + 10}
@@ -56,19 +54,14 @@ def test_a_measurement_is_worth_a_standard_deviation(power, worth):
     alpha = np.sqrt(power * (1 + ((T + 10) / T) ** 2 / R)) * SIGMA[3] / (LENGTH * 10)
     campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
     here = conditions_of(campaign)
-    longer, warmer = (
-        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
-    )
+    longer, warmer = machine(campaign, LONGER), machine(campaign, WARMER)
     found = next_measurement(campaign, here, longer, [warmer])
     assert (found is not None) == worth
 
 
-def test_what_has_no_answer_decides_nothing(monkeypatch):
-    campaign = bar(link=BEAM)
-    here = conditions_of(campaign)
-    fit = refit(campaign, here, [LONGER], np.zeros(1))
-    monkeypatch.setattr(module, "_power", lambda d, J, C: np.full(len(d), np.nan))
-    assert next_measurement(campaign, here, fit, [fit]) is None
+def test_what_has_no_answer_decides_nothing():
+    d, J = np.array([[np.nan, 0.0], [3.0, 0.0]]), np.zeros((2, 2, 1))
+    assert module._power(d, J, np.eye(1)).tolist() == [0.0, 9.0]
 
 
 def test_loads_temperatures_and_sides_are_tried_within_and_beyond_what_was_used():
@@ -120,14 +113,14 @@ def test_nothing_known_is_missed_by_nothing():
     assert module._power(d, J, np.eye(1)) == pytest.approx([4.5])
 
 
-def test_slopes_of_a_fit_are_those_of_its_numbers(monkeypatch):
+def test_slopes_of_a_fit_are_those_of_its_numbers():
     """Of a length in the readings measured; numbers known surely have none."""
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
-    fit = refit(campaign, here, [LONGER], np.zeros(1))
+    fit = machine(campaign, LONGER)
     sigma = SIGMA.copy()
     sigma[1] = np.nan
-    model, J = module._model(here, fit, sigma)
+    model, J, _ = module._model(here, fit, sigma)
     expected = (fit_of(campaign, 1.0) / SIGMA)[:, [0, 2, 3, 4, 5]]
     assert model.shape == (8, 5)
     np.testing.assert_allclose(J[:, :, 0], expected, atol=1e-6 / SIGMA.min())
@@ -138,7 +131,7 @@ def test_slopes_of_a_fit_are_those_of_its_numbers(monkeypatch):
 def test_nothing_decides_between_one_explanation_and_itself():
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
-    fit = refit(campaign, here, [LONGER], np.zeros(1))
+    fit = machine(campaign, LONGER)
     assert next_measurement(campaign, here, fit, [fit]) is None
 
 
@@ -152,8 +145,8 @@ def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
     seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
     campaign = bar(rows=2, spread=2 * np.pi, measured=seen)
     here = conditions_of(campaign)
-    turned = refit(campaign, here, [TURNED], np.zeros(1))
-    eccentric = refit(campaign, here, [ECCENTRIC], np.zeros(1))
+    turned = machine(campaign, TURNED)
+    eccentric = machine(campaign, ECCENTRIC)
     found = next_measurement(campaign, here, turned, [eccentric])
     q = found.configuration["q.drive"]
     assert abs(q - np.pi) < 0.2
@@ -169,9 +162,7 @@ def test_a_range_of_temperatures_is_left_by_half_of_it():
     seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
     campaign = bar(link=BEAM, measured=seen, **heat)
     here = conditions_of(campaign)
-    longer, warmer = (
-        refit(campaign, here, [one], np.zeros(1)) for one in (LONGER, WARMER)
-    )
+    longer, warmer = machine(campaign, LONGER), machine(campaign, WARMER)
     for fit, rival in ((longer, warmer), (warmer, longer)):
         found = next_measurement(campaign, here, fit, [rival])
         assert found.covariates == {"temperature": 80.0}
@@ -182,10 +173,7 @@ def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed()
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     here = conditions_of(campaign)
-    softer, turned = (
-        refit(campaign, here, [one], np.array([start]))
-        for one, start in ((SOFTER, 1e-6), (TURNED, 0.0))
-    )
+    softer, turned = machine(campaign, SOFTER, start=1e-6), machine(campaign, TURNED)
     found = next_measurement(campaign, here, softer, [turned])
     assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
     assert found.load[2] < 0  # against it they are farther apart

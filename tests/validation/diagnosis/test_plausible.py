@@ -7,8 +7,32 @@ import numpy as np
 import pytest
 
 from tests.planar_arm_for_tests import measured
-from validation.diagnosis.background import NOTHING
 from validation.diagnosis.plausible import implausible, impossible_rows
+from validation.diagnosis.unknowns import Small
+
+
+def found(effects, small=()):
+    """A machine with numbers of effects, by their public names."""
+    parts = [
+        SimpleNamespace(
+            device=False,
+            session=None,
+            hypothesis=SimpleNamespace(effect=name, public=lambda robot, x: x),
+            values=values,
+        )
+        for name, values in effects.items()
+    ]
+    return SimpleNamespace(
+        unknowns=SimpleNamespace(effects=parts, small=small),
+        own=lambda one: (one.values, None, None),
+        robot=SimpleNamespace(effects=effects),
+    )
+
+
+def made_badly(rotation, translation):
+    """A machine whose geometric errors have prior sizes [rad, m]."""
+    std = np.array([rotation, translation])
+    return found({}, [Small("geometry", np.zeros(2, int), np.array([0, 3]), std)])
 
 
 @pytest.fixture(scope="module")
@@ -31,9 +55,7 @@ def campaign(tmp_path_factory):
 )
 def test_a_number_is_taken_or_doubted(campaign, effect, name, fair, absurd):
     def said(value):
-        return implausible(
-            campaign, SimpleNamespace(effects={effect: {name: value}}), NOTHING
-        )
+        return implausible(campaign, found({effect: {name: value}}))
 
     assert said(fair) == ()
     (one,) = said(absurd)
@@ -53,14 +75,16 @@ def test_the_softest_spring_gives_a_fifth_under_the_largest_load(
     campaign, effect, name, softest
 ):
     for value, count in ((1.001 * softest, 0), (0.999 * softest, 1)):
-        fit = SimpleNamespace(effects={effect: {name: value}})
-        assert len(implausible(campaign, fit, NOTHING)) == count
+        fit = found({effect: {name: value}})
+        assert len(implausible(campaign, fit)) == count
 
 
-def test_a_frame_that_is_fitted_anyway_may_be_anywhere(campaign):
-    anywhere = replace(campaign, registration="unknown")
-    fit = SimpleNamespace(effects={"registration": {"base.tx": 29.0}})
-    assert implausible(anywhere, fit, NOTHING) == ()
+def test_the_place_of_a_device_may_be_anywhere(campaign):
+    fit = found({"registration": {"base.tx": 29.0}})
+    assert len(implausible(campaign, fit)) == 1
+    (frame,) = fit.unknowns.effects
+    frame.device = True
+    assert implausible(campaign, fit) == ()
 
 
 def test_a_temperature_that_no_sensor_has_is_flagged(campaign):
@@ -73,10 +97,8 @@ def test_a_temperature_that_no_sensor_has_is_flagged(campaign):
 
 def test_geometric_errors_of_a_fiftieth_of_the_robot_are_doubted(campaign):
     """An arm of about 1 m: frames that are all off by 5 cm were not made like that."""
-    fit = SimpleNamespace(effects={})
     for size, doubted in ((2e-3, 0), (5e-2, 1)):
-        behind = replace(NOTHING, scales={"geometry": (1e-3, size)})
-        assert len(implausible(campaign, fit, behind)) == doubted
+        assert len(implausible(campaign, made_badly(1e-3, size))) == doubted
 
 
 @pytest.mark.parametrize(
@@ -98,18 +120,17 @@ def test_every_number_has_a_range(campaign, effect, name, low, high):
         (0.999 * high, 0), (1.001 * high, 1), (low * 0.999**np.sign(-low), 0),
         (low * 1.001**np.sign(-low), 1),
     ):  # fmt: skip
-        fit = SimpleNamespace(effects={effect: {name: value}})
-        assert len(implausible(campaign, fit, NOTHING)) == doubts, value
+        fit = found({effect: {name: value}})
+        assert len(implausible(campaign, fit)) == doubts, value
 
 
 def test_geometric_errors_have_a_largest_size(campaign):
     """A tenth of a radian; a fiftieth of 0.6 m."""
-    fit = SimpleNamespace(effects={})
     for scales, doubted in (
         ((0.099, 0.0119), []), ((0.101, 0.0119), ["rotation"]),
         ((0.099, 0.0121), ["translation"]), ((1.0, 1.0), ["rotation", "translation"]),
     ):  # fmt: skip
-        said = implausible(campaign, fit, replace(NOTHING, scales={"geometry": scales}))
+        said = implausible(campaign, made_badly(*scales))
         assert [kind in one for kind, one in zip(doubted, said, strict=True)] == [
             True for _ in doubted
         ]
@@ -135,8 +156,8 @@ def test_what_nothing_loads_but_its_weight_may_give_by_a_fifth_too(campaign):
     force = 5.0 + 9.81 * (10.0 + sum(f.mass for f in frames[:-1]))
     softest = force / (0.2 * 0.6)
     for value, count in ((1.001 * softest, 0), (0.999 * softest, 1)):
-        fit = SimpleNamespace(effects={"base_compliance": {"stiffness.tx": value}})
-        assert len(implausible(loaded, fit, NOTHING)) == count
+        fit = found({"base_compliance": {"stiffness.tx": value}})
+        assert len(implausible(loaded, fit)) == count
 
 
 @pytest.mark.parametrize(
@@ -145,5 +166,5 @@ def test_what_nothing_loads_but_its_weight_may_give_by_a_fifth_too(campaign):
      ("encoder_eccentricity", "one.phase", 3.0)],
 )  # fmt: skip
 def test_other_numbers_may_be_anything(campaign, effect, name, value):
-    fit = SimpleNamespace(effects={effect: {name: value}})
-    assert implausible(campaign, fit, NOTHING) == ()
+    fit = found({effect: {name: value}})
+    assert implausible(campaign, fit) == ()

@@ -1,4 +1,4 @@
-"""What a diagnosis makes of residuals: rows kept aside, noise or not, what varies."""
+"""What a diagnosis makes of residuals: noise or not, and what they vary with."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,6 @@ from scipy.stats import binom, f, kstest
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import structure
-from validation.diagnosis.holdout import split
 from validation.diagnosis.lack_of_fit import (
     SIGNIFICANT,
     LackOfFit,
@@ -17,40 +16,6 @@ from validation.diagnosis.lack_of_fit import (
 )
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.structure import trends
-
-# rows kept aside
-
-
-def test_no_configuration_is_on_both_sides():
-    repeat = np.repeat(np.arange(10), 4)
-    campaign = campaign_of(
-        np.ones((40, 6)), repeat=np.random.default_rng(0).permutation(repeat)
-    )
-    parts = split(campaign)
-    kept = set(campaign.configuration[~parts.fitted])
-    assert len(kept) == 10 // 4
-    assert not kept & set(campaign.configuration[parts.fitted])
-    assert np.array_equal(split(campaign).fitted, parts.fitted)
-    assert "8 rows of 2 of 10 configurations" in parts.how
-
-
-def test_few_configurations_are_split_by_spans_of_time():
-    """Sixteen spans of three rows, a quarter kept, each whole; order of time counts."""
-    order = np.random.default_rng(0).permutation(48)
-    campaign = campaign_of(
-        np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order
-    )
-    parts = split(campaign)
-    assert "12 rows of 4 of 16 spans of time" in parts.how
-    held = np.sort(order[~parts.fitted])
-    assert np.array_equal(held.reshape(4, 3) % 3, np.tile([0, 1, 2], (4, 1)))
-
-
-def test_one_row_is_not_split():
-    parts = split(campaign_of(np.ones((1, 6))))
-    assert parts.fitted.all()
-    assert "too few" in parts.how
-
 
 # is what is left noise?
 

@@ -6,97 +6,107 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.effects.registration import BASE
 from assembly.model.function import Function
 from tests.bar_for_tests import LONGER, TURNED, bar
 from validation.diagnosis import results as module
 from validation.diagnosis.candidates import CandidatePart
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.kept_aside import Errors, Rung
-from validation.diagnosis.refit import Fit
-from validation.diagnosis.scoring import FINITE
-from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
+from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.sequence import Errors, Step
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
-def fit_of(hypotheses, values, covariance):
-    conditions = conditions_of(bar())
-    return Fit(
-        tuple(hypotheses), np.array(values), np.array(covariance), np.zeros(1),
-        conditions, np.zeros((1, len(values))),
-    )  # fmt: skip
+def fitted(robot, parts, x, std):
+    """A machine with effects and small unknowns of known values."""
+    effects = tuple(Acting(p, np.zeros(1)) for p in parts if not isinstance(p, Small))
+    small = tuple(p for p in parts if isinstance(p, Small))
+    unknowns = Unknowns(robot, effects, small)
+    C, nothing = np.diag(np.array(std) ** 2), np.zeros((1, len(x)))
+    return MachineFit(unknowns, np.array(x), C, nothing, np.zeros(1))
+
+
+def diagnosis(campaign, fit, **more):
+    return SimpleNamespace(campaign=campaign, fit=fit, robot=fit.robot, **more)
 
 
 def test_an_effect_has_values_deviations_and_intervals_of_nine_in_ten():
-    """1.645 standard deviations either way; what is not of the best set is not told."""
-    finite = Hypothesis(FINITE, (), ())
-    fit = fit_of([TURNED, LONGER, finite], [3e-4, -2e-4], np.diag([4e-10, 1e-10]))
-    one = SimpleNamespace(
-        campaign=bar(), fit=fit, best_by_score=("link_length", FINITE),
-        probability={"link_length": 0.9},
-    )  # fmt: skip
-    length, motions = module.effects(one)
+    """1.645 standard deviations either way."""
+    fit = fitted(bar().robot, [TURNED, LONGER], [3e-4, -2e-4], [2e-5, 1e-5])
+    one = diagnosis(bar(), fit, probability={"link_length": 0.9})
+    turned, length = module.effects(one)
     assert (length["name"], length["where"]) == ("link_length", ["tip"])
-    assert (length["probability"], motions["probability"]) == (0.9, 0.0)
+    assert (length["probability"], turned["probability"]) == (0.9, 0.0)
     (number,) = length["parameters"]
     assert (number["name"], number["unit"]) == ("tip", "m")
     assert number["value"] == pytest.approx(-2e-4)
     assert number["std"] == pytest.approx(1e-5)
     interval = [-2e-4 - 1.645e-5, -2e-4 + 1.645e-5]
     assert number["interval_90"] == pytest.approx(interval)
-    assert motions["parameters"] == []
+    assert "found" not in number
 
 
-class Behind:
-    """Geometry of both frames and a spring of the first."""
-
-    terms = (
-        SmallTerm(GEOMETRY, np.array([0, 0, 1, 1]), np.array([2, 3, 0, 5]),
-                  np.zeros((1, 4)), np.full(4, np.nan), -np.inf),
-        SmallTerm(SPRINGS, np.zeros(2, int), np.array([1, 4]), np.zeros((1, 2)),
-                  np.full(2, np.nan), 0.0),
-    )  # fmt: skip
-    scales = {GEOMETRY: (1e-4, 0.0), SPRINGS: (1e-7, 1e-9)}
-
-    def values(self, residual):
-        return [np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0])]
-
-    def deviations(self):
-        return [np.array([0.1, 0.2, 0.3, 0.4]), np.array([0.5, 0.6])]
-
-    def identified(self):
-        return [np.array([0.5, 0.25, 0.03, 0.01]), np.array([0.9, 0.06])]
+def test_a_declared_effect_has_what_was_declared_and_what_was_found():
+    """0.5 mrad in the file, 0.3 mrad more in the machine: 0.8 are saved."""
+    campaign = bar()
+    robot = replace(campaign.robot, effects={"encoder_offset": {"drive": 5e-4}})
+    campaign = replace(campaign, robot=robot)
+    fit = fitted(robot, [TURNED], [3e-4], [2e-5])
+    (turned,) = module.effects(diagnosis(campaign, fit, probability={}))
+    (number,) = turned["parameters"]
+    assert number["value"] == pytest.approx(8e-4)
+    assert number["interval_90"] == pytest.approx([8e-4 - 3.29e-5, 8e-4 + 3.29e-5])
+    expected = {"declared": 5e-4, "difference": 3e-4, "corrected": 8e-4}
+    assert number["found"] == pytest.approx(expected)
 
 
 def test_small_unknowns_are_told_by_frame_and_one_by_one():
-    """Frames of which hardly anything is known are left out; units by kind."""
-    one = SimpleNamespace(behind=Behind(), fit=fit_of([], [], np.zeros((0, 0))),
-                          campaign=bar())  # fmt: skip
+    """Frames of which hardly anything is known are left out; units by kind.
+
+    Known of each: 1 minus its variance over that of its prior.
+    """
+    geometry = Small(GEOMETRY, np.array([0, 0, 1, 1]), np.array([2, 3, 0, 5]),
+                     np.array([1e-4, 2e-4, 1e-4, 2e-4]))  # fmt: skip
+    springs = Small(SPRINGS, np.zeros(2, int), np.array([1, 4]), np.array([1e-7, 1e-9]))
+    share = np.array([0.5, 0.25, 0.03, 0.01, 0.9, 0.06])
+    prior = np.concatenate([geometry.std, springs.std])
+    x = np.array([1e-4, 2e-4, 3e-5, 4e-5, 5e-8, 6e-10])
+    fit = fitted(bar().robot, [geometry, springs], x, prior * np.sqrt(1 - share))
+    one = diagnosis(bar(), fit)
     told = module.small(one, GEOMETRY)
-    assert told["scale"] == {"rotation": 1e-4}
+    assert told["scale"] == {"rotation": 1e-4, "translation": 2e-4}
     assert told["unit"] == {"rotation": "rad", "translation": "m"}
     assert (told["unknowns"], told["identifiable"]) == (4, pytest.approx(0.79))
-    assert told["frames"] == [{"frame": "drive", "identifiable": 0.75}]
+    assert told["where"] == ["drive"]
+    ((name, known),) = [one.values() for one in told["frames"]]
+    assert (name, known) == ("drive", pytest.approx(0.75))
     assert [
-        (p["frame"], p["component"], p["value"], p["std"], p["identified"], p["unit"])
-        for p in told["parameters"]
+        (p["frame"], p["component"], p["value"], p["unit"]) for p in told["parameters"]
     ] == [
-        ("drive", "rz", 1.0, 0.1, 0.5, "rad"), ("drive", "tx", 2.0, 0.2, 0.25, "m"),
-        ("tip", "rx", 3.0, 0.3, 0.03, "rad"), ("tip", "tz", 4.0, 0.4, 0.01, "m"),
+        ("drive", "rz", 1e-4, "rad"), ("drive", "tx", 2e-4, "m"),
+        ("tip", "rx", 3e-5, "rad"), ("tip", "tz", 4e-5, "m"),
     ]  # fmt: skip
-    springs = module.small(one, SPRINGS)
-    units = [p["unit"] for p in springs["parameters"]]
-    assert units == ["rad/(N m)", "m/N"]
-    assert springs["frames"] == [
-        {"frame": "drive", "identifiable": pytest.approx(0.96)}
-    ]
+    assert [p["identified"] for p in told["parameters"]] == pytest.approx(share[:4])
+    told = module.small(one, SPRINGS)
+    assert [p["unit"] for p in told["parameters"]] == ["rad/(N m)", "m/N"]
+    assert told["scale"] == {"rotation": 1e-7, "translation": 1e-9}
+    assert told["identifiable"] == pytest.approx(0.96)
     assert module.small(one, "nothing") is None
+
+
+def test_geometry_alone_is_an_effect_with_a_name():
+    """Where nothing of the library is named, and no function; how many are known."""
+    part = Small(GEOMETRY, np.array([0, 1]), np.array([2, 3]), np.full(2, 1e-4))
+    fit = fitted(bar().robot, [part], [1e-4, 2e-4], [1e-5, 1e-5])
+    (one,) = module._unnamed(diagnosis(bar(), fit, effects=()))
+    assert (one["name"], one["where"]) == ("geometric_errors", ["drive", "tip"])
+    assert one["combinations"] == pytest.approx(2 * (1 - 0.01))
+    assert module._unnamed(diagnosis(bar(), fit, effects=("drift",))) == []
 
 
 def test_steps_are_in_metres_or_where_none_was_read_in_radians():
     errors = Errors(1e-5, 2e-6, 3.0), Errors(float("nan"), 4e-6, 5.0)
     one = SimpleNamespace(
-        ladder=[Rung(f"step {k}", k, e) for k, e in enumerate(errors)]
+        sequence=[Step(f"step {k}", k, e) for k, e in enumerate(errors)]
     )
     first, other = module.steps(one)
     assert (first["kept_aside_rms"], first["unit"]) == (1e-5, "m")
@@ -111,8 +121,8 @@ def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
         for w in ("drive", "tip", "reading")
     ]
     monkeypatch.setattr(module, "functions_of", lambda *given: [every[:1], every[1:]])
-    ladder = [
-        Rung(name, 0, Errors(float(k), 0.0, 0.0))
+    sequence = [
+        Step(name, 0, Errors(float(k), 0.0, 0.0))
         for k, name in enumerate((
             "declared",
             "library effects",
@@ -122,9 +132,10 @@ def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
     ]
     same = ((CandidatePart("tip", ("ty", "tz"), "time"),),)
     one = SimpleNamespace(
-        ladder=ladder, campaign=None,
-        model=SimpleNamespace(learned=[SimpleNamespace(equivalent=same),
-                                       SimpleNamespace(equivalent=())]),
+        sequence=sequence,
+        traced=SimpleNamespace(selected=SimpleNamespace(functions=[
+            SimpleNamespace(equivalent=same), SimpleNamespace(equivalent=()),
+        ])),
     )  # fmt: skip
     told = module.learned(one)
     assert [t["where"] for t in told] == ["drive", "tip", "reading"]
@@ -136,37 +147,3 @@ def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
     assert told[1]["equivalent_places"] == []
     assert (told[0]["parameters"], told[0]["std"]) == ({"1": 2.0}, {"1": 0.5})
     assert told[0]["formula"] == "tx = 2 drive"
-
-
-@pytest.mark.parametrize("sessions", [None, np.array([*"aaaaaaab"])])
-@pytest.mark.parametrize("tool", [{}, {"tool.tx": 1e-3}])
-def test_the_frame_found_is_saved_for_all_rows_or_session_by_session(sessions, tool):
-    """The tool's part of a registration and other effects stay as they are."""
-    campaign = replace(bar(), session=sessions, registration="unknown")
-    base = np.arange(6.0)
-    if sessions is not None:
-        base = np.where((sessions == "a")[:, None], base, -base)
-    conditions = replace(conditions_of(bar()), base=base)
-    robot = campaign.robot
-    declared = {
-        "registration": {**tool, BASE[0]: 99.0},
-        "encoder_offset": {"drive": 1.0},
-    }
-    robot = replace(
-        robot, effects=declared, session_effects={"a": {"load_gain": {"factor": 1.1}}}
-    )
-    one = SimpleNamespace(
-        fit=SimpleNamespace(effects={}), campaign=campaign,
-        model=SimpleNamespace(conditions=conditions),
-    )  # fmt: skip
-    saved = module._registered(one, robot)
-    found = dict(zip(BASE, np.arange(6.0).tolist(), strict=True))
-    assert saved.effects["encoder_offset"] == {"drive": 1.0}
-    if sessions is None:
-        assert saved.effects["registration"] == {**tool, **found}
-        assert saved.session_effects == robot.session_effects
-        return
-    assert saved.effects.get("registration", {}) == tool
-    own = saved.session_effects
-    assert own["a"] == {"load_gain": {"factor": 1.1}, "registration": found}
-    assert own["b"] == {"registration": {k: -v for k, v in found.items()}}

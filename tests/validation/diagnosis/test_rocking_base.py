@@ -76,9 +76,8 @@ def test_an_unknown_gain_is_learned(rocking):
     found = diagnose(rocking)
     assert found.verdict == "learned"
     assert 0.8 < found.after.normalised < 1.2
-    (one,) = learned(found)
+    one = next(one for one in learned(found) if "ry" in one["components"])
     assert (one["where"], one["variables"]) == ("base", ["cov.tilt"])
-    assert "ry" in one["components"]
     numbers = one["parameters"]
     (name,) = [n for n in numbers if n in ("1", "ry.1")]
     assert 0 < one["std"][name] < 0.01

@@ -21,7 +21,7 @@ def test_the_robot_drawn_stands_where_it_was_measured(diagnosed):
     """Within five sigma of the reading, where the declared model errs by far more."""
     row, name = worst_row(diagnosed)
     assert name == "position"
-    aside = ~diagnosed.split.fitted
+    aside = diagnosed.held.rows & ~diagnosed.outliers
     sizes = np.linalg.norm(np.nan_to_num(diagnosed.residual_before[:, 3:]), axis=1)
     assert aside[row]
     assert sizes[row] == sizes[aside].max()
@@ -36,14 +36,12 @@ def test_the_robot_drawn_stands_where_it_was_measured(diagnosed):
 def test_the_page_names_the_row_and_what_is_drawn(diagnosed):
     row, _ = worst_row(diagnosed)
     drawn = worst_robot(diagnosed)
-    assert f"Row {diagnosed.campaign.ids[row]}, kept aside" in drawn
+    assert f"Row {diagnosed.campaign.ids[row]}, held out" in drawn
     assert "drive compliance" in drawn
 
 
-def test_without_rows_kept_aside_nothing_is_drawn(diagnosed):
-    everything = replace(
-        diagnosed.split, fitted=np.ones_like(diagnosed.split.fitted)
-    )  # fmt: skip
-    none = replace(diagnosed, split=everything)
+def test_without_rows_held_out_nothing_is_drawn(diagnosed):
+    nobody = np.zeros(len(diagnosed.campaign), bool)
+    none = replace(diagnosed, held=replace(diagnosed.held, folds=(nobody,)))
     assert worst_row(none) == (-1, "")
     assert worst_robot(none) == ""

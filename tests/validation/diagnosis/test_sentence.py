@@ -8,6 +8,8 @@ import pytest
 
 from assembly.model.function import Function
 from validation.diagnosis import sentence as module
+from validation.diagnosis.calibration import Calibration
+from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.report import _tiles
 from validation.diagnosis.sentence import (
     calibration_text,
@@ -17,7 +19,12 @@ from validation.diagnosis.sentence import (
     sentence,
 )
 from validation.diagnosis.structure import Trend
-from validation.diagnosis.verdict import Calibration
+
+
+def test_a_product_of_two_variables_names_both():
+    numbers = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
+    function = Function("drive", ("rz",), ("q.drive", "cov.bed"), "powers", numbers)
+    assert formula(function) == "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"
 
 
 @pytest.mark.parametrize(
@@ -39,7 +46,7 @@ def test_numbers_stand_before_what_they_multiply(form, parameters, expected):
 
 def test_the_tiles_say_the_error_before_and_after_and_nothing_not_measured():
     diagnosis = SimpleNamespace(
-        verdict="none_needed", best_by_score=["self_weight", "drift"],
+        verdict="none_needed", effects=("self_weight", "drift"),
         probability={"drift": 0.25, "self_weight": 0.75}, next=None,
         before=SimpleNamespace(position=2e-3, rotation=float("nan")),
         after=SimpleNamespace(position=5e-4, rotation=float("nan")),
@@ -66,11 +73,14 @@ def test_a_calibration_is_said_in_shares():
     assert "named it" not in unnamed
 
 
-def test_noise_that_repeats_show_is_said_of_what_it_is_larger():
-    both = noise_text(np.array([1.5, 1.5, 1.5, 2.25, 2.25, 2.25]))
-    assert both.endswith("taken 1.5 times (rotations) and 2.2 times (positions)")
-    one = noise_text(np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0]))
-    assert one.endswith("taken 3 times (positions)")
+def test_scatter_of_repeats_is_a_finding_of_its_own():
+    """What it may be is said: sigma, memory, time, or something not recorded."""
+    lack = SimpleNamespace(sigma_too_small=False, repeats=1.0)
+    one = SimpleNamespace(noise_scale=(2.0, 0.1), lack=lack)
+    assert noise_text(one) == "readings scatter 2.00 +- 0.10 times the sigma stated"
+    lack.sigma_too_small, lack.repeats = True, 2.5
+    assert "repeats 2.50 times: not repeatable" in noise_text(one)
+    assert "memory" in noise_text(one)
 
 
 def test_a_compliance_is_said_to_be_times_the_wrench():
@@ -84,11 +94,12 @@ def test_a_compliance_is_said_to_be_times_the_wrench():
 
 SAID = [
     ({"verdict": "none_needed"}, "is noise as far as this design can tell (7.00 sigma"),
-    ({"verdict": "explained"}, "lacks a and b and springs; on rows kept aside the"),
+    ({"verdict": "explained"}, "lacks a and b and springs; on held-out rows the"),
     ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
-    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on rows"),
-    ({"verdict": "outside_library"}, "are left, which vary with x0, x1, x2;"),
-    ({"verdict": "outside_library", "trends": ()}, "with nothing that was recorded;"),
+    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on held"),
+    ({"verdict": "outside_library"}, "sigma stay, which vary with x0, x1, x2; on held"),
+    ({"verdict": "outside_library", "trends": ()}, "rows 2.50 sigma stay; on held"),
+    ({"verdict": "not_enough_rows"}, "too few to tell a cause from chance; on held"),
 ]  # fmt: skip
 
 
@@ -101,13 +112,16 @@ def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected)
         "before": SimpleNamespace(normalised=7.0),
         "after": SimpleNamespace(normalised=1.5), "lack": SimpleNamespace(rms=2.5),
         "claimed": ("a", "b"), "alternatives": tuple((names, 0.2) for names in sets),
-        "behind": SimpleNamespace(terms=(SimpleNamespace(name="springs"),)),
-        "split": SimpleNamespace(fitted=np.array([True, False])),
+        "fit": SimpleNamespace(
+            unknowns=SimpleNamespace(small=(SimpleNamespace(name="springs"),))
+        ),
+        "held": HeldOut("split", (np.array([False, True]),), ""), "uncertainty": 0.25,
+        "setup": (),
         "trends": tuple(Trend(f"x{k}", 0.1, 0.0) for k in range(5)),
     } | changes)  # fmt: skip
     assert expected in sentence(one)
-    one.split = SimpleNamespace(fitted=np.ones(2, bool))
-    assert "on the rows fitted, too few to spare any" in sentence(one)
+    one.held = HeldOut("none", (np.ones(2, bool),), "")
+    assert "on the rows fitted, too few to hold any out" in sentence(one)
 
 
 def test_open_rows_are_counted():

@@ -12,13 +12,13 @@ from tests.bar_for_tests import BEAM, LONGER, TURNED, bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import signatures as module
 from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.scoring import FINITE
 from validation.diagnosis.signatures import (
     Tangents,
     conditions_of,
     loaded_components,
     whiten,
 )
+from validation.diagnosis.trace import FINITE
 
 
 def test_the_weight_has_the_direction_that_covariates_say():

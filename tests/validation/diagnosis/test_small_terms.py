@@ -10,20 +10,15 @@ from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import LENGTH, along, bar
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.background import background
-from validation.diagnosis.evidence import Prior
-from validation.diagnosis.kept_aside import FittedModel, _with_terms, errors_of
 from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import (
     GEOMETRY,
     SPRINGS,
-    SmallTerm,
     _term,
-    added,
-    screws_of,
     small_terms,
-    with_small,
+    with_compliance,
+    with_error,
 )
 
 LOAD = [0.0, 0, 4.0, 0, 0, 30.0]
@@ -104,94 +99,36 @@ def test_what_is_not_loaded_or_not_read_has_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_what_they_add_is_what_the_model_with_them_reads(loaded):
-    """Errors and springs of a size that is small; functions are passed over."""
+def test_columns_add_up_to_what_a_robot_with_them_reads(loaded):
+    """Errors and springs of a size that is small, built into the robot."""
     campaign, conditions, response = loaded
-    terms = small_terms(campaign, conditions, response)
+    geometry, springs = small_terms(campaign, conditions, response)
     rng = np.random.default_rng(1)
-    values = [1e-6 * rng.normal(size=len(terms[0])), 1e-8 * rng.uniform(0.5, 1, 4)]
-    total = added(campaign, response, conditions, terms, values)
-    robot = with_small(campaign.robot, terms, values)
+    x, c = 1e-6 * rng.normal(size=len(geometry)), 1e-8 * rng.uniform(0.5, 1, 4)
+    robot = with_error(campaign.robot, geometry.frame, geometry.axis, x)
+    robot = with_compliance(robot, springs.frame, springs.axis, c)
     there = conditions_of(replace(campaign, robot=robot))
-    moved = predict(there).deviation - predict(conditions).deviation
+    moved = whiten(campaign, predict(there).deviation - predict(conditions).deviation)
+    total = geometry.columns @ x + springs.columns @ c
     np.testing.assert_allclose(total, moved, atol=1e-3 * np.abs(moved).max())
-    screws = screws_of(campaign, terms, values)
-    assert screws[terms[0].frame, terms[0].axis].tolist() == values[0].tolist()
-    np.testing.assert_allclose(
-        [f.geometric_error for f in robot.frames], screws, atol=1e-15
-    )
-    function = SmallTerm("function 1", np.zeros(1, int), np.zeros(1, int),
-                         np.zeros((48, 1)), np.full(1, np.nan), -np.inf)  # fmt: skip
-    more, also = [*terms, function], [*values, np.ones(1)]
-    np.testing.assert_array_equal(
-        added(campaign, response, conditions, more, also), total
-    )
-    assert screws_of(campaign, more, also).tolist() == screws.tolist()
-    same = with_small(campaign.robot, [function], [np.ones(1)])
-    assert same.frames == campaign.robot.frames
+    assert robot.errors[geometry.frame, geometry.axis].tolist() == x.tolist()
 
 
 def test_springs_of_no_compliance_stay_as_declared():
     robot = Robot("a", "tip", (Frame("one", joint="revolute"), Frame("tip", "one")))
-    springs = SmallTerm(SPRINGS, np.zeros(2, int), np.array([0, 1]), np.zeros((1, 2)),
-                        np.full(2, np.nan), 0.0)  # fmt: skip
-    same = with_small(robot, [springs], [np.array([0.0, -1e-6])])
+    first, axes = np.zeros(2, int), np.array([0, 1])
+    same = with_compliance(robot, first, axes, np.array([0.0, -1e-6]))
     assert same.frame("one").joint_stiffness is robot.frame("one").joint_stiffness
 
 
-def test_some_terms_keep_their_sizes(loaded):
-    """Of geometry and springs, the geometry alone."""
-    campaign, conditions, response = loaded
-    terms = small_terms(campaign, conditions, response)
-    used = tuple(np.ones(len(t), bool) for t in terms)
-    scales = {GEOMETRY: (1e-4, 2e-5), SPRINGS: (1e-7, 1e-9)}
-    both = background(terms, Prior(used, scales, -4.0, 0.0))
-    assert _with_terms(both, [GEOMETRY, SPRINGS]) is both
-    one = _with_terms(both, [GEOMETRY])
-    assert [t.name for t in one.terms] == [GEOMETRY]
-    assert one.size.tolist() == both.size[:12].tolist()
-    assert one.score == 0.0
-    assert not _with_terms(both, [])
-
-
-def test_errors_of_readings_are_by_kind_and_by_sigma(loaded):
-    campaign, _, _ = loaded
-    left = np.zeros((8, 6))
-    left[2, 0], left[2, 3] = 3e-5, 4e-5
-    judged = errors_of(campaign, left, np.arange(8) == 2)
-    assert judged.rotation == pytest.approx(3e-5 / np.sqrt(3))
-    assert judged.position == pytest.approx(4e-5 / np.sqrt(3))
-    z = np.hypot(3e-5 / SIGMA[0], 4e-5 / SIGMA[3])
-    assert judged.normalised == pytest.approx(z / np.sqrt(6))
-
-
-def test_a_fitted_model_adds_functions_that_are_known(loaded):
-    """The first of two, of which the second was left out of this step."""
-    campaign, conditions, response = loaded
-
-    class Functions:
-        def moved(self, candidate, x):
-            return np.full((8, 6), candidate * x[0])
-
-    class Behind:
-        terms = (SmallTerm("function 1", *[np.zeros(1, int)] * 2, np.zeros((48, 1)),
-                           np.full(1, np.nan), -np.inf),)  # fmt: skip
-
-        def values(self, residual):
-            return [np.array([3.0])]
-
-    class Nothing:
-        effects, residual = {}, None
-
-    class One:
-        def __init__(self, candidate):
-            self.candidate = candidate
-
-    model = FittedModel(conditions, response, Nothing(), Behind(), (One(2.0), One(9.0)))
-    object.__setattr__(model, "sensitivities", Functions())
-    left = model.residual(campaign)
-    expected = campaign.measured - predict(conditions).deviation - 6.0
-    np.testing.assert_allclose(left, expected)
+def test_springs_of_passive_joints_leave_their_own_motion_free():
+    """1e-7 m/N in series with a bearing that is rigid but for its turning."""
+    hinge = Frame("hinge", "base", joint="revolute")
+    robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
+    first, axes = np.zeros(2, int), np.array([2, 4])
+    K = with_compliance(robot, first, axes, np.array([1e-3, 1e-7])).frame("hinge")
+    stiffness = np.diag(K.joint_stiffness)
+    assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
 
 
 @pytest.mark.parametrize("units", [1.0, 1e6])

@@ -1,6 +1,6 @@
 """Readings of one place that follow one another while temperatures change."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +8,10 @@ import pytest
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Frame, Robot
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.forms_tried import CandidateShape
-from validation.diagnosis.results import corrected, table
-from validation.diagnosis.spans import simplest
+from validation.diagnosis.prediction import predicted
+from validation.diagnosis.results import table
+from validation.diagnosis.saving import corrected
 
 ROWS, STEP, SIGMA = 240, 60.0, 2e-6
 BED, FRAME = 0.9e-6, -16e-6  # [m/K]
@@ -68,18 +67,23 @@ def test_the_causes_are_learned_in_their_simplest_form(heated):
     """
     diagnosis, _ = heated
     functions = corrected(diagnosis).functions
-    learned = {one.variables[0]: one for one in functions}
-    assert set(learned) == {"cov.bed", "cov.frame"}
+    assert {v for one in functions for v in one.variables} == {"cov.bed", "cov.frame"}
     assert all(one.form == "powers" for one in functions)
-    (value,) = learned["cov.bed"].parameters.values()
+    campaign = diagnosis.campaign
+    warmer = campaign.covariates | {"bed": campaign.covariates["bed"] + 1.0}
+    here, there = (
+        predicted(replace(campaign, covariates=given), diagnosis.robot).deviation[:, 5]
+        for given in (campaign.covariates, warmer)
+    )
+    value = np.mean(there - here)
     spread = 15.0  # K rms of the bed's temperature about its mean and what frames say
     assert value == pytest.approx(BED, abs=5 * 2.5e-6 / spread / np.sqrt(40))
 
 
-def test_spans_of_time_kept_aside_are_foretold_to_the_noise(heated):
-    """60 rows, some fifteen of them independent: within half of the noise in them."""
+def test_spans_of_time_held_out_are_foretold_to_the_noise(heated):
+    """Some sixty independent rows: within half of the noise in them."""
     diagnosis, noise = heated
-    kept = ~diagnosis.split.fitted
+    kept = diagnosis.held.rows
     left = np.sqrt(np.mean(noise[kept] ** 2))
     assert diagnosis.before.position > 7 * left
     assert diagnosis.after.position < 1.5 * left
@@ -93,75 +97,7 @@ def test_many_blunders_do_not_keep_from_learning(tmp_path):
     where = rng.choice(320, 11, replace=False)
     read[where] += 2e-2 * 0.62 ** np.arange(11)
     diagnosis = diagnosed(tmp_path, read, {"bed": warm}, sigma=1e-6)
-    fitted = set(where[diagnosis.split.fitted[where]].tolist())
-    assert len(fitted) >= 7  # the others are kept aside
-    assert fitted <= set(np.flatnonzero(diagnosis.outliers).tolist())
+    assert set(where.tolist()) <= set(np.flatnonzero(diagnosis.outliers).tolist())
     (learned,) = table(diagnosis)["learned"]
     assert learned["variables"] == ["cov.bed"]
-    assert diagnosis.trimmed[1].normalised < 1 + 4 / np.sqrt(2 * 80)
-
-
-class Warm:
-    """Thirty rows that follow one another, and what was measured beside them."""
-
-    time = np.arange(30.0)
-
-    def __init__(self, covariates):
-        self.covariates = covariates
-
-    def __len__(self):
-        return len(self.time)
-
-    def take(self, rows):
-        return self
-
-
-class Foretold:
-    """Rows of whose other spans a table says how well candidates foretell them."""
-
-    def __init__(self, conditions, gains):
-        self.gains = {frozenset(own): gain for own, gain in gains.items()}
-        self.sensitivities = SimpleNamespace(conditions=conditions, rows=slice(None))
-
-    def gain(self, some, others=()):
-        """By the standard error 1 throughout."""
-        name = [frozenset(c.parts[0].variable for c in own) for own in (some, others)]
-        return self.gains.get(name[0], 0.0) - self.gains.get(name[1], 0.0), 1.0
-
-    def foretells(self, some):
-        return self.gain(some)[0] > 2.0
-
-    def worths_of_pairs(self, some, pairs):
-        return np.array([self.gain([some[i], some[j]])[0] for i, j in pairs])
-
-
-@pytest.mark.parametrize(
-    ("gains", "expected"),
-    [
-        ({"a": 10.0, "b": 3.0}, "a"),
-        ({"a": 10.0, "b": 3.0, "ab": 11.0}, "a"),  # one of two says nearly as much
-        ({"a": 10.0, "b": 3.0, "ab": 20.0}, "ab"),  # each of two says what one lacks
-        ({"ab": 20.0}, "ab"),
-        ({"a": 10.0, "t": 40.0, "at": 60.0}, "a"),  # what was measured before time
-        ({"a": 1.5, "t": 40.0, "at": 80.0}, "t"),  # which stands alone
-        ({"a": 10.0, "c": 11.5}, "a"),  # a form of one number before one of three
-        ({"a": 10.0, "c": 13.0}, "c"),
-        ({"a": 1.0, "b": 1.9}, ""),
-    ],
-)
-def test_the_simplest_that_foretells_nearly_as_well_is_kept(gains, expected):
-    """Written down by the rule of one standard error, and nothing but it."""
-    rng = np.random.default_rng(1)
-    conditions = Warm({name: rng.normal(size=30) for name in "abc"})
-    names = {"a": "cov.a", "b": "cov.b", "c": "cov.c", "t": "time"}
-    powers = {"c": ("1", "2", "3")}
-    refined = [
-        Candidate(
-            (CandidatePart("reading", ("tz",), names[name]),), "screw",
-            CandidateShape("powers", powers.get(name, ("1",))),
-        )
-        for name in "abct"
-    ]  # fmt: skip
-    table = {tuple(names[n] for n in own): gain for own, gain in gains.items()}
-    told = simplest(Foretold(conditions, table), refined, np.arange(4.0))
-    assert "".join("abct"[i] for i in sorted(told)) == expected
+    assert diagnosis.after.normalised < 1 + 4 / np.sqrt(2 * 309)

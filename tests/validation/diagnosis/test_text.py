@@ -7,26 +7,30 @@ import pytest
 
 from validation.diagnosis import text as module
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.kept_aside import Errors, Rung
 from validation.diagnosis.next_measurement import NextMeasurement, load_text
 from validation.diagnosis.noise_in_time import NoiseInTime
+from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.structure import Trend
 
 BEFORE, AFTER = Errors(3e-5, 2e-6, 7.0), Errors(1e-5, float("nan"), 1.5)
 
 
 def made(**changes):
-    """Four rows of which the last two were kept aside, and nothing found."""
+    """Four rows of which the last two were held out, and nothing found."""
     return SimpleNamespace(**{
-        "campaign": SimpleNamespace(name="arm", ids=("m0", "m1", "m2", "m3")),
+        "campaign": SimpleNamespace(
+            name="arm", ids=("m0", "m1", "m2", "m3"), cells=np.ones((4, 6), bool)
+        ),
         "verdict": "none_needed",
         "alternatives": ((("drift",), 0.75), ((), 0.25)),
-        "split": SimpleNamespace(fitted=np.array([True, True, False, False])),
+        "held": SimpleNamespace(rows=np.arange(4) > 1, words="2 rows, drawn once"),
         "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 0.2),
-        "trimmed": (Errors(2e-5, 1e-6, 6.0), Errors(9e-6, 1e-6, 1.25)),
-        "noise_factor": np.ones(6), "noise_in_time": None,
+        "saved": Errors(8e-6, 3e-6, 1.0),
+        "with_outliers": (Errors(2e-5, 1e-6, 8.0), Errors(9e-6, 1e-6, 2.25)),
+        "noise_scale": (1.0, 0.05), "more_scatter": False, "noise_in_time": None,
+        "lack": SimpleNamespace(sigma_too_small=False, repeats=1.0), "needed": "",
         "outliers": np.zeros(4, bool), "open": np.zeros(4, bool),
-        "ladder": (Rung("declared", 0, BEFORE), Rung("geometry", 4.6, AFTER)),
+        "sequence": (Step("declared", 0, BEFORE), Step("geometry", 4.6, AFTER)),
         "trends": (), "next": None, "remarks": (),
     } | changes)  # fmt: skip
 
@@ -51,49 +55,58 @@ def test_what_is_not_there_is_not_said(shown):
     assert said[:2] == ["arm: none_needed", "Enough."]
     at = said.index("sets of effects, by probability:")
     assert said[at + 1 : at + 3] == ["   0.750  drift", "   0.250  none"]
-    assert [line.split() for line in said[at + 4 : at + 8]] == [
-        ["rows", "kept", "aside", "before", "after", "noise"],
-        ["position", "[m]", "3e-05", "1e-05", "5e-06"],
-        ["rotation", "[rad]", "2e-06", "-", "1e-06"],
+    assert said[at + 4] == "errors on 2 rows, drawn once; saved: on all rows"
+    assert [line.split() for line in said[at + 5 : at + 9]] == [
+        ["before", "after", "noise", "saved"],
+        ["position", "[m]", "3e-05", "1e-05", "5e-06", "8e-06"],
+        ["rotation", "[rad]", "2e-06", "-", "1e-06", "3e-06"],
         # noise is one sigma whatever it is in the rows at hand
-        ["normalised", "[sigma]", "7", "1.5", "1"],
+        ["normalised", "[sigma]", "7", "1.5", "1", "1"],
     ]
-    assert [line.split() for line in said[at + 9 :]] == [
-        ["step", "unknowns", "m", "sigma", "bought"],
+    assert [line.split() for line in said[at + 10 :]] == [
+        ["model", "unknowns", "m", "sigma", "reduction"],
         ["declared", "0", "3e-05", "7"],
         ["geometry", "5", "1e-05", "1.5", "2e-05"],
     ]
 
 
-def test_one_step_alone_buys_nothing(shown):
+def test_one_step_alone_reduces_nothing(shown):
     """Where only rotations were read its rms is one of angles."""
-    declared = Rung("declared", 0, Errors(float("nan"), 2e-6, 7.0))
-    assert [line.split() for line in shown(ladder=(declared,))[-2:]] == [
-        ["step", "unknowns", "rad", "sigma", "bought"],
+    declared = Step("declared", 0, Errors(float("nan"), 2e-6, 7.0))
+    assert [line.split() for line in shown(sequence=(declared,))[-2:]] == [
+        ["model", "unknowns", "rad", "sigma", "reduction"],
         ["declared", "0", "2e-06", "7"],
     ]
 
 
-def test_rows_fitted_are_called_so_where_none_was_kept_aside(shown):
-    said = shown(split=SimpleNamespace(fitted=np.ones(4, bool)))
-    assert any(line.startswith("rows fitted ") for line in said)
-
-
-def test_only_outliers_kept_aside_are_taken_out_of_the_errors(shown):
+def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
     """An outlier among the rows fitted is named all the same."""
     fitted = shown(outliers=np.array([False, True, False, False]))
     assert "left out as outliers: m1" in fitted
-    assert not any(line.startswith("without outliers") for line in fitted)
+    assert not any(line.startswith("with outliers") for line in fitted)
     aside = shown(outliers=np.array([False, True, False, True]))
     assert "left out as outliers: m1, m3" in aside
-    (cut,) = [line for line in aside if line.startswith("without outliers")]
-    assert cut.split() == ["without", "outliers", "6", "1.25", "1"]
+    (more,) = [line for line in aside if line.startswith("with outliers")]
+    assert more.split() == ["with", "outliers", "8", "2.25", "1"]
 
 
-def test_noise_is_said_where_repeats_scatter_more_or_time_correlates(shown):
-    assert not any("repeats" in line or "correlated" in line for line in shown())
-    factor = np.repeat([1.0, 1.5], 3)
-    assert any("1.5 times (positions)" in line for line in shown(noise_factor=factor))
+def test_components_that_no_row_has_are_named(shown):
+    """Not as 0 +- 0: they were not measured."""
+    cells = np.zeros((4, 6), bool)
+    cells[1, [3, 5]] = True
+    campaign = SimpleNamespace(name="arm", ids=("m0", "m1", "m2", "m3"), cells=cells)
+    assert "not measured: rx, ry, rz, ty" in shown(campaign=campaign)
+    assert not any("not measured" in line for line in shown())
+
+
+def test_rows_that_would_decide_are_said(shown):
+    assert "what would decide: 16 configurations" in shown(needed="16 configurations")
+
+
+def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
+    assert not any("scatter" in line or "correlated" in line for line in shown())
+    more = shown(noise_scale=(1.5, 0.04), more_scatter=True)
+    assert "readings scatter 1.50 +- 0.04 times the sigma stated" in more
     (line,) = [
         line
         for line in shown(noise_in_time=NoiseInTime(0.35, 60.0, 1e-9))

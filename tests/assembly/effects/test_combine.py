@@ -1,0 +1,111 @@
+"""An effect that a file declares and the difference found for it: one effect again."""
+
+import numpy as np
+import pytest
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.combine import combined
+from assembly.kinematics.posture import place_robot
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.model.robot import BeamLink, Frame, Robot
+
+SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
+TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
+FRAME_1 = {"base.rx": 0.3, "base.ry": -0.2, "base.rz": 0.9, "base.tx": 1.0}
+FRAME_2 = {"base.rx": -0.1, "base.rz": 0.4, "base.ty": -0.5, "tool.tz": 1e-3}
+IN_TURN = {
+    "self_weight": ({"g.z": -5.0}, {"g.x": 1.0, "g.z": -4.81}),
+    "thermal_expansion": ({"j2": 2.34e-5}, {"j2": -1.14e-5, "tool": 1e-5}),
+    "drive_compliance": ({"j1": 4e4}, {"j1": 9e4, "j2": 1e5}),
+    "encoder_offset": ({"j1": 2e-4}, {"j1": -3e-4, "j3": 1e-4}),
+    "encoder_eccentricity": (
+        {"j1.amplitude": 2e-4, "j1.phase": 0.4},
+        {"j1.amplitude": 3e-4, "j1.phase": 2.9, "j2.amplitude": 1e-4},
+    ),
+    "link_length": ({"tool": 1e-4}, {"tool": 5e-5, "j2": -1e-4}),
+    "registration": (FRAME_1, FRAME_2),
+    "modulus_scale": ({"j2": 0.8}, {"j2": 0.9, "tool": 1.2}),
+    "friction_hysteresis": ({"j1": 2.0}, {"j1": 1.0, "j2": -0.5}),
+    "load_gain": ({"factor": 1.2, "offset.fx": 3.0}, {"factor": 0.9, "offset.fy": 1.0}),
+    "drift": (
+        {"amplitude.tz": 1e-5, "time_constant": 600.0},
+        {"amplitude.tz": 2e-5, "amplitude.rx": 1e-5, "time_constant": 600.0},
+    ),
+    "base_compliance": (
+        {"stiffness.rx": 1e6, "stiffness.tz": 1e8},
+        {"stiffness.rx": 3e6, "stiffness.tz": 2e8},
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """Three elastic drives and two tubes, loaded, warm, some time after the start."""
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    robot = Robot("arm", "tool", (
+        Frame("j1", **turning),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=TUBE, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], **turning),
+        Frame("tool", "j3", [0.3, 0.05, 0.1], link=TUBE, mass=0.8),
+    ))  # fmt: skip
+    placed = place_robot(robot, joints={"j1": 0.3, "j2": -0.4, "j3": 0.6})
+    given = {"temperature": 6.0, "time": 900.0, "approach": 1.0}
+    load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -10.0])
+    return as_declared(placed, load, covariates=given)
+
+
+@pytest.mark.parametrize("name", IN_TURN)
+def test_both_together_read_as_one_after_the_other(name, standing):
+    declared, found = ({name: values} for values in IN_TURN[name])
+    in_turn = predict(apply_effects(apply_effects(standing, declared), found)).deviation
+    once = predict(apply_effects(standing, combined(declared, found))).deviation
+    change = np.abs(in_turn - predict(standing).deviation).max()
+    assert change > 1e-6
+    np.testing.assert_allclose(once, in_turn, rtol=0, atol=1e-9 * change + 1e-13)
+
+
+def test_no_effect_with_numbers_is_left_out():
+    """Clearances add and contact laws cannot; finite motions have no number."""
+    others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
+    assert IN_TURN.keys() | others == LIBRARY.keys()
+
+
+@pytest.mark.parametrize(("name", "declared", "found", "both"), [
+    ("encoder_offset", {"a": 2e-4}, {"a": -5e-4, "b": 1e-4}, {"a": -3e-4, "b": 1e-4}),
+    ("thermal_expansion", {"a": 23.4e-6}, {"a": -11.4e-6}, {"a": 12e-6}),
+    ("modulus_scale", {"a": 0.8}, {"a": 0.5}, {"a": 0.4}),
+    # compliances add: 1/4 + 1/12 = 1/3
+    ("drive_compliance", {"a": 4e4, "b": 1e5}, {"a": 12e4}, {"a": 3e4, "b": 1e5}),
+    ("joint_clearance", {"a.radial": 1e-5}, {"a.radial": 2e-5, "a.tilt": 1e-4},
+     {"a.radial": 3e-5, "a.tilt": 1e-4}),
+    # two sines of one angle: 3 sin + 4 cos
+    ("encoder_eccentricity", {"a.amplitude": 3.0, "a.phase": 0.0},
+     {"a.amplitude": 4.0, "a.phase": np.pi / 2},
+     {"a.amplitude": 5.0, "a.phase": np.arctan2(4, 3)}),
+    ("load_gain", {"factor": 2.0, "offset.fx": 3.0}, {"factor": 1.5, "offset.fx": 1.0},
+     {"factor": 3.0, "offset.fx": 5.5}),
+])  # fmt: skip
+def test_numbers_of_both_by_hand(name, declared, found, both):
+    assert combined({name: declared}, {name: found})[name] == pytest.approx(both)
+
+
+def test_other_effects_stay_as_they_are():
+    declared = {"drift": {"amplitude.tz": 1e-5, "time_constant": 60.0}}
+    found = {"encoder_offset": {"a": 1e-4}}
+    assert combined(declared, found) == declared | found
+    assert combined(declared, {}) == declared
+    assert combined({}, found) == found
+
+
+def test_what_is_no_single_effect_is_refused():
+    """Springs in series whose laws differ in their exponents; two time constants."""
+    law = {"a.coefficient": 1e7, "a.exponent": 1.5}
+    with pytest.raises(ValueError, match="no single contact law"):
+        combined({"contact_stiffening": law}, {"contact_stiffening": law})
+    other = {"b.coefficient": 2e7, "b.exponent": 2.0}
+    both = combined({"contact_stiffening": law}, {"contact_stiffening": other})
+    assert both == {"contact_stiffening": law | other}
+    drifts = [{"drift": {"amplitude.tz": 1e-5, "time_constant": t}} for t in (60, 600)]
+    with pytest.raises(ValueError, match="no single drift"):
+        combined(*drifts)

@@ -1,0 +1,49 @@
+"""An arm of three elastic drives and two tubes, and rows at which it is read."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.kinematics.posture import place_robot
+from assembly.model.robot import BeamLink, Frame, Robot
+from tests.planar_arm_for_tests import SIGMA
+from validation.campaign.campaign import Campaign
+
+SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
+TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
+DRIVES = ("j1", "j2", "j3")
+
+
+def arm(**effects):
+    """No drive is parallel to the next; effects of its file."""
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    robot = Robot("arm", "tool", (
+        Frame("j1", **turning),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=TUBE, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], link=TUBE, **turning),
+        Frame("tool", "j3", [0.3, 0.05, 0.1], link=TUBE, mass=0.8),
+    ))  # fmt: skip
+    return replace(robot, effects=effects)
+
+
+def commanded(robot, rows=12, seed=2, reach=1.5):
+    """Rows of the arm, all around, loaded, while it warms; readings are zero."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-reach, reach, (rows, 3))
+    bare = robot.without_effects().with_errors(np.zeros((4, 6)))
+    placed = [
+        place_robot(bare, joints=dict(zip(DRIVES, row, strict=True))) for row in q
+    ]
+    loads = rng.normal(size=(rows, 6)) * np.repeat([2.0, 30.0], 3)
+    return Campaign(
+        name="arm", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
+        commanded="joints", loads=loads, measured=np.zeros((rows, 6)),
+        sigma=np.tile(SIGMA, (rows, 1)),
+        covariates={"temperature": np.linspace(1, 8, rows),
+                    "time": 60.0 * np.arange(rows),
+                    "approach": rng.choice([-1.0, 1.0], rows)},
+        reference_point=np.array([0.02, 0.05, 0.03]), registration="known",
+        configuration=np.arange(rows), repeat=np.arange(rows),
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Which effects readings support, by closed forms on a bar."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from assembly.effects.effect import Unknown
+from tests.bar_for_tests import (
+    BEAM,
+    LENGTH,
+    LONGER,
+    SOFTER,
+    WARMER,
+    bar,
+    fit_of,
+    gives_way,
+    hypothesis,
+    machine,
+    numbers,
+)
+from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis.claims import parameters_of, supported
+from validation.diagnosis.fit import fit_machine
+from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.unknowns import Acting, Small, Unknowns
+
+SURE = norm.isf(0.5e-3)  # standard deviations that chance exceeds once in a thousand
+
+
+def first(fit):
+    return supported(fit, fit.unknowns.effects[0])
+
+
+@pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_length_is_claimed_from_one_chance_in_a_thousand(times, claimed, sign):
+    """Its standard deviation is sigma / sqrt(8): of eight readings along the bar."""
+    length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
+    plain = bar(link=BEAM)
+    fit = machine(bar(link=BEAM, measured=fit_of(plain, length)), LONGER)
+    assert fit.x == pytest.approx([length], rel=1e-6)
+    assert first(fit) == claimed
+
+
+def test_a_stiffness_that_nothing_softens_is_no_effect():
+    """At its lower bound, zero: there is no parameter to be told."""
+    seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
+    fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
+    assert numbers(fit) == []
+    assert not first(fit)
+    assert first(machine(gives_way(30.0, 2e5), SOFTER, start=1e-6))
+
+
+def test_two_effects_that_do_the_same_are_both_unsupported():
+    """Heat that never changes is a length: either may be anything."""
+    heat = {"temperature": np.full(8, 5.0)}
+    plain = bar(link=BEAM, **heat)
+    campaign = bar(link=BEAM, measured=fit_of(plain, 1e-3), **heat)
+    both = machine(campaign, LONGER, WARMER)
+    assert not any(supported(both, one) for one in both.unknowns.effects)
+    for one in (LONGER, WARMER):
+        assert first(machine(campaign, one))
+
+
+def test_an_unknown_at_its_bound_supports_nothing():
+    """An expansion of 5e-4 per kelvin, which no material has, stops there."""
+    heat = {"temperature": np.full(8, 5.0)}
+    plain = bar(link=BEAM, **heat)
+    most = 5e-4 * LENGTH * 5.0
+    for size, claimed in ((0.9, True), (1.2, False)):
+        seen = fit_of(plain, size * most)
+        fit = machine(bar(link=BEAM, measured=seen, **heat), WARMER)
+        assert fit.x == pytest.approx([min(size, 1.0) * 5e-4], rel=1e-4)
+        assert first(fit) == claimed
+
+
+@pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
+def test_an_exponent_at_its_bound_is_no_law(value, claimed):
+    """Of a contact: what gives it its name must not be where it may go no further."""
+    slots = (
+        Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
+        Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
+    )
+    one = Acting(Hypothesis("contact_stiffening", ("drive",), slots), np.zeros(2))
+    plain = machine(bar(link=BEAM), LONGER)
+    fit = replace(
+        plain, unknowns=Unknowns(bar().robot, (one,)), x=np.array([1e-5, value]),
+        covariance=np.diag([1e-14, 1e-4]), slopes=np.ones((8, 2)) * [1e7, 1.0],
+    )  # fmt: skip
+    assert supported(fit, one) == claimed
+
+
+def test_what_has_no_number_and_where_a_device_stands_are_not_in_question():
+    fit = machine(bar(link=BEAM), LONGER)
+    assert not first(fit)
+    finite = Acting(Hypothesis("geometric_stiffening", (), ()), np.zeros(0))
+    assert supported(fit, finite)
+    assert supported(fit, replace(fit.unknowns.effects[0], device=True))
+
+
+@pytest.mark.parametrize(("declared", "value", "std"), [
+    # a factor 0.8 of which 0.9 is left: 0.72, and 0.8 times as unsure
+    (0.8, 0.72, 0.8 * 0.81 * 1e-3),
+    (None, 0.9, 0.81 * 1e-3),
+])  # fmt: skip
+def test_a_parameter_is_as_sure_as_the_machine_s_and_not_the_difference_s(
+    declared, value, std
+):
+    """1 / factor - 1 is fitted: of factor f its uncertainty is f squared times."""
+    softer = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
+    one = Acting(softer, np.zeros(1))
+    given = {} if declared is None else {"tip": declared}
+    ((name, found, sigma),) = parameters_of(
+        bar(link=BEAM).robot, one, np.array([1 / 0.9 - 1]), np.array([[1e-6]]), given
+    )
+    assert (name, found) == ("tip", pytest.approx(value))
+    assert sigma == pytest.approx(std, rel=1e-6)
+
+
+def test_a_spring_that_would_be_negative_changes_nothing():
+    """A drive that turns against its moment: compliance 0, and the robot as it was."""
+    M = 30.0
+    seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
+    campaign = bar(
+        [0, 0, M, 0, 0, 0], seen, spring=np.diag([np.inf] * 2 + [1e6] + [np.inf] * 3)
+    )
+    springs = Small(SPRINGS, np.zeros(1, int), np.array([2]), np.array([1e-5]))
+    fit = fit_machine(
+        campaign, Unknowns(campaign.robot, (), (springs,)), np.ones(8, bool)
+    )
+    assert fit.x == pytest.approx([0.0], abs=1e-15)
+    declared, found = (r.frames[0].joint_stiffness for r in (campaign.robot, fit.robot))
+    assert np.array_equal(declared, found)
+
+
+def test_small_unknowns_are_those_of_a_ridge_regression():
+    """The mean of eight readings along the bar, drawn towards zero by its prior."""
+    size, std = 3e-6, 2e-6
+    plain = bar(link=BEAM)
+    campaign = bar(link=BEAM, measured=fit_of(plain, size))
+    part = Small(GEOMETRY, np.ones(1, int), np.array([3]), np.array([std]))
+    fit = fit_machine(campaign, Unknowns(campaign.robot, (), (part,)), np.ones(8, bool))
+    told = 8 * std**2 / (8 * std**2 + SIGMA[3] ** 2)
+    assert fit.x == pytest.approx([told * size], rel=1e-4)
+    assert fit.determined == pytest.approx([told], rel=1e-4)
+    assert fit.covariance[0, 0] == pytest.approx((1 - told) * std**2, rel=1e-4)

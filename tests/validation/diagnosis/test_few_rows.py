@@ -1,0 +1,73 @@
+"""Too few rows decide nothing, and say which would."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from examples.campaign_folder import DATA
+from tests.elastic_arm_for_tests import arm, commanded
+from tests.planar_arm_for_tests import SIGMA
+from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.prediction import predicted
+from validation.diagnosis.results import table
+from validation.diagnosis.text import text
+from validation.diagnosis.verdict import NOT_ENOUGH
+
+
+def seen(rows, seed, unlike=0.0):
+    """Positions of an arm whose frames are off; more at random, in sigma."""
+    rng = np.random.default_rng(seed)
+    errors = rng.normal(size=(4, 6)) * np.repeat([1e-3, 5e-4], 3)
+    campaign = commanded(arm(), rows, seed)
+    there = predicted(replace(campaign, robot=arm().with_errors(errors)))
+    readings = there.deviation + SIGMA * rng.normal(size=(rows, 6))
+    readings += unlike * SIGMA * rng.normal(size=(rows, 6))
+    readings[:, :3] = np.nan
+    return replace(campaign, measured=readings)
+
+
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))]
+)
+def test_eight_rows_of_a_target_explain_nothing(seed):
+    """24 numbers, of which geometry alone has twenty unknowns."""
+    found = diagnose(seen(8, seed))
+    assert found.verdict == NOT_ENOUGH
+    assert found.claimed == ()
+    told = table(found)
+    assert told["effects"] == []
+    assert "configurations" in told["needed"]
+    wanted = int(told["needed"].split("about ")[1].split()[0])
+    assert wanted >= 16
+    assert told["needed"] in text(found)
+    assert "too few" in told["sentence"]
+
+
+@pytest.mark.slow
+def test_as_many_rows_as_were_asked_for_suffice():
+    found = diagnose(seen(8, 1))
+    wanted = int(found.needed.split("about ")[1].split()[0])
+    again = diagnose(seen(wanted, 1))
+    assert again.verdict == "explained"
+    assert again.needed == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, 5])
+def test_readings_like_no_other_are_never_explained(seed):
+    """A hundred sigma each, at random: there is nothing to be learned in 8 or 16."""
+    for rows in (8, 16):
+        found = diagnose(seen(rows, seed, unlike=100.0))
+        assert found.verdict in {NOT_ENOUGH, "outside_library"}
+        assert found.claimed == ()
+
+
+@pytest.mark.slow
+def test_eight_rows_of_six_joints_are_too_few():
+    """Of one target, which once were explained: errors rose from 121 to 1084 sigma."""
+    folder = DATA.parent / "cases" / "campaigns" / "few_8"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there")
+    assert diagnose(read_campaign(folder)).verdict == NOT_ENOUGH

@@ -1,0 +1,131 @@
+"""Numbers of a robot fitted together, on a bar whose answers are known."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.stats import binom
+
+from tests.bar_for_tests import (
+    BEAM,
+    LENGTH,
+    LONGER,
+    SOFTER,
+    TURNED,
+    along,
+    bar,
+    fit_of,
+    gives_way,
+    machine,
+    numbers,
+)
+from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis.diagnose import diagnose
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
+def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
+    """And its standard deviation sigma / sqrt(R): rotations have no say."""
+    plain = bar(link=BEAM)
+    noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
+    seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
+    campaign = bar(link=BEAM, measured=seen)
+    fit = machine(campaign, LONGER, start=start)
+    ((name, value, std),) = numbers(fit)
+    assert name == "tip"
+    mean = np.einsum("ri,ri->r", seen[:, 3:], along(plain)).mean()
+    assert value == pytest.approx(mean, rel=1e-7)
+    assert std == pytest.approx(SIGMA[3] / np.sqrt(8), rel=1e-6)
+    left = (seen - fit_of(campaign, value)) / SIGMA
+    assert fit.residual @ fit.residual == pytest.approx(np.sum(left**2))
+
+
+def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
+    """Turn M/k and arc M L/k in every row; std k = k^2 std(1/k)."""
+    M, k = 30.0, 2e5
+    campaign = gives_way(M, k)
+    fit = machine(campaign, SOFTER, start=1e-6)
+    ((name, value, std),) = numbers(fit)
+    assert name == "drive"
+    assert value == pytest.approx(k, rel=1e-4)  # arcs are chords to first order
+    J = 8 * ((M / SIGMA[2]) ** 2 + (M * LENGTH / SIGMA[3]) ** 2)
+    assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
+
+
+def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
+    """Only x is read: L (cos(q + e) - cos q), of slope -L sin(q + e) per radian.
+
+    Slopes are the linear model's at the robot reached, off by e to first order.
+    """
+    e, plain = 0.02, bar()
+    q = plain.coordinates[:, 0]
+    seen = np.full((8, 6), np.nan)
+    seen[:, 3] = LENGTH * (np.cos(q + e) - np.cos(q))
+    fit = machine(bar(measured=seen), TURNED)
+    ((_, value, std),) = numbers(fit)
+    slope = LENGTH * np.sin(q + e) / SIGMA[3]
+    assert std == pytest.approx(1 / np.linalg.norm(slope), rel=2 * e)
+    assert abs(value - e) < 0.05 * std
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    """One standard deviation in 68 %, of 60 campaigns."""
+    rng = np.random.default_rng(8)
+    inside = 0
+    shape = fit_of(bar(link=BEAM), 2e-5)
+    for _ in range(60):
+        campaign = bar(link=BEAM, measured=shape + rng.normal(size=(8, 6)) * SIGMA)
+        ((_, value, std),) = numbers(machine(campaign, LONGER))
+        inside += abs(value - 2e-5) < std
+    assert 1e-3 < binom.cdf(inside, 60, 0.6827) < 1 - 1e-3
+
+
+def test_a_drive_that_turns_against_its_load_is_rigid():
+    """The compliance stays at its bound."""
+    M = 30.0
+    seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
+    campaign = bar([0, 0, M, 0, 0, 0], seen)
+    fit = machine(campaign, SOFTER, start=1e-6)
+    assert fit.x == pytest.approx([0.0], abs=1e-9)
+    assert fit.robot.effects == {}
+    assert numbers(fit) == []
+
+
+def test_an_offset_is_exact_far_from_straight():
+    """The drive turns by a where K (a - e) = F L cos(q + a), far from straight."""
+    K, F, e = 2e3, 150.0, 4e-3
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * (a - e) - F * LENGTH * np.cos(b + a), -1, 1)
+        for b in q
+    ])
+    seen = np.zeros((8, 6))
+    seen[:, 2] = turn
+    seen[:, 3] = LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] = LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, spring=spring)
+    fit = machine(campaign, TURNED)
+    assert fit.x == pytest.approx([e], rel=1e-4)
+    assert np.abs(fit.residual).max() < 0.5  # sigma
+
+
+def test_what_finite_motions_explain_needs_no_effect_once_they_are_declared():
+    """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
+    K, F, rows = 2e3, 150.0, 20
+    spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
+    plain = bar([0, 0, 0, 0, F, 0], rows=rows, spring=spring)
+    q = plain.coordinates[:, 0]
+    turn = np.array([
+        brentq(lambda a, b=b: K * a - F * LENGTH * np.cos(b + a), -1, 1) for b in q
+    ])
+    seen = np.random.default_rng(5).normal(size=(rows, 6)) * SIGMA
+    seen[:, 2] += turn
+    seen[:, 3] += LENGTH * (np.cos(q + turn) - np.cos(q))
+    seen[:, 4] += LENGTH * (np.sin(q + turn) - np.sin(q))
+    campaign = bar([0, 0, 0, 0, F, 0], seen, rows=rows, spring=spring)
+    linear, finite = diagnose(campaign), diagnose(campaign, finite=True)
+    assert (linear.verdict, linear.claimed) == ("explained", ("geometric_stiffening",))
+    assert finite.verdict == "none_needed"
+    assert finite.before.normalised == pytest.approx(1.0, abs=0.4)
+    assert linear.before.normalised > 10
