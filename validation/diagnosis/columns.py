@@ -17,6 +17,7 @@ from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import blocks_of
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
+from validation.diagnosis.joint_functions import joint_functions
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -27,7 +28,6 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.small_terms import small_terms
-from validation.diagnosis.together import together
 
 _VISIBLE = 4.0  # squared whitened change of the readings
 
@@ -72,7 +72,7 @@ class Columns:
         )
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
         self.functions = Functions(campaign, self.sensitivities)
-        self.explicit = together(self.functions)
+        self.explicit = joint_functions(self.functions)
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Hypotheses that show; of those that do the same, the first."""
@@ -126,7 +126,7 @@ class Columns:
         """
         robot = self.campaign.robot
         public = self._public(elements, xs)
-        middle = self.together(elements, xs)
+        middle = self.combined(elements, xs)
         made = []
         for e, x in zip(elements, xs, strict=True):
             others = {name: v for name, v in public.items() if name != e.name}
@@ -142,7 +142,7 @@ class Columns:
             for s, e, x in zip(made, elements, xs, strict=True)
         ]
 
-    def together(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
+    def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
         """(N,) what effects of the library do together, whitened."""
         public = self._public(elements, xs)
         if any(LIBRARY[name].clearance for name in public):

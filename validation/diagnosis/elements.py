@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly.effects.functions import AXES
 from assembly.model.robot import Robot
 from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.gaussian import Taken, averaged_gains, likeness
+from validation.diagnosis.gaussian import Marginal, deviance, evidence_gains
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import Signature
 
@@ -38,7 +38,7 @@ class Element:
         what: the hypothesis or candidate.
         slots: (m,) which of the hypothesis's slots; columns of a function.
         begin: values of all slots where the unknowns are zero.
-        first: the same as it was scored at first, where it was taken again since.
+        first: the same as it was scored at first, where it was marginal again since.
     """
 
     name: str
@@ -93,7 +93,7 @@ def effect_element(
         signature: of the hypothesis.
         robot: whose frames it names.
         log_prior: of it.
-        shapes: (k,) values about which it was taken; absent where it begins.
+        shapes: (k,) values about which it was marginal; absent where it begins.
 
     Returns:
         The element; unknowns that do not show are left at their start.
@@ -208,21 +208,25 @@ class Dense:
             bounded = np.array([m == 1 and elements[i].bounded[0] for i in own])
             self._groups.append((np.array(own), B, gram, most, bounded))
 
-    def gains(self, taken: Taken, freedom: float) -> NDArray:
-        """(len(elements),) log evidence ratio of each beside what was taken out."""
+    def gains(self, marginal: Marginal, freedom: float) -> NDArray:
+        """(len(elements),) log evidence ratio of each beside what was marginal out."""
         gains = np.full(len(self.elements), -np.inf)
         for own, B, gram, most, bounded in self._groups:
             m = gram.shape[1]
-            shown = (taken.across.T @ B).reshape(-1, len(own), m).transpose(1, 0, 2)
+            shown = (
+                (marginal.factor_columns.T @ B)
+                .reshape(-1, len(own), m)
+                .transpose(1, 0, 2)
+            )
             left = gram - shown.transpose(0, 2, 1) @ shown
-            along = (taken.held @ B).reshape(len(own), m)
-            gains[own] = averaged_gains(left, along, most, bounded, taken, freedom)
-        n = len(taken.held)
+            along = (marginal.held @ B).reshape(len(own), m)
+            gains[own] = evidence_gains(left, along, most, bounded, marginal, freedom)
+        n = len(marginal.held)
         for i, o in self._offsets:
-            across = taken.across.T @ o
-            Q = taken.squares - 2 * float(taken.held @ o) + float(o @ o)
-            Q -= float(across @ across)
-            change = likeness(taken.squares, n, freedom) - likeness(Q, n, freedom)
+            factor_columns = marginal.factor_columns.T @ o
+            Q = marginal.squares - 2 * float(marginal.held @ o) + float(o @ o)
+            Q -= float(factor_columns @ factor_columns)
+            change = deviance(marginal.squares, n, freedom) - deviance(Q, n, freedom)
             gains[i] = 0.5 * float(change)
         return gains
 

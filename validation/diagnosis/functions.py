@@ -34,29 +34,29 @@ from validation.diagnosis.candidates import (
 )
 from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.forms_tried import CandidateShape, is_angle
-from validation.diagnosis.gaussian import Taken, averaged_gains
+from validation.diagnosis.gaussian import Marginal, evidence_gains
 from validation.diagnosis.places import Places, Weighted, Where
 from validation.diagnosis.remainder import in_cells
 
 Variables = tuple[str, ...]
-Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
+Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
 
 
 @dataclass(frozen=True)
-class Found:
+class ScoredFunction:
     """A function that was scored.
 
     Attributes:
-        worth: log evidence ratio and log prior together.
+        score: log evidence ratio and log prior together.
         where: number of its place.
         variables: one or two.
         shape: the form.
         log_prior: of it.
     """
 
-    worth: float
+    score: float
     where: int
     variables: Variables
     shape: CandidateShape
@@ -77,24 +77,24 @@ class _Scored:
 
 
 def _likeliest(
-    parts: Mapping[int, Sequence[_Scored]], taken: Taken, freedom: float
+    parts: Mapping[int, Sequence[_Scored]], marginal: Marginal, freedom: float
 ) -> list[tuple[float, int, int, int]]:
     """Worth, and which variables, form and place, of all that show; best first."""
-    worths, whose = [], []
+    scores, whose = [], []
     for own in parts.values():
-        gains = averaged_gains(
+        gains = evidence_gains(
             np.concatenate([p.gram for p in own]),
             np.concatenate([p.along for p in own]),
-            np.concatenate([p.most for p in own]), False, taken, freedom,
+            np.concatenate([p.most for p in own]), False, marginal, freedom,
         )  # fmt: skip
         sizes = [len(p.where) for p in own]
-        worths.append(gains + np.repeat([p.prior for p in own], sizes))
+        scores.append(gains + np.repeat([p.prior for p in own], sizes))
         numbers = np.repeat([(p.number, p.shape) for p in own], sizes, axis=0)
         whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
-    worth, names = np.concatenate(worths), np.concatenate(whose)
-    order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
+    score, names = np.concatenate(scores), np.concatenate(whose)
+    order = [i for i in np.argsort(-score).tolist()[:_LISTED] if np.isfinite(score[i])]
     return [
-        (float(worth[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
+        (float(score[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
         for i in order
     ]
 
@@ -146,38 +146,38 @@ class Functions:
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
-    def first_look(self) -> list[Asked]:
+    def first_look(self) -> list[Request]:
         """Variables, and forms that show whether they count."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
             for name in self.variables
         ]
 
-    def products(self, names: Iterable[str]) -> list[Asked]:
+    def products(self, names: Iterable[str]) -> list[Request]:
         """Products of some variables with any others."""
-        asked: dict[Variables, tuple[CandidateShape, ...]] = {}
+        requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
                 both = None
                 if other != name:
                     both = forms.of_two(self.conditions, name, other)
-                if both is not None and both[0] not in asked:
-                    asked[both[0]] = tuple(both[1])
+                if both is not None and both[0] not in requests:
+                    requests[both[0]] = tuple(both[1])
             if is_angle(self.campaign.robot, name):
-                asked[(name,)] = (forms.of_direction(name),)
-        return list(asked.items())
+                requests[(name,)] = (forms.of_direction(name),)
+        return list(requests.items())
 
     def look(
-        self, taken: Taken, weighted: Weighted, freedom: float,
-        asked: Sequence[Asked], most: int,
-    ) -> list[Found]:  # fmt: skip
+        self, marginal: Marginal, weighted: Weighted, freedom: float,
+        requests: Sequence[Request], most: int,
+    ) -> list[ScoredFunction]:  # fmt: skip
         """The best functions of some variables and forms beside what is known.
 
         Args:
-            taken: what is known, and what is left, in the cells of ``weighted``.
+            marginal: what is known, and what is left, in the cells of ``weighted``.
             weighted: places.
             freedom: of the noise's scale.
-            asked: variables with their forms.
+            requests: variables with their forms.
             most: functions of each variable or pair.
 
         Returns:
@@ -186,25 +186,25 @@ class Functions:
         if not len(self.places):
             return []
         row, component = weighted.cells
-        count = taken.across.shape[1]
+        count = marginal.factor_columns.shape[1]
         U = np.zeros((len(weighted.rows), 6, count))
-        U[row, component] = taken.across
+        U[row, component] = marginal.factor_columns
         held = np.zeros((len(weighted.rows), 6))
-        held[row, component] = taken.held
+        held[row, component] = marginal.held
         through = weighted.answers.transpose(1, 0, 2) @ U
         on = np.einsum("src,rc->sr", weighted.answers, held)
         parts: dict[int, list[_Scored]] = {}
-        for number, (variables, shapes) in enumerate(asked):
+        for number, (variables, shapes) in enumerate(requests):
             for one in self._blocks(number, weighted, variables, shapes, through, on):
                 parts.setdefault(one.along.shape[1], []).append(one)
-        best: list[Found] = []
+        best: list[ScoredFunction] = []
         each: dict[int, int] = {}
-        for worth, number, k, where in _likeliest(parts, taken, freedom):
+        for score, number, k, where in _likeliest(parts, marginal, freedom):
             each[number] = each.get(number, 0) + 1
             if each[number] <= most:
-                variables, shapes = asked[number]
+                variables, shapes = requests[number]
                 prior = self.prior(variables, shapes[k])
-                best.append(Found(worth, where, variables, shapes[k], prior))
+                best.append(ScoredFunction(score, where, variables, shapes[k], prior))
         return best
 
     def _blocks(
@@ -246,7 +246,7 @@ class Functions:
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
-    def candidate(self, found: Found) -> Candidate:
+    def candidate(self, found: ScoredFunction) -> Candidate:
         """The function that was scored."""
         return self._at(self.places.names[found.where], found.variables, found.shape)
 

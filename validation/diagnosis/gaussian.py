@@ -8,7 +8,7 @@ symbol  code            shape    meaning
 ======  ==============  =======  =====================================================
 G       ``matrix``      (k, k)   inner products of columns, z last
 M                       (p, p)   1 + S G S of what is eliminated
-U       ``across``      (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - U U'
+U       ``factor_columns``      (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - U U'
 Q       ``squares``              z' C^-1 z
 ======  ==============  =======  =====================================================
 
@@ -93,30 +93,30 @@ def log_evidence(
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)
     constant -= count / 2 * math.log(freedom * math.pi) + log_det / 2
-    return float(constant - likeness(squares, count, freedom) / 2)
+    return float(constant - deviance(squares, count, freedom) / 2)
 
 
-def likeness(squares: NDArray | float, count: int, freedom: float) -> NDArray | float:
+def deviance(squares: NDArray | float, count: int, freedom: float) -> NDArray | float:
     """-2 ln of the part of the density of z that depends on z' C^-1 z."""
     return (freedom + count) * np.log1p(np.asarray(squares) / freedom)
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class Marginal:
     """What columns leave: the fast path for many candidates at once.
 
     Attributes:
-        across: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
+        factor_columns: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
         held: (n,) C^-1 z.
         squares: z' C^-1 z.
     """
 
-    across: NDArray
+    factor_columns: NDArray
     held: NDArray
     squares: float
 
 
-def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken:
+def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
     """What columns (n, k) of prior std (k,), and orthonormal flat ones, leave."""
     X = columns * std
     M = X.T @ X
@@ -124,37 +124,37 @@ def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken
     L = np.linalg.cholesky(M)
     U = solve_triangular(L, X.T, lower=True, check_finite=False).T
     held = z - U @ (U.T @ z)
-    return Taken(np.hstack([flat, U]), held, float(z @ held))
+    return Marginal(np.hstack([flat, U]), held, float(z @ held))
 
 
 def leave_block_out(
-    taken: Taken, blocks: NDArray, tau: float = 1.0
+    marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
     """Readings of each block foretold by a fit to all others, sizes held.
 
     Args:
-        taken: of n readings.
+        marginal: of n readings.
         blocks: (n,) whose each reading is.
         tau: of the noise.
 
     Returns:
         (n,) errors, and (number of blocks,) ln densities.
     """
-    errors, densities = np.empty_like(taken.held), []
+    errors, densities = np.empty_like(marginal.held), []
     for name in np.unique(blocks):
         own = np.flatnonzero(blocks == name)
-        U = taken.across[own]
+        U = marginal.factor_columns[own]
         left = np.eye(len(own)) - U @ U.T
-        errors[own] = np.linalg.solve(left, taken.held[own])
+        errors[own] = np.linalg.solve(left, marginal.held[own])
         size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi * tau**2)
-        square = float(errors[own] @ taken.held[own]) / tau**2
+        square = float(errors[own] @ marginal.held[own]) / tau**2
         densities.append(0.5 * (size - square))
     return errors, np.array(densities)
 
 
-def averaged_gains(
+def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
-    taken: Taken, freedom: float,
+    marginal: Marginal, freedom: float,
 ) -> NDArray:  # fmt: skip
     """Log evidence ratios of blocks of columns, the size of each averaged over a grid.
 
@@ -163,13 +163,13 @@ def averaged_gains(
         along: (c, m) B'C^-1 z.
         most: (c,) largest size that is plausible, in the same scale.
         bounded: (c,) whether its one unknown cannot be negative.
-        taken: what is known.
+        marginal: what is known.
         freedom: of the noise's scale.
 
     Returns:
         (c,) -inf where nothing plausible shows.
     """
-    count = len(taken.held)
+    count = len(marginal.held)
     if gram.shape[1] == 1:
         values, turned = gram[:, 0], along
     else:
@@ -180,10 +180,10 @@ def averaged_gains(
     squares = np.where(seen, turned**2, 0.0)
     t2 = SIZES[:, None, None] ** 2
     grown = 1 + t2 * values
-    left = taken.squares - (squares * t2 / grown).sum(axis=2)
-    left = np.maximum(left, 1e-9 * taken.squares)
-    base = likeness(taken.squares, count, freedom)
-    gains = 0.5 * (base - likeness(left, count, freedom) - np.log(grown).sum(axis=2))
+    left = marginal.squares - (squares * t2 / grown).sum(axis=2)
+    left = np.maximum(left, 1e-9 * marginal.squares)
+    base = deviance(marginal.squares, count, freedom)
+    gains = 0.5 * (base - deviance(left, count, freedom) - np.log(grown).sum(axis=2))
     if gram.shape[1] == 1 and np.any(bounded):
         spread = np.sqrt(t2[:, :, 0] / grown[:, :, 0])
         tau = np.sqrt((freedom + left) / (freedom + count))
@@ -197,7 +197,7 @@ def averaged_gains(
     return np.where(sizes > 0, average, -np.inf)
 
 
-def size_cost(determined: float) -> float:
+def size_penalty(determined: float) -> float:
     """What a size costs that was chosen best instead of averaged, by Laplace.
 
     Args:

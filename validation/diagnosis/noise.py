@@ -39,7 +39,7 @@ class Noise:
     findings: tuple[str, ...] = ()
 
 
-def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
+def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
     """Probability of every reading that it is no blunder.
 
     Args:
@@ -62,12 +62,12 @@ def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
     return share
 
 
-def weights_of(good: NDArray) -> NDArray:
+def cell_weights(good: NDArray) -> NDArray:
     """(n,) precision of readings, of one that is good."""
     return good + (1 - good) / _WIDTH**2
 
 
-def scatter_of_repeats(z: NDArray, group: NDArray) -> tuple[float, int]:
+def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
     """How much readings of the same thing differ, whatever the model.
 
     Args:
@@ -92,7 +92,7 @@ def findings(
     Args:
         tau: true over stated sigma, by what a model leaves.
         tau_std: its standard deviation.
-        repeats: :func:`scatter_of_repeats`, of what is left.
+        repeats: :func:`repeat_scatter`, of what is left.
         memory: whether the model depends on the rows before.
 
     Returns:

@@ -4,7 +4,7 @@ With posterior mean mu and covariance V of the unknowns of a group and s their s
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-zero where s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, taken with a limit.
+zero where s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, marginal with a limit.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from validation.diagnosis.gaussian import likeness, size_cost
+from validation.diagnosis.gaussian import deviance, size_penalty
 
 _STEPS = 25
 _SETTLED = 0.03  # change of ln s
@@ -99,10 +99,10 @@ def best_sizes(
         left = max(squares - float(std * along @ x), 1e-12 * squares)
         log_det = 2 * float(np.log(np.diag(factor[0])).sum())
         determined = 1 - (inverse**2).sum(axis=0)
-        now = -0.5 * (float(likeness(left, count, freedom)) + log_det)
+        now = -0.5 * (float(deviance(left, count, freedom)) + log_det)
         if now > worth:
             worth = now
-            cost = sum(size_cost(float(determined[w].sum())) for w in own.values())
+            cost = sum(size_penalty(float(determined[w].sum())) for w in own.values())
             inverse *= std
             best = Sizes(
                 std, dict(size), std * x, inverse.T @ inverse, left, log_det, cost

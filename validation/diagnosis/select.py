@@ -20,13 +20,13 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
     findings,
-    good_readings,
+    probability_good,
+    repeat_scatter,
     scale,
-    scatter_of_repeats,
 )
 from validation.diagnosis.search import Search, Update, names_of
 from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
-from validation.diagnosis.states import State, foretold
+from validation.diagnosis.states import State, prediction_gain
 
 _EQUAL = 3.0  # log posterior: functions that do as well
 _SAME = 1.0  # squared whitened difference of models that say the same
@@ -53,11 +53,11 @@ def select(
     """
     good = np.ones(len(z))
     search = Search(columns, z, cells, good)
-    begin = good_readings(search.begin.expected_squares(), clearly=True)
+    begin = probability_good(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
         good, search = begin, Search(columns, z, cells, begin)
     states = search.run(update)
-    again = good_readings(states[0].expected_squares())
+    again = probability_good(states[0].expected_squares())
     if not np.array_equal(again, good):
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
@@ -66,7 +66,7 @@ def select(
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     """The answer from all models seen."""
-    states = _confirmed(search, _unlike(states))
+    states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     best, fit = states[0], search.fit
@@ -122,7 +122,7 @@ def _findings(
         point = np.unique(columns.campaign.point, return_inverse=True)[1][row]
     group = (repeat * (point.max(initial=0) + 1) + point) * 6 + component
     kept = good > 0.5
-    repeats = scatter_of_repeats(best.left[kept], group[kept])
+    repeats = repeat_scatter(best.left[kept], group[kept])
     forms = {e.candidate.shape.form for e in best.elements if not e.name}
     memory = any(FORMS[form].remembers for form in forms)
     return findings(*scale, repeats, memory=memory)
@@ -148,7 +148,7 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
         rests = [tuple(x for x in best.elements if x is not e) for e in learned]
         rests.append(tuple(x for x in best.elements if x.name))
         gains = [
-            foretold(best, search.fit.state(rest, best.mode, best), blocks)
+            prediction_gain(best, search.fit.state(rest, best.mode, best), blocks)
             for rest in rests
             if learned
         ]
@@ -158,7 +158,7 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
     return states
 
 
-def _unlike(states: Sequence[State]) -> list[State]:
+def _merged(states: Sequence[State]) -> list[State]:
     """Models without those that say of the readings what a likelier one says.
 
     A function that does what an effect does is that effect: the one with fewer

@@ -66,11 +66,11 @@ def _reversals(
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
-    plays = [
-        CandidateShape("play", ("size",), (("depth", depth * size),))
+    slips = [
+        CandidateShape("slip", ("size",), (("depth", depth * size),))
         for depth in depths
     ]
-    return [CandidateShape("reversal", ("0",)), *plays]
+    return [CandidateShape("reversal", ("0",)), *slips]
 
 
 def of_two(

@@ -15,10 +15,10 @@ from scipy.special import log_ndtr
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
 from validation.diagnosis.gaussian import (
-    Taken,
+    Marginal,
+    deviance,
     leave_block_out,
-    likeness,
-    take_out,
+    marginalise,
 )
 from validation.diagnosis.noise import FREEDOM, scale
 from validation.diagnosis.prior_sizes import Sizes, best_sizes
@@ -28,7 +28,7 @@ MORE = math.log(2.0)  # an element more is half as likely
 IN_USE = math.log(10.0), math.log(10.0)  # geometry, springs: one campaign in ten
 _GROUPS = 4
 _RANK = 1e-9
-_GLANCED = 500  # rows by which functions are looked for first, drawn once
+_SAMPLE = 500  # rows by which functions are looked for first, drawn once
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +54,24 @@ class State:
     fit: "Fitting"
 
     @cached_property
-    def taken(self) -> Taken:
+    def marginal(self) -> Marginal:
         """What is left beside this model."""
         f, z = self.fit, self.fit.readings(self.elements)
         columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
         X = np.hstack(columns)
-        return take_out(X, self.sizes.std, z, f.flat)
+        return marginalise(X, self.sizes.std, z, f.flat)
 
     @cached_property
-    def glance(self) -> Taken:
+    def sample_marginal(self) -> Marginal:
         """The same in the rows of a first look."""
         f = self.fit
-        if f.glanced.all():
-            return self.taken
+        if f.sampled.all():
+            return self.marginal
         columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
-        X, z = np.hstack(columns)[f.glanced], f.readings(self.elements)[f.glanced]
-        flat = np.linalg.qr(f.flat[f.glanced])[0]
+        X, z = np.hstack(columns)[f.sampled], f.readings(self.elements)[f.sampled]
+        flat = np.linalg.qr(f.flat[f.sampled])[0]
         X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
-        return take_out(X, self.sizes.std, z, flat)
+        return marginalise(X, self.sizes.std, z, flat)
 
     @cached_property
     def fitted(self) -> NDArray:
@@ -101,7 +101,7 @@ class State:
         return self.left**2 + spread * self.tau**2 / f.weights
 
 
-def foretold(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
+def prediction_gain(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
     """How much better a model foretells blocks of rows that it was not fitted to.
 
     Args:
@@ -113,7 +113,7 @@ def foretold(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
         Sum of differences of ln densities at the first one's tau, sizes held, and its
         standard error from block to block.
     """
-    densities = [leave_block_out(s.taken, blocks, one.tau)[1] for s in (one, other)]
+    densities = [leave_block_out(s.marginal, blocks, one.tau)[1] for s in (one, other)]
     gains = densities[0] - densities[1]
     return float(gains.sum()), float(gains.std(ddof=1) * np.sqrt(len(gains)))
 
@@ -136,7 +136,7 @@ class Fitting:
         rows = columns.row[cells]
         number = np.unique(rows, return_inverse=True)[1]
         order = np.random.default_rng(0).permutation(number.max(initial=0) + 1)
-        self.glanced = order[number] < _GLANCED
+        self.sampled = order[number] < _SAMPLE
         self.root = np.sqrt(weights)
         flat = columns.flat[cells] * self.root[:, None]
         flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
@@ -230,14 +230,17 @@ class Fitting:
         made = [self._products(e) for e in elements]
         E = np.hstack([np.zeros((len(z), 0)), *(B for B, _, _ in made)])
         counts = [B.shape[1] for B, _, _ in made]
-        across = np.hstack([np.zeros((len(self._gram), 0)), *(c for _, _, c in made)])
+        factor_columns = np.hstack([
+            np.zeros((len(self._gram), 0)),
+            *(c for _, _, c in made),
+        ])
         inner, with_z = E.T @ E, E.T @ z
         small_z = self.small.T @ z
         element = np.repeat(np.arange(len(elements)), counts)
         given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
         most = np.repeat([e.most for e in elements], counts)
         while True:
-            beside = across[used]
+            beside = factor_columns[used]
             gram = np.block([
                 [self._gram[np.ix_(used, used)], beside],
                 [beside.T, inner],
@@ -264,7 +267,7 @@ class Fitting:
     ) -> float:
         """Log posterior of a model, up to a constant."""
         small = self.columns.nuisance
-        evidence = float(likeness(sizes.squares, self.count, FREEDOM)) + sizes.log_det
+        evidence = float(deviance(sizes.squares, self.count, FREEDOM)) + sizes.log_det
         score = -0.5 * evidence - sizes.cost
         for spring, cost in ((False, IN_USE[0]), (True, IN_USE[1])):
             declared = small.declared and not spring

@@ -1,9 +1,9 @@
-"""Effects of a model taken again about what was found, all of them together.
+"""Effects of a model marginal again about what was found, all of them together.
 
-A tangent taken where effects begin misses what they do to one another, what bends in
+A tangent marginal where effects begin misses what they do to one another, what bends in
 their shapes (a time constant, an exponent), and finite motions.  So the model is asked
 what the effects of a state do together; where that differs from the sum of tangents,
-these are taken again there.
+these are marginal again there.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ _LINEAR = 0.5  # squared whitened difference of what is linear enough
 _SHIFT = 3.0  # times that a shape may change in a round
 
 
-class Settling:
+class Relinearisation:
     """Models about their own values, each found once."""
 
     def __init__(self, columns: Columns, fit: Fitting) -> None:
@@ -32,7 +32,7 @@ class Settling:
         self.columns, self.fit = columns, fit
         self._about: dict[object, list[Element] | None] = {}
 
-    def settled(self, state: State) -> State:
+    def relinearised(self, state: State) -> State:
         """A model about its own values, where that differs from what was assumed."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
@@ -79,7 +79,7 @@ class Settling:
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)
             if e.offset is not None:
                 linear += e.offset
-        miss = (self.columns.together(effects, xs) - linear)[self.fit.cells]
+        miss = (self.columns.combined(effects, xs) - linear)[self.fit.cells]
         return float(miss @ miss)
 
 

@@ -19,7 +19,7 @@ _CUBIC = CandidateShape("powers", ("2",))  # of a compliance: times its own wren
 Parts = tuple[CandidatePart, ...]
 
 
-def together(functions: Functions) -> list[Element]:
+def joint_functions(functions: Functions) -> list[Element]:
     """Functions that act at several places, and those of a joint's own wrench.
 
     Args:
