@@ -29,33 +29,33 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.special import gammaln, log_ndtr
 
-SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] what a block may do to readings
+SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] prior contributions to readings
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # of the largest product: directions of a block lost to rounding
+_SEEN = 1e-8  # least eigenvalue of a scaled candidate that is not rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Inner products of columns, some of them eliminated.
+    """Inner products of columns, some of which are eliminated.
 
     Attributes:
         matrix: (k, k), the readings last.
-        log_det: ln det C of what was eliminated.
+        log_det: ln det C of the eliminated columns.
     """
 
     matrix: NDArray
     log_det: float = 0.0
 
     def eliminate(self, columns: NDArray, prior_std: NDArray | float) -> "Products":
-        """What is left when some unknowns are marginalised.
+        """Marginalise some of the unknowns.
 
         Args:
-            columns: their numbers.
-            prior_std: of each, about zero; inf is a flat prior, whose columns must be
-                independent, and adds nothing to ``log_det``.
+            columns: indices of their columns.
+            prior_std: prior standard deviations; inf is a flat prior, whose columns
+                must be independent and add nothing to ``log_det``.
 
         Returns:
-            Products with C^-1 between; those of the columns eliminated are zero.
+            Inner products with C^-1 as metric; zero for the eliminated columns.
         """
         own = np.asarray(columns)
         std = np.broadcast_to(np.asarray(prior_std, dtype=float), own.shape)
@@ -71,13 +71,13 @@ class Products:
         return Products(left, self.log_det + log_det)
 
     def log_evidence(self, count: int, freedom: float = math.inf) -> float:
-        """Ln p(z) of n readings, all unknowns eliminated."""
+        """Return ln p(z) of n readings after all unknowns are eliminated."""
         return log_evidence(float(self.matrix[-1, -1]), self.log_det, count, freedom)
 
     def posterior(
         self, columns: NDArray, prior_std: NDArray | float
     ) -> tuple[NDArray, NDArray]:
-        """Mean and covariance of unknowns, all that was eliminated beside them."""
+        """Return posterior mean and covariance of unknowns that are not eliminated."""
         own = np.asarray(columns)
         std = np.broadcast_to(np.asarray(prior_std, dtype=float), own.shape)
         precision = np.diag(std**-2.0)
@@ -88,7 +88,7 @@ class Products:
 def log_evidence(
     squares: float, log_det: float, count: int, freedom: float = math.inf
 ) -> float:
-    """Ln p(z) of n readings, from z' C^-1 z and ln det C; tau about 1."""
+    """Return ln p(z) of n readings from z' C^-1 z and ln det C."""
     if math.isinf(freedom):
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)
@@ -97,13 +97,13 @@ def log_evidence(
 
 
 def deviance(squares: NDArray | float, count: int, freedom: float) -> NDArray | float:
-    """-2 ln of the part of the density of z that depends on z' C^-1 z."""
+    """Return -2 ln p(z) without the terms that do not depend on z' C^-1 z."""
     return (freedom + count) * np.log1p(np.asarray(squares) / freedom)
 
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """What columns leave: the fast path for many candidates at once.
+    """A model with its unknowns marginalised, for scoring many candidates.
 
     Attributes:
         factor_columns: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
@@ -117,7 +117,7 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """What columns (n, k) of prior std (k,), and orthonormal flat ones, leave."""
+    """Marginalise columns (n, k) of prior std (k,); flat: (n, f), orthonormal."""
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -130,15 +130,15 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Readings of each block foretold by a fit to all others, sizes held.
+    """Predict each block of readings by a fit to all others, exactly.
 
     Args:
         marginal: of n readings.
-        blocks: (n,) whose each reading is.
-        tau: of the noise.
+        blocks: (n,) block of each reading.
+        tau: scale of the noise.
 
     Returns:
-        (n,) errors, and (number of blocks,) ln densities.
+        (n,) prediction errors and (blocks,) ln predictive densities.
     """
     errors, densities = np.empty_like(marginal.held), []
     for name in np.unique(blocks):
@@ -156,18 +156,18 @@ def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
     marginal: Marginal, freedom: float,
 ) -> NDArray:  # fmt: skip
-    """Log evidence ratios of blocks of columns, the size of each averaged over a grid.
+    """Return log evidence ratios of candidates, averaged over prior sizes.
 
     Args:
-        gram: (c, m, m) B'C^-1 B of c blocks, columns scaled to norm about 1.
+        gram: (c, m, m) B'C^-1 B of c candidates, columns scaled to norm about 1.
         along: (c, m) B'C^-1 z.
-        most: (c,) largest size that is plausible, in the same scale.
-        bounded: (c,) whether its one unknown cannot be negative.
+        most: (c,) largest plausible prior standard deviation, in that scale.
+        bounded: (c,) whether the single unknown cannot be negative.
         marginal: what is known.
-        freedom: of the noise's scale.
+        freedom: degrees of freedom of the noise scale's prior.
 
     Returns:
-        (c,) -inf where nothing plausible shows.
+        (c,) logarithms; -inf where no plausible size is visible.
     """
     count = len(marginal.held)
     if gram.shape[1] == 1:
@@ -198,12 +198,12 @@ def evidence_gains(
 
 
 def size_penalty(determined: float) -> float:
-    """What a size costs that was chosen best instead of averaged, by Laplace.
+    """Return the penalty of an optimised prior size (Laplace approximation).
 
     Args:
-        determined: number of well determined unknowns that share it.
+        determined: number of well determined unknowns that share the size.
 
     Returns:
-        Logarithm of the maximum over the average, of a range of :data:`SIZES`.
+        Logarithm of the ratio of maximum and average over the range of sizes.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)
