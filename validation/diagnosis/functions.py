@@ -1,8 +1,7 @@
-"""All functions that may act, scored together: places times forms of variables.
+"""Candidate functions, scored in batches: places times forms of variables.
 
-A column of a function is what a component does to the readings of a row times a number
-of that row, B_(rc)q = a_rc P_rq.  So its products take one pass over the readings for
-each component at a place, and one over the rows for each number:
+A column of a function is the response of a row's readings to a component, times a
+number of that row: B_(rc)q = a_rc P_rq.  Inner products therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
@@ -40,20 +39,20 @@ from validation.diagnosis.remainder import in_cells
 
 Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_WIDEST = 36  # columns of a function of several components
-_LISTED = 2000  # functions that are ordered
+_WIDEST = 36  # most columns of a function of several components
+_LISTED = 2000  # best functions that are sorted
 
 
 @dataclass(frozen=True)
 class ScoredFunction:
-    """A function that was scored.
+    """A scored function.
 
     Attributes:
-        score: log evidence ratio and log prior together.
-        where: number of its place.
+        score: log evidence ratio plus log prior.
+        where: index of its place.
         variables: one or two.
-        shape: the form.
-        log_prior: of it.
+        shape: form.
+        log_prior: ln of the prior probability.
     """
 
     score: float
@@ -65,7 +64,7 @@ class ScoredFunction:
 
 @dataclass(frozen=True, eq=False)
 class _Scored:
-    """Products of one form at c places, columns scaled to norm about one."""
+    """Inner products of one form at c places, columns scaled to norm about 1."""
 
     number: int
     shape: int
@@ -79,7 +78,7 @@ class _Scored:
 def _likeliest(
     parts: Mapping[int, Sequence[_Scored]], marginal: Marginal, freedom: float
 ) -> list[tuple[float, int, int, int]]:
-    """Worth, and which variables, form and place, of all that show; best first."""
+    """Return score, request, form and place of the functions, best first."""
     scores, whose = [], []
     for own in parts.values():
         gains = evidence_gains(
@@ -100,7 +99,7 @@ def _likeliest(
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """(c, m) root of the mean squared norm of columns, of turns and of shifts."""
+    """Return (c, m) rms norms of the columns, of rotations and of translations."""
     diagonal = np.einsum("skk->sk", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -110,13 +109,13 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 
 
 class Functions:
-    """Places, variables and forms of a campaign's functions."""
+    """Candidate functions of a campaign."""
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List them; what does the same to the readings counts once.
+        """List places and variables.
 
         Args:
-            campaign: of which commands, loads, covariates and sigma are read.
+            campaign: design; no measured value is used.
             sensitivities: of its rows.
         """
         self.campaign, self.sensitivities = campaign, sensitivities
@@ -128,7 +127,7 @@ class Functions:
         self._numbers = cache(self._columns)
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
-        """All forms of one variable or two, with ln of the prior at one place."""
+        """Return all forms of one or two variables with their log priors."""
         if len(variables) == 1:
             shapes = forms.every(self.conditions, variables[0], "compliance")
         else:
@@ -142,19 +141,19 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """Ln of the prior of a form of variables, at one place."""
+        """Return the log prior of a form at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Variables, and forms that show whether they count."""
+        """Return requests for general forms of every variable."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
             for name in self.variables
         ]
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Products of some variables with any others."""
+        """Return requests for products of given variables with all others."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -171,17 +170,17 @@ class Functions:
         self, marginal: Marginal, weighted: Weighted, freedom: float,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
-        """The best functions of some variables and forms beside what is known.
+        """Return the functions that improve a model most.
 
         Args:
-            marginal: what is known, and what is left, in the cells of ``weighted``.
-            weighted: places.
-            freedom: of the noise's scale.
+            marginal: model, in the cells of ``weighted``.
+            weighted: responses at all places.
+            freedom: degrees of freedom of the noise scale's prior.
             requests: variables with their forms.
-            most: functions of each variable or pair.
+            most: number of functions for each request.
 
         Returns:
-            Functions, best first.
+            Scored functions, best first.
         """
         if not len(self.places):
             return []
@@ -211,7 +210,7 @@ class Functions:
         self, number: int, weighted: Weighted, variables: Variables,
         shapes: Sequence[CandidateShape], through: NDArray, on: NDArray,
     ) -> Iterator[_Scored]:  # fmt: skip
-        """Products of all forms of variables at all places."""
+        """Compute inner products of all forms of a request at all places."""
         columns = [self._numbers(variables, s)[weighted.rows] for s in shapes]
         ends = np.cumsum([0, *(c.shape[1] for c in columns)])
         P = np.hstack(columns)
@@ -242,12 +241,12 @@ class Functions:
                 yield _Scored(number, k, where, left, b * scale, most, prior)
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """(R, q) columns of a form, falling as their prior does."""
+        """Return (R, q) columns of a form, scaled by their relative prior."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
     def candidate(self, found: ScoredFunction) -> Candidate:
-        """The function that was scored."""
+        """Return the candidate of a scored function."""
         return self._at(self.places.names[found.where], found.variables, found.shape)
 
     @staticmethod
@@ -258,7 +257,7 @@ class Functions:
         return Candidate((part,), place[0][2], shape)
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Parts of candidates at other places that do the same to the readings."""
+        """Return the parts of candidates at other places with equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -268,7 +267,7 @@ class Functions:
         return [self._at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """A candidate with its columns."""
+        """Return the element of a candidate; None if it is not visible."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
