@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.coupling import Coupling
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
@@ -50,6 +51,8 @@ class Joint:
         after: (4, 4) of the child, seen from the joint after its motion.
         position: [rad or m] coordinate at home.
         actuated: whether a drive holds it.
+        stiffness: [N m/rad or N/m] of a spring in its freedom, 0 without one.
+        rest: [rad or m] coordinate at which that spring carries nothing.
     """
 
     name: str
@@ -61,6 +64,8 @@ class Joint:
     after: NDArray = field(default_factory=lambda: HERE)
     position: float = 0.0
     actuated: bool = False
+    stiffness: float = 0.0
+    rest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +101,9 @@ class Mechanism:
         loops: pairs of places that meet.
         platform: name of a body, None where the file does not say.
         left_out: what the file says and a mechanism cannot hold, in words.
+        taken: what the file leaves open, and what was taken, in words.
+        couplings: joints that follow others, no leader after its follower.
+        unweighed: names of bodies whose mass is that of meshes, which are not read.
     """
 
     name: str
@@ -105,6 +113,9 @@ class Mechanism:
     loops: tuple[Loop, ...] = ()
     platform: str | None = None
     left_out: tuple[str, ...] = ()
+    taken: tuple[str, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    unweighed: tuple[str, ...] = ()
 
     @property
     def home(self) -> NDArray:

@@ -141,8 +141,8 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """What the file says of the diagnosis that made it; a covariance's path absolute."""
-    # a record for people and programs: its texts, numbers and lists are kept as they are
+    """What the file says of the diagnosis that made it, a path made absolute."""
+    # a record for people and programs: texts, numbers and lists are kept as they are
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")

@@ -129,11 +129,15 @@ def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
             "clearance": assembly.clearance_screws[i],
             "link": assembly.link_screws[i],
             "joint": assembly.joint_screws[i],
-            "wrench": assembly.wrenches[i],
+            "wrench": assembly.tip_wrenches[i],
             "joint_wrench": assembly.joint_wrenches[i],
         }
         for i, f in enumerate(robot.frames)
     }
+    if isinstance(assembly, Assembly):
+        for f, start in zip(robot.frames, assembly.start_wrenches, strict=True):
+            if np.isfinite(start).all():
+                frames[f.name]["start_wrench"] = start
     closures = [
         {"frames": list(pair), "wrench": assembly.closure_wrenches[k]}
         for k, pair in enumerate(robot.closures)
@@ -284,8 +288,8 @@ def _screw_bound_text(bound: dict[str, Any]) -> str:
     text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
     if max(loose) > 1e-9:
         text += (
-            "; at the same energy clearances leave open up to "
-            f"{loose[0]:.3g} mrad, {loose[1]:.3g} um"
+            "; at the same energy clearances move it from there by up to "
+            f"{loose[0]:.4g} mrad, {loose[1]:.4g} um"
         )
     return text
 

@@ -47,7 +47,7 @@ def predict(
     error of the prediction is printed.  Exit status 1 if a row has no answer; its cells
     are empty.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
     from validation.correction.prediction import foretell, reading_table
 
@@ -128,7 +128,7 @@ def compensate(
     wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
     row has no answer; its command is unchanged.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
     from validation.correction import compensation_table as tables
     from validation.correction.compensation import compensate as correct
@@ -199,8 +199,8 @@ def carry(
     declared robot's.  Exit status 1, and no robot written, where the set-up rows do not
     suffice or the saved robot is worse than the declared one.
     """
+    from assembly.exchange.robot_files import load_robot
     from assembly.files.robot_file import write_robot
-    from assembly.robots import load_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
     from validation.correction import carrying, carrying_table
     from validation.correction.session_unknowns import OF_A_SESSION
@@ -243,7 +243,7 @@ def explain(
 
     With their bands; one that remembers as its answer to a step of one unit.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.correction import curves
 
     if figure is not None:

@@ -27,7 +27,7 @@ RobotArgument = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="A robot file, or a built-in name.",
+        help="A robot file, a URDF, MJCF or SDF file, or a built-in name.",
         autocompletion=_built_in_names,
     ),
 ]
@@ -225,9 +225,9 @@ def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None
 ) -> Any:
     """The posture of the options, of the robot without the effects of its file."""
+    from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.posture import place_robot
     from assembly.model.largest import LARGEST_LENGTH
-    from assembly.robots import load_robot
 
     return place_robot(
         load_robot(robot),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.robot_file import read_robot
+from assembly.exchange.robot_files import read_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
 from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN

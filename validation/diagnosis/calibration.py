@@ -9,7 +9,8 @@ from scipy.stats import chi2
 
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
-from validation.diagnosis.select import Selected, select
+from validation.diagnosis.select import select
+from validation.diagnosis.selected import Selected
 from validation.diagnosis.verdict import Kept, verdict
 
 

@@ -16,7 +16,7 @@ A component of a candidate adds a times P T to the readings.
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from assembly.effects.forms import FORMS, roughness
 from assembly.effects.functions import AXES, basis
 from assembly.effects.places import beams, drives
 from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict
 from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
 from assembly.model.robot import BeamLink, Robot, beam_axis
@@ -35,6 +36,7 @@ from validation.diagnosis.responses import Responses
 TURN, SHIFT = AXES[:3], AXES[3:]
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
+_STEP = 1e-3  # of the largest load, for a derivative
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 
 
@@ -142,8 +144,22 @@ class Sensitivities:
         """(R, n, 6) [N m, N] through every joint as declared, in its axes."""
         return self._response.wrenches
 
+    @cached_property
+    def under_load(self) -> NDArray:
+        """(R, 6, 6) change of the reading per unit of a component of the load."""
+        change = np.zeros((len(self.conditions), 6, 6))
+        still = predict(self.conditions).deviation
+        size = max(float(np.abs(self.conditions.load).max()), 1.0)
+        for k in range(6):
+            load = self.conditions.load + _STEP * size * np.eye(6)[k]
+            more = predict(replace(self.conditions, load=load)).deviation
+            change[:, :, k] = np.nan_to_num((more - still) / (_STEP * size))
+        return change[self.rows]
+
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
+        if where == "load":
+            return self.under_load[:, :, LOADS.index(component)]
         axis = AXES.index(component)
         if where == "reading":
             return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
@@ -225,7 +241,12 @@ class Sensitivities:
         """(m,) component that each unknown of a candidate acts in."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
-        return np.repeat([AXES.index(c) for c in components], counts)
+        kinds = [0 if is_turn(c) else 3 for c in components]
+        numbers = [
+            AXES.index(c) if c in AXES else k
+            for c, k in zip(components, kinds, strict=True)
+        ]
+        return np.repeat(numbers, counts)
 
     def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:
         """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
@@ -277,6 +298,11 @@ class Sensitivities:
                     )
                 )
         return functions
+
+
+def is_turn(component: str) -> bool:
+    """Whether a component is a rotation, or a moment; otherwise a shift or a force."""
+    return component[0] in "rm"
 
 
 def variables_of(conditions: Conditions) -> list[str]:

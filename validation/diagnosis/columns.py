@@ -1,8 +1,9 @@
-"""Everything a search may use, of a campaign's design alone: no reading is looked at."""
+"""Everything a search may use, of a campaign's design alone: no reading is seen."""
 
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY, apply_effects
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_second_order
+from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
-from validation.diagnosis.holdout import blocks_of
+from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
@@ -29,8 +31,10 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.small_terms import small_terms
+from validation.diagnosis.together import together
 
 FUNCTION = "function"
+_CLOCK = 0.999  # correlation with time of what counts it
 _VISIBLE = 4.0  # squared whitened change of the readings
 
 
@@ -79,7 +83,7 @@ class Columns:
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
-        self.explicit = self.functions.explicit()
+        self.explicit = together(self.functions) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Hypotheses that show; of those that do the same, the first."""
@@ -105,6 +109,30 @@ class Columns:
         """Ln of the prior of one way in which an effect may act."""
         prior = effect_prior(len(ways), ways[effect])
         return prior + math.log(self.odds.get(effect, 1.0))
+
+    def without_clocks(self) -> "Columns":
+        """The same without functions of time and effects that time alone drives."""
+        other = copy(self)
+        timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
+        other.library = [e for e in self.library if e.name not in timed]
+        names = [n for n in self.functions.variables if not self._is_clock(n)]
+        other.functions = self.functions.of(names)
+        other.explicit = together(other.functions) if names else []
+        return other
+
+    @property
+    def has_clocks(self) -> bool:
+        """Whether rows follow one another and something counts the time."""
+        successive = blocks_of(self.campaign)[1] == SPANS
+        return successive and any(map(self._is_clock, self.functions.variables))
+
+    def _is_clock(self, name: str) -> bool:
+        """Whether a variable goes with time alone."""
+        time = self.conditions.time
+        if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
+            return name == "time"
+        x = variable(self.conditions, name)
+        return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
         """(N, c) columns of single unknowns of springs that have a name."""

@@ -24,9 +24,6 @@ from validation.diagnosis.setup_blunders import SetupBlunder
 from validation.diagnosis.structure import Trend
 from validation.diagnosis.trace import Traced
 
-_SURELY = 3.0  # standard deviations by which a scale of noise is surely above 1
-_MORE = 0.1  # and by how much, to be worth a word
-
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -120,12 +117,6 @@ class Diagnosis:
         """Whether the machine found predicts the held-out rows better than declared."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
-
-    @property
-    def more_scatter(self) -> bool:
-        """Whether readings scatter clearly more than stated."""
-        tau, std = self.noise_scale
-        return self.lack.sigma_too_small or tau > 1.0 + _SURELY * std + _MORE
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""

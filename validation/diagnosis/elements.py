@@ -102,12 +102,13 @@ def effect_element(
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
     begin = h.start if shapes is None else np.where(shape, shapes, h.start)
     shown = signature.columns.any(axis=0)
-    slots = np.flatnonzero(shown if shapes is not None else shown & ~shape)
+    used = shown if shapes is not None else shown & ~shape
+    slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
     # a shape may be wrong by about half of what it is
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
-    kinds = [_kind(robot, h, k) for k in slots]
+    kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
     # what is added at the start: nothing, but for effects that no unknown scales
@@ -229,3 +230,14 @@ class Dense:
 def effect_prior(effects: int, ways: int) -> float:
     """Ln of the prior of a way in which one of so many effects may act."""
     return -math.log(2.0) - math.log(max(effects, 1)) - math.log(max(ways, 1))
+
+
+def label(one: Candidate) -> str:
+    """A function in words."""
+    where = " and ".join(f"{p.where} {', '.join(p.components)}" for p in one.parts)
+    of = ", ".join(one.parts[0].variables)
+    given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)
+    kind = "" if one.kind == "screw" else "compliance of "
+    return (
+        f"{kind}{where}: {one.shape.form} ({', '.join(one.shape.names)}{given}) of {of}"
+    )

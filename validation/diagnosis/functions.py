@@ -18,15 +18,13 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
-from itertools import combinations
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.functions import AXES
-from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
 from validation.diagnosis import shapes as forms
 from validation.diagnosis.candidates import (
@@ -34,20 +32,15 @@ from validation.diagnosis.candidates import (
     CandidatePart,
     Sensitivities,
     in_cells,
-    places_of,
     variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.forms_tried import CandidateShape, is_angle
-from validation.diagnosis.gaussian import SIZES, Taken, averaged_gains
-from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
+from validation.diagnosis.gaussian import Taken, averaged_gains
+from validation.diagnosis.places import Places, Weighted, Where
 
-Where = tuple[str, str, str]  # place, component, kind
 Variables = tuple[str, ...]
 Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_PROBES = 3  # random directions by which equal places are known
-_DIGITS = 6
-_REMEMBERED = 8  # columns of forms whose products are kept
 _WIDEST = 36  # columns of a function of several components
 _LISTED = 2000  # functions that are ordered
 
@@ -72,39 +65,6 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighted:
-    """Places in some of the cells, weighted.
-
-    Attributes:
-        rows: those that have such a cell.
-        answers: (S, R, 6) zero in other cells.
-        squares: (S, R).
-        beside: (pairs, R) products of components of one combination.
-        cells: their rows and components.
-        known: products of columns of a form at all places, and of pairs of these.
-    """
-
-    rows: NDArray
-    answers: NDArray
-    squares: NDArray
-    beside: NDArray
-    cells: tuple[NDArray, NDArray]
-    known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
-
-    def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
-        """(S, m, m) B'B at all places and (pairs, m, m), of columns P (R, m)."""
-        if key in self.known:
-            return self.known[key]
-        m = columns.shape[1]
-        outer = (columns[:, :, None] * columns[:, None, :]).reshape(-1, m * m)
-        whole = (self.squares @ outer).reshape(-1, m, m)
-        cross = (self.beside @ outer).reshape(-1, m, m)
-        if m <= _REMEMBERED:
-            self.known[key] = whole, cross
-        return whole, cross
-
-
-@dataclass(frozen=True, eq=False)
 class _Scored:
     """Products of one form at c places, columns scaled to norm about one."""
 
@@ -124,7 +84,8 @@ def _likeliest(
     worths, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
     for own in parts.values():
         gains = averaged_gains(
-            np.concatenate([p.gram for p in own]), np.concatenate([p.along for p in own]),
+            np.concatenate([p.gram for p in own]),
+            np.concatenate([p.along for p in own]),
             np.concatenate([p.most for p in own]), False, taken, freedom,
         )  # fmt: skip
         sizes = [len(p.where) for p in own]
@@ -133,7 +94,10 @@ def _likeliest(
         whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
     worth, names = np.concatenate(worths), np.concatenate(whose)
     order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
-    return [(float(worth[i]), *map(int, names[i])) for i in order]
+    return [
+        (float(worth[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
+        for i in order
+    ]
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
@@ -161,106 +125,22 @@ class Functions:
         """
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
-        self._over_sigma = np.where(campaign.cells, 1 / campaign.sigma, 0.0)
         self.variables = variables_of(self.conditions) if some else []
-        self.plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
-        self._list_places()
-        self.shapes_of = lru_cache(maxsize=None)(self._shapes_of)
-        self.prior = lru_cache(maxsize=None)(self._prior)
+        self.places = Places(campaign, sensitivities)
+        self._keep()
 
-    def _list_places(self) -> None:
-        """Components at places, and combinations of some at one place."""
-        singles: list[Where] = []
-        combined: list[tuple[str, CandidatePart]] = []
-        self.together: list[tuple[str, tuple[CandidatePart, ...]]] = []
-        asked = self.variables[:1]
-        for kind, parts in places_of(self.campaign.robot, asked):
-            part = parts[0]
-            if len(parts) > 1:
-                self.together.append((kind, parts))
-            elif len(part.components) > 1:
-                combined.append((kind, part))
-            else:
-                singles.append((part.where, part.components[0], kind))
-        singles.sort(key=self._preference)
-        self.places: list[tuple[Where, ...]] = []
-        self.equal: list[list[tuple[Where, ...]]] = []
-        answers, known = [], {}
-        rng = np.random.default_rng(0)
-        probes = rng.normal(size=(_PROBES, *self._over_sigma.shape))
-        probes *= rng.normal(size=(_PROBES, 1, 1))
-        for where in singles:
-            a = self.sensitivities.sensitivity(*where) * self._over_sigma
-            size = float(np.linalg.norm(a))
-            if not np.isfinite(size) or size * self._most(where) < SIZES[0]:
-                continue
-            seen = np.einsum("prc,rc->p", probes, a) / size
-            key = tuple(np.round(seen * np.sign(seen[0]), _DIGITS))
-            if key in known:
-                self.equal[known[key]].append((where,))
-                continue
-            known[key] = len(self.places)
-            self.places.append((where,))
-            self.equal.append([])
-            answers.append(a)
-        rows = self._over_sigma.shape
-        self._answers = np.array(answers).reshape(len(answers), *rows)
-        number = {p[0]: i for i, p in enumerate(self.places)}
-        self.members: list[tuple[int, ...]] = [(i,) for i in range(len(self.places))]
-        for kind, part in combined:
-            own = [(part.where, c, kind) for c in part.components]
-            seen_ones = tuple(number[w] for w in own if w in number)
-            if len(seen_ones) > 1:
-                self.places.append(tuple(w for w in own if w in number))
-                self.equal.append([])
-                self.members.append(seen_ones)
-        self.most = np.array([min(self._most(w) for w in p) for p in self.places])
-        self._groups: list[tuple[NDArray, NDArray, NDArray]] = []
-        for size in sorted({len(m) for m in self.members}):
-            where = np.array([i for i, m in enumerate(self.members) if len(m) == size])
-            mem = np.array([self.members[i] for i in where])
-            turns = [[AXES.index(self.places[i][0][1]) < 3 for i in m] for m in mem]
-            self._groups.append((where, mem, np.array(turns)))
-        pairs = {pair for m in self.members for pair in combinations(m, 2)}
-        self._pairs = {pair: k for k, pair in enumerate(sorted(pairs))}
+    def _keep(self) -> None:
+        """Make each answer once."""
+        self.shapes_of = cache(self._shapes_of)
+        self.prior = cache(self._prior)
+        self._numbers = cache(self._columns)
 
-    def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Drives' own motions first, then other frames, then base and reading."""
-        name, component, kind = where
-        frames = {f.name: f for f in self.campaign.robot.frames}
-        frame = frames.get(name)
-        own = bool(frame and frame.actuated and AXES[frame.own_axis] == component)
-        return kind != "screw", not own, frame is None
-
-    def _most(self, where: Where) -> float:
-        """Plausible size of an unknown: displacement, or per wrench there."""
-        name, component, kind = where
-        axis = AXES.index(component)
-        most = self.plausible[axis // 3]
-        if kind == "screw":
-            return most
-        row = self.conditions.robot.index(name)
-        w = self.sensitivities.wrenches[:, row, axis]
-        size = float(np.sqrt(np.mean(w**2)))
-        return most / size if size > 0 else 0.0
-
-    def weighted(self, cells: NDArray, root: NDArray) -> Weighted:
-        """Places in some cells.
-
-        Args:
-            cells: (N,) mask over the measured cells.
-            root: (n,) of the weights of these.
-        """
-        row, component = (axis[cells] for axis in np.nonzero(self.campaign.cells))
-        rows, row = np.unique(row, return_inverse=True)
-        weight = np.zeros((len(rows), 6))
-        weight[row, component] = root
-        answers = self._answers[:, rows] * weight
-        squares = np.einsum("src,src->sr", answers, answers)
-        beside = np.zeros((len(self._pairs), len(rows)))
-        for (i, j), k in self._pairs.items():
-            beside[k] = np.einsum("rc,rc->r", answers[i], answers[j])
-        return Weighted(rows, answers, squares, beside, (row, component))
+    def of(self, variables: list[str]) -> "Functions":
+        """The same of some of the variables."""
+        other = copy(self)
+        other.variables = variables
+        other._keep()
+        return other
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
         """All forms of one variable or two, with ln of the prior at one place."""
@@ -269,7 +149,7 @@ class Functions:
         else:
             both = forms.of_two(self.conditions, *variables)
             shapes = [] if both is None else both[1]
-        count, places = len(self.variables), len(self.places) + len(self.together)
+        count, places = len(self.variables), len(self.places)
         prior = -math.log(2.0) - math.log(max(count, 1)) - math.log(max(places, 1))
         if len(variables) > 1:
             prior -= math.log(2.0 * max(count - 1, 1))
@@ -277,7 +157,7 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """ln of the prior of a form of variables, at one place."""
+        """Ln of the prior of a form of variables, at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
@@ -288,9 +168,7 @@ class Functions:
             for name in self.variables
         ]
 
-    def products(
-        self, names: Iterable[str]
-    ) -> list[Asked]:
+    def products(self, names: Iterable[str]) -> list[Asked]:
         """Products of some variables with any others."""
         asked: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -320,7 +198,7 @@ class Functions:
         Returns:
             Functions, best first.
         """
-        if not len(self.places) or not asked:
+        if not len(self.places):
             return []
         row, component = weighted.cells
         count = taken.across.shape[1]
@@ -360,42 +238,32 @@ class Functions:
             m = own.shape[1]
             whole, cross = weighted.products((variables, shapes[k]), own)
             prior = self.prior(variables, shapes[k])
-            for where, mem, turns in self._groups:
+            for where, mem, turns in self.places.sizes:
                 c, size = mem.shape
                 if size > 1 and size * m > _WIDEST:
                     continue
-                B = whole[mem[:, 0]] if size == 1 else self._joined(mem, whole, cross)
+                B = (
+                    whole[mem[:, 0]]
+                    if size == 1
+                    else self.places.joined(mem, whole, cross)
+                )
                 y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
                 b = along[mem, part].reshape(c, size * m)
                 norm = _by_kind(np.repeat(turns, m, axis=1), B)
                 scale = np.where(norm > 0, 1 / np.maximum(norm, 1e-300), 0.0)
                 left = B - y.transpose(0, 2, 1) @ y
                 left *= scale[:, :, None] * scale[:, None, :]
-                most = self.most[where] * norm.max(axis=1)
+                most = self.places.most[where] * norm.max(axis=1)
                 yield _Scored(number, k, where, left, b * scale, most, prior)
 
-    def _joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
-        """(c, s m, s m) products of combinations of s components."""
-        c, s = members.shape
-        m = whole.shape[1]
-        B = np.zeros((c, s, m, s, m))
-        for i in range(s):
-            B[:, i, :, i] = whole[members[:, i]]
-            for j in range(i + 1, s):
-                pair = [self._pairs[a, b] for a, b in members[:, [i, j]].tolist()]
-                B[:, i, :, j] = cross[pair]
-                B[:, j, :, i] = cross[pair].transpose(0, 2, 1)
-        return B.reshape(c, s * m, s * m)
-
-    @lru_cache(maxsize=None)  # noqa: B019  one campaign at a time
-    def _numbers(self, variables: Variables, shape: CandidateShape) -> NDArray:
+    def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """(R, q) columns of a form, falling as their prior does."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
     def candidate(self, found: Found) -> Candidate:
         """The function that was scored."""
-        return self._at(self.places[found.where], found.variables, found.shape)
+        return self._at(self.places.names[found.where], found.variables, found.shape)
 
     @staticmethod
     def _at(
@@ -410,7 +278,8 @@ class Functions:
             return []
         part = one.parts[0]
         own = tuple((part.where, c, one.kind) for c in part.components)
-        same = self.equal[self.places.index(own)] if own in self.places else []
+        names = self.places.names
+        same = self.places.equal[names.index(own)] if own in names else []
         return [self._at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
@@ -420,33 +289,5 @@ class Functions:
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
         fall = np.tile(forms.falling(one.shape, each), columns.shape[1] // each)
         wheres = [(p.where, c, one.kind) for p in one.parts for c in p.components]
-        most = min(self._most(w) for w in wheres)
+        most = min(self.places.plausible(w) for w in wheres)
         return function_element(one, columns, axes, fall, most, log_prior)
-
-    def explicit(self) -> list[Element]:
-        """Functions at several places at once, and cubic laws of a joint's wrench."""
-        listed: list[tuple[Candidate, float]] = []
-        count = max(len(self.variables), 1)
-        base = -math.log(2.0 * count)
-        for kind, parts in self._parts_together():
-            name = parts[0].variable
-            tried = forms.first(self.conditions, name)
-            if kind == "compliance":
-                tried += forms.uneven(self.conditions, name)
-            listed += [(Candidate(parts, kind, s), self.prior((name,), s)) for s in tried]
-        cubic = CandidateShape("powers", ("2",))
-        joints = [
-            w for p in self.places for w in p[:1] if len(p) == 1 and w[2] == "compliance"
-        ]
-        for name, component, kind in joints:
-            wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
-            one = CandidatePart(name, (component,), wrench)
-            prior = base - math.log(len(joints)) - math.log(2.0)
-            listed.append((Candidate((one,), kind, cubic), prior))
-        made = [self.element(one, prior) for one, prior in listed]
-        return [e for e in made if e is not None and e.most > SIZES[0]]
-
-    def _parts_together(self) -> list[tuple[str, tuple[CandidatePart, ...]]]:
-        """Beams together and drives together, of every variable."""
-        every = places_of(self.campaign.robot, self.variables)
-        return [(kind, parts) for kind, parts in every if len(parts) > 1]

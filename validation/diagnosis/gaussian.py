@@ -88,7 +88,7 @@ class Products:
 def log_evidence(
     squares: float, log_det: float, count: int, freedom: float = math.inf
 ) -> float:
-    """Ln p(z), of n readings with z' C^-1 z and ln det C; tau about 1 by ``freedom``."""
+    """Ln p(z) of n readings, from z' C^-1 z and ln det C; tau about 1."""
     if math.isinf(freedom):
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)
@@ -117,7 +117,7 @@ class Taken:
 
 
 def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken:
-    """What is left beside columns (n, k) with prior std (k,) and orthonormal flat ones."""
+    """What columns (n, k) of prior std (k,), and orthonormal flat ones, leave."""
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
@@ -127,15 +127,18 @@ def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken
     return Taken(np.hstack([flat, U]), held, float(z @ held))
 
 
-def leave_block_out(taken: Taken, blocks: NDArray) -> tuple[NDArray, NDArray]:
+def leave_block_out(
+    taken: Taken, blocks: NDArray, tau: float = 1.0
+) -> tuple[NDArray, NDArray]:
     """Readings of each block foretold by a fit to all others, sizes held.
 
     Args:
         taken: of n readings.
         blocks: (n,) whose each reading is.
+        tau: of the noise.
 
     Returns:
-        (n,) errors, and (number of blocks,) ln densities with tau = 1.
+        (n,) errors, and (number of blocks,) ln densities.
     """
     errors, densities = np.empty_like(taken.held), []
     for name in np.unique(blocks):
@@ -143,8 +146,9 @@ def leave_block_out(taken: Taken, blocks: NDArray) -> tuple[NDArray, NDArray]:
         U = taken.across[own]
         left = np.eye(len(own)) - U @ U.T
         errors[own] = np.linalg.solve(left, taken.held[own])
-        size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi)
-        densities.append(0.5 * (size - float(errors[own] @ taken.held[own])))
+        size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi * tau**2)
+        square = float(errors[own] @ taken.held[own]) / tau**2
+        densities.append(0.5 * (size - square))
     return errors, np.array(densities)
 
 
@@ -198,5 +202,8 @@ def size_cost(determined: float) -> float:
 
     Args:
         determined: number of well determined unknowns that share it.
+
+    Returns:
+        Logarithm of the maximum over the average, of a range of :data:`SIZES`.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

@@ -85,18 +85,6 @@ def calibration_text(tally: Calibration) -> str:
     )
 
 
-def noise_text(diagnosis: Diagnosis) -> str:
-    """That readings scatter more than stated, and what that may be."""
-    tau, std = diagnosis.noise_scale
-    text = f"readings scatter {tau:.2f} +- {std:.2f} times the sigma stated"
-    if diagnosis.lack.sigma_too_small:
-        text += (
-            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is "
-            "too small, or there is memory, a change in time, or something not recorded"
-        )
-    return text
-
-
 def open_text(open_: NDArray) -> str:
     """In which rows clearances leave the pose undetermined, and what is then predicted.
 

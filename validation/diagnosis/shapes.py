@@ -15,7 +15,10 @@ from assembly.measurement.variables import variable
 from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle
 
 _DEPTHS = 0.03, 0.1, 0.3, 1.0  # of a variable's range: what slips after it
+_ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 _HIGH = 12  # waves a turn that are looked for one by one
+_CLOCKS = "time", "cov.time"
+_JUMPS, _MANY_JUMPS = 10, 91  # levels of time at which something may jump
 _ANGLE = ("0.cosine", "1.sine", "1.cosine")
 
 
@@ -33,7 +36,8 @@ def first(conditions: Conditions, name: str) -> list[CandidateShape]:
     if is_angle(conditions.robot, name):
         waves = [_waves(k) for k in range(1, _HIGH + 1)]
         return [_waves(1, 2, 3, 4), powers, *waves, *_reversals(conditions, name)]
-    return [powers, *straight, *_reversals(conditions, name)]
+    steps = _steps(conditions, name, _JUMPS) if name in _CLOCKS else []
+    return [powers, *straight, *steps, *_reversals(conditions, name)]
 
 
 def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
@@ -41,18 +45,30 @@ def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
     shapes = list(all_shapes(conditions, name, kind))
     if is_angle(conditions.robot, name):
         shapes += [_waves(k) for k in range(9, _HIGH + 1)]
-    more = [*first(conditions, name), *_reversals(conditions, name)]
+    if name in _CLOCKS:
+        shapes = [s for s in shapes if s.form != "step"]
+        shapes += _steps(conditions, name, _MANY_JUMPS)
+    more = [*first(conditions, name), *_reversals(conditions, name, _ALL_DEPTHS)]
     return list(dict.fromkeys([*shapes, *more]))
 
 
-def _reversals(conditions: Conditions, name: str) -> list[CandidateShape]:
+def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
+    """A jump at so many levels, as many rows between two as between others."""
+    x = variable(conditions, name)
+    levels = np.unique(np.quantile(x, np.linspace(0.05, 0.95, count)))
+    return [CandidateShape("step", ("size",), (("at", float(v)),)) for v in levels]
+
+
+def _reversals(
+    conditions: Conditions, name: str, depths: Sequence[float] = _DEPTHS
+) -> list[CandidateShape]:
     """Forms that remember from where a variable came."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
     plays = [
         CandidateShape("play", ("size",), (("depth", depth * size),))
-        for depth in _DEPTHS
+        for depth in depths
     ]
     return [CandidateShape("reversal", ("0",)), *plays]
 

@@ -14,7 +14,12 @@ from scipy.special import log_ndtr
 
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
-from validation.diagnosis.gaussian import Taken, likeness, take_out
+from validation.diagnosis.gaussian import (
+    Taken,
+    leave_block_out,
+    likeness,
+    take_out,
+)
 from validation.diagnosis.noise import FREEDOM, scale
 from validation.diagnosis.prior_sizes import Sizes, best_sizes
 
@@ -75,6 +80,13 @@ class State:
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
         return X @ self.sizes.mean + (f.z - f.readings(self.elements))
 
+    @cached_property
+    def left(self) -> NDArray:
+        """(n,) residual, unweighted."""
+        f = self.fit
+        X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
+        return (f.readings(self.elements) - X @ self.sizes.mean) / f.root
+
     def own(self, k: int) -> slice:
         """Unknowns of the k-th element among all."""
         counts = [e.columns.shape[1] for e in self.elements]
@@ -85,9 +97,25 @@ class State:
         """(n,) squared residuals of the cells unweighted, with what is not known."""
         f = self.fit
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
-        left = f.readings(self.elements) - X @ self.sizes.mean
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
-        return (left**2 + spread * self.tau**2) / f.weights
+        return self.left**2 + spread * self.tau**2 / f.weights
+
+
+def foretold(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
+    """How much better a model foretells blocks of rows that it was not fitted to.
+
+    Args:
+        one: that model.
+        other: of the same readings.
+        blocks: (n,) whose each reading is.
+
+    Returns:
+        Sum of differences of ln densities at the first one's tau, sizes held, and its
+        standard error from block to block.
+    """
+    densities = [leave_block_out(s.taken, blocks, one.tau)[1] for s in (one, other)]
+    gains = densities[0] - densities[1]
+    return float(gains.sum()), float(gains.std(ddof=1) * np.sqrt(len(gains)))
 
 
 class Fitting:
@@ -166,6 +194,9 @@ class Fitting:
             elements: of it.
             mode: whether geometry and springs are in use.
             start: from whose sizes to go on.
+
+        Returns:
+            The model, found once.
         """
         key = frozenset(elements), mode
         if key not in self._states:
@@ -212,7 +243,8 @@ class Fitting:
                 [beside.T, inner],
             ])
             sizes = best_sizes(
-                gram, np.append(small_z[used], with_z), float(z @ z), self.count, FREEDOM,
+                gram, np.append(small_z[used], with_z), float(z @ z),
+                self.count, FREEDOM,
                 np.append(small.group[used], _GROUPS + element),
                 np.append(small.given[used], given), np.append(small.most[used], most),
                 begin,

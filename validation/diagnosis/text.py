@@ -11,7 +11,6 @@ from validation.diagnosis.saving import not_measured
 from validation.diagnosis.sentence import (
     WORDS,
     calibration_text,
-    noise_text,
     open_text,
     sentence,
 )
@@ -35,8 +34,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     missing = not_measured(diagnosis.campaign)
     if missing:
         lines += ["", f"not measured: {', '.join(missing)}"]
-    if diagnosis.more_scatter:
-        lines += ["", noise_text(diagnosis)]
+    lines += diagnosis.traced.selected.noise.findings
     if diagnosis.noise_in_time is not None:
         noise = diagnosis.noise_in_time
         lines += [

@@ -35,14 +35,17 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import weights_of
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
-from validation.diagnosis.select import Selected, select
+from validation.diagnosis.select import select
+from validation.diagnosis.selected import Selected
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.states import foretold
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _TURNS = 3  # of the search, with what finite geometric errors add
+_CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
 
 
@@ -85,7 +88,7 @@ class Traced:
             own = slice(at, at := at + len(h.slots))
             if unknown and k == 0:
                 effects += self._device_frames(h)
-            else:
+            elif h.effect != FINITE or self._alone:
                 effects.append(Acting(h, found.values[own]))
         small = []
         for name, springs in ((GEOMETRY, False), (SPRINGS, True)):
@@ -100,6 +103,13 @@ class Traced:
             self.campaign.robot, tuple(effects), tuple(small), tuple(functions),
             self.columns.sensitivities if functions else None,
         )  # fmt: skip
+
+    @property
+    def _alone(self) -> bool:
+        """Whether the best model has one element: finite motions then are a claim."""
+        found = self.selected
+        device = self.campaign.registration == "unknown"
+        return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self, most: int = 3) -> list[Unknowns]:
         """Machines of other effects than the best model's, likeliest first."""
@@ -168,7 +178,7 @@ def trace(
         read = predict(conditions).deviation
         z = whiten(campaign, campaign.measured - read)
         cells &= np.isfinite(z)
-        selected = select(columns, z[cells], cells, update)
+        selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
             campaign, declared, conditions, fitted, cells, selected, columns, finite
         )
@@ -180,6 +190,19 @@ def trace(
             break
         conditions = bent
     return traced, fit
+
+
+def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
+    """The search; where rows follow one another, time itself explains the least."""
+    # it varies with whatever changed meanwhile, and says nothing of another day: it is
+    # believed only where it predicts other spans of time clearly better
+    whole = select(columns, z, cells, update)
+    if not columns.has_clocks:
+        return whole
+    timeless = select(columns.without_clocks(), z, cells, update)
+    blocks = columns.block[cells]
+    gain, error = foretold(whole.states[0], timeless.states[0], blocks)
+    return whole if gain > _CLEARLY * error else timeless
 
 
 def _traced(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from validation.diagnosis.columns import FUNCTION
-from validation.diagnosis.select import Selected
+from validation.diagnosis.selected import Selected
 
 NOT_ENOUGH = "not_enough_rows"
 CLAIM = 0.9  # probability from which an effect is claimed

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.robot_files import load_robot
 from assembly.model.robot import Robot
-from assembly.robots import BUILT_IN, load_robot
+from assembly.robots import BUILT_IN
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
 from validation.exchange.clock import DATES

@@ -133,7 +133,9 @@ def test_a_bounded_unknown_gains_the_ratio_of_half_normals():
     taken = take_out(np.zeros((n, 0)), np.zeros(0), z, np.zeros((n, 0)))
     huge = 1e9  # degrees of freedom: the scale is known
     most = np.array([SIZES[0]])
-    found = averaged_gains(np.ones((1, 1, 1)), np.full((1, 1), b), most, True, taken, huge)
+    found = averaged_gains(
+        np.ones((1, 1, 1)), np.full((1, 1), b), most, True, taken, huge
+    )
     x = np.linspace(0, 12 * SIZES[0], 200001)
     prior = 2 / SIZES[0] / np.sqrt(2 * np.pi) * np.exp(-(x**2) / 2 / SIZES[0] ** 2)
     ratio = np.trapezoid(prior * np.exp(b * x - x**2 / 2), x)
@@ -144,5 +146,7 @@ def test_what_cannot_plausibly_show_is_worth_nothing(draw):
     X, std, z = draw
     taken = take_out(X, std, z, np.zeros((40, 0)))
     least = np.array([0.5 * SIZES[0]])
-    found = averaged_gains(np.ones((1, 1, 1)), np.ones((1, 1)), least, False, taken, 20.0)
+    found = averaged_gains(
+        np.ones((1, 1, 1)), np.ones((1, 1)), least, False, taken, 20.0
+    )
     assert found[0] == -np.inf

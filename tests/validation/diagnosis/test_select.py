@@ -10,7 +10,8 @@ from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense
 from validation.diagnosis.noise import FREEDOM
-from validation.diagnosis.select import Search, select
+from validation.diagnosis.search import Search
+from validation.diagnosis.select import select
 from validation.diagnosis.signatures import conditions_of
 
 ROWS = 40
@@ -100,7 +101,9 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     search = Search(columns, z, np.ones(len(z), dtype=bool), np.ones(len(z)))
     search.prepare()
     looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
-    made = [columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked]
+    made = [
+        columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
+    ]
     dense = Dense(made, search.fit.cells, search.fit.root)
     alone = dense.gains(search.empty[-1].taken, FREEDOM)
     together = np.array([f.worth - f.log_prior for f in looked])
@@ -114,7 +117,15 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
     campaign = replace(campaign, measured=measured)
     known = Columns(campaign, with_second_order(conditions_of(campaign)))
-    assert (("drive", "rz", "screw"),) not in known.functions.places
-    assert (("tip", "tx", "screw"),) in known.functions.places + [
-        p for equal in known.functions.equal for p in equal
+    assert (("drive", "rz", "screw"),) not in known.functions.places.names
+    assert (("tip", "tx", "screw"),) in known.functions.places.names + [
+        p for equal in known.functions.places.equal for p in equal
     ]
+
+
+@pytest.mark.parametrize("size", [6.0, 25.0])
+def test_one_row_alone_teaches_no_function(columns, size):
+    readings = np.zeros((ROWS, 6))
+    readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
+    selected = found(columns, readings)
+    assert selected.functions == ()
