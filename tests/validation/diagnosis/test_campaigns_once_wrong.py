@@ -1,0 +1,109 @@
+"""Campaigns on which a diagnosis once failed, by what is known of their machines."""
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from assembly.files.robot_file import read_robot
+from examples.campaign_folder import DATA
+from validation.campaign.campaign_file import read_campaign, read_commands
+from validation.correction.prediction import foretell
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import table
+from validation.diagnosis.saving import save
+
+CASES = DATA.parent / "cases" / "campaigns"
+PRACTICE = DATA / "practice"
+NAMES = (
+    "ax_cum", "crash_singular", "crash_sizes", "declared_effect", "fb_gear", "fb_wear",
+    "few_8", "hx_play", "hyst", "points_in_one_go", "zonly",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    """By folder, each once."""
+
+    @cache
+    def find(folder):
+        if not folder.is_dir():
+            pytest.skip(f"{folder} is not there")
+        return diagnose(read_campaign(folder))
+
+    return find
+
+
+def effect(found, name):
+    """Parameters of an effect: value and standard deviation by name."""
+    (one,) = [e for e in table(found)["effects"] if e["name"] == name]
+    return {p["name"]: p for p in one["parameters"]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_saved_robot_is_the_one_that_is_printed_and_never_a_worse_one(
+    name, diagnosed, tmp_path
+):
+    """Without a traceback; by the file and the command that reads it."""
+    found = diagnosed(CASES / name)
+    if not found.better:
+        assert found.verdict != "explained"
+        return
+    save(found, tmp_path / "robot.toml")
+    data = read_commands(CASES / name, read_robot(tmp_path / "robot.toml"))
+    told = foretell(replace(data, registration="known").take(~found.outliers))
+    assert told.error[2] == pytest.approx(found.saved.normalised, rel=1e-4)
+    assert found.after.normalised < found.before.normalised
+    assert found.sequence[-1].error.normalised == found.after.normalised
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [
+    "p02_self_weight", "p04_drive_compliance_encoder_offset", "p05_outside",
+])  # fmt: skip
+def test_robots_of_another_program_s_campaigns_are_saved_as_printed(
+    name, diagnosed, tmp_path
+):
+    found = diagnosed(PRACTICE / name)
+    save(found, tmp_path / "robot.toml")
+    data = read_commands(PRACTICE / name, read_robot(tmp_path / "robot.toml"))
+    told = foretell(replace(data, registration="known").take(~found.outliers))
+    assert told.error[2] == pytest.approx(found.saved.normalised, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_expansion_of_a_printer_is_what_it_is(diagnosed, tmp_path):
+    """23.4e-6 per kelvin declared, 12e-6 true."""
+    found = diagnosed(CASES / "declared_effect")
+    assert (found.verdict, found.claimed) == ("explained", ("thermal_expansion",))
+    one = effect(found, "thermal_expansion")["frame"]
+    assert abs(one["value"] - 12e-6) < 4 * one["std"] < 1e-6
+    assert one["found"]["declared"] == 23.4e-6
+    save(found, tmp_path / "robot.toml")
+    saved = read_robot(tmp_path / "robot.toml").effects["thermal_expansion"]
+    assert saved["frame"] == pytest.approx(one["value"])
+
+
+@pytest.mark.slow
+def test_a_clearance_in_a_leg_is_a_clearance(diagnosed):
+    found = diagnosed(CASES / "hx_play")
+    assert (found.verdict, found.claimed) == ("explained", ("joint_clearance",))
+    springs = table(found)["springs"] or {"parameters": []}
+    assert all(p["value"] >= 0.0 for p in springs["parameters"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
+def test_what_the_library_lacks_is_no_effect_of_it(name, diagnosed):
+    """A rod that grows with time; waves of a gear.  Down to the noise."""
+    found = diagnosed(CASES / name)
+    assert (found.verdict, found.claimed) == ("learned", ())
+    assert found.after.normalised < 1.2
+
+
+@pytest.mark.slow
+def test_scatter_of_repeats_is_no_cause(diagnosed):
+    """Errors are in the sigma stated; what memory does is no drift."""
+    found = diagnosed(CASES / "hyst")
+    assert not set(found.claimed) & {"drift", "encoder_eccentricity"}
