@@ -50,11 +50,12 @@ from assembly.exact.descent import (
 from assembly.exact.equilibrium import imbalance, least_curvature
 from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
 from assembly.exact.placement import Placement, place
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.pieces import CutRobot, cut_beams
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import inverse, logarithm
 from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
+from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (

@@ -21,7 +21,9 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.kinematics.modes import follow_in_mode
 from assembly.kinematics.nominal import NOT_CLOSED, Target, follow
+from assembly.kinematics.singular_posture import is_singular
 from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
@@ -198,6 +200,13 @@ def home_posture(robot: Robot) -> Posture:
     return _posture(robot, track, 0)
 
 
+@lru_cache(maxsize=64)
+def home_is_singular(robot: Robot) -> bool:
+    """Whether operation modes meet at home; see :func:`is_singular`."""
+    home = home_posture(robot)
+    return is_singular(robot, home.coordinates, home.transforms)
+
+
 def place_robot(
     robot: Robot,
     pose: Mapping[str, float] | None = None,
@@ -206,7 +215,9 @@ def place_robot(
     """The posture of a nominal platform pose, or of actuated coordinates.
 
     The closures are followed from the home pose along a straight line, so the assembly
-    mode is the home pose's.  What the input leaves undetermined stays near home.
+    mode is the home pose's.  What the input leaves undetermined stays near home.  At a
+    singular home pose operation modes meet: there the platform keeps what is not given
+    as it is at home, if it can, its rotation first.
 
     Args:
         robot: any.
@@ -222,7 +233,6 @@ def place_robot(
         BadInput: both or an unknown name given, a value not finite, or out of reach;
             the message gives the distance that is missing.
     """
-    home = home_posture(robot)
     if pose and joints:
         raise BadInput("found both a pose and joints, expected one of them")
     if joints:
@@ -230,8 +240,8 @@ def place_robot(
     elif pose:
         target = pose_target(pose)
     else:
-        return home
-    track = follow(robot, home.coordinates, target)
+        return home_posture(robot)
+    track = _follow(robot, target)
     if not track.reached[0]:
         raise BadInput(f"{robot.name}: {unreached(robot, track, target, 0)}")
     return _posture(robot, track, 0)
@@ -311,7 +321,7 @@ def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
     """For each target its posture, or None and the reason."""
-    track = follow(robot, home_posture(robot).coordinates, target)
+    track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
         for i, reached in enumerate(track.reached)
@@ -321,6 +331,14 @@ def _follow_many(
         for i, reached in enumerate(track.reached)
     ]
     return postures, reasons
+
+
+def _follow(robot: Robot, target: Target) -> Track:
+    """Targets followed from home, in a mode where modes meet there."""
+    home = home_posture(robot)
+    pose = pose_components(home.platform)
+    singular = home_is_singular(robot)
+    return follow_in_mode(robot, home.coordinates, pose, target, singular)
 
 
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
@@ -335,6 +353,9 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     reached = pose_components(track.transforms[i, robot.index(robot.platform)])
     given = [k for k in range(6) if np.isfinite(goal[k])]
     asked = ", ".join(f"{POSE[k]}={goal[k]:.6g}" for k in given)
+    why = NOT_CLOSED
+    if len(given) < len(POSE) and home_is_singular(robot):
+        why += "; home is a singular posture: name all six components of the pose"
     gap = np.array([
         goal[k] - reached[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
     ])
@@ -349,7 +370,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     stop = ", ".join(f"{POSE[k]}={reached[k]:.6g}" for k in given)
     return (
         f"pose {asked} cannot be reached: on the straight line from home the platform "
-        f"stops at {stop}, {' and '.join(parts)} short; {NOT_CLOSED}"
+        f"stops at {stop}, {' and '.join(parts)} short; {why}"
     )
 
 

@@ -22,8 +22,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import Linearisation, VirtualJoints, closure_signs
+from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads, loads_on_frames, weights
 from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.verdict import posture_remarks
 from assembly.linear.assemblies import failure_status
 from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
@@ -17,6 +18,7 @@ from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
+from assembly.report.first_order import first_order_status, linearisation_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded, screw_text
@@ -62,8 +64,10 @@ def solution_of(
 
     Returns:
         The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
-        with the solution and the gap of its certificate as ``reason``; or the kind of
-        failure, and the solution is then null.
+        with the solution and the gap of its certificate as ``reason``; or
+        ``"singular"``, with the solution at first order, which decides nothing there,
+        and that of finite motions in ``reason``; or the kind of failure, and the
+        solution is then null.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -74,7 +78,7 @@ def solution_of(
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
-        "remarks": list(robot.remarks),
+        "remarks": [*robot.remarks, *posture_remarks(posture)],
         "load": np.zeros(6) if load is None else np.asarray(load),
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
@@ -87,10 +91,15 @@ def solution_of(
             results["zone"].get("reason"),
             unproved(assembly) or "; ".join(unproved_screw(assembly, bound)),
         ))  # fmt: skip
+        linearisation, finite = linearisation_of(assembly, gravity)
+        forced = robot.errors.any() or results["load"].any() or gravity is not None
         return (
             results
-            | _assembly_results(assembly, bound, gravity)
+            | _assembly_results(assembly, bound)
+            | {"linearisation_error": linearisation}
             | proof_status("; ".join(unproved_parts))
+            # a robot without errors or loads stands there all the same
+            | (first_order_status(assembly, linearisation, finite) if forced else {})
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
@@ -102,9 +111,7 @@ def proof_status(reason: str) -> dict[str, str]:
     return {"status": "not proved", "reason": reason} if reason else {}
 
 
-def _assembly_results(
-    assembly: Assembly, bound: ScrewBound, gravity: ArrayLike | None
-) -> dict[str, Any]:
+def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
     """Results of a solved assembly."""
     certificate = {
         "closure_residual": assembly.closure_residual(),
@@ -117,7 +124,6 @@ def _assembly_results(
         **_screws_and_wrenches(assembly),
         "certificate": certificate,
         "ranks": assembly.ranks,
-        "linearisation_error": _linearisation_error(assembly, gravity),
     }
 
 
@@ -145,17 +151,6 @@ def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
         "frames": frames,
         "closures": closures,
     }
-
-
-def _linearisation_error(
-    assembly: Assembly, gravity: ArrayLike | None
-) -> dict[str, Any]:
-    """Linear minus exact solution, or why it is unknown."""
-    try:
-        exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
-    except SolverFailed as error:
-        return {"status": str(error)}
-    return {"status": "ok", **vars(exact.linearisation_error)}
 
 
 def exact_of(
@@ -208,7 +203,7 @@ def exact_text(results: dict[str, Any]) -> str:
     """An exact solution for people: a few lines."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
+        lines.append(status_line(results))
     if "certificate" not in results:
         return "\n".join(lines)
     certificate = results["certificate"]
@@ -251,7 +246,7 @@ def solution_text(results: dict[str, Any]) -> str:
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
+        lines.append(status_line(results))
     if results["energy"] is None:
         return "\n".join(lines)
     certificate = results["certificate"]
@@ -267,6 +262,12 @@ def solution_text(results: dict[str, Any]) -> str:
         *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
+
+
+def status_line(results: dict[str, Any]) -> str:
+    """Status and reason of a result that is not in order."""
+    status, reason = results["status"], results["reason"]
+    return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def remark_lines(remarks: Sequence[str]) -> list[str]:

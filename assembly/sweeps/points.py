@@ -15,7 +15,6 @@ from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
-from assembly.linear.singularity import KINDS, find_singularities
 from assembly.linear.zone import MARGIN_READINGS, zone_margins
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
@@ -29,6 +28,7 @@ from assembly.sweeps.point_conditions import (
     point_conditions,
     wrenches_of,
 )
+from assembly.sweeps.point_kinematics import note_geometry
 from assembly.sweeps.point_stiffness import (
     classical_stiffnesses,
     tangent_stiffnesses,
@@ -126,13 +126,20 @@ def _solve_variant(
     except BadInput as error:
         _fail(solved, range(first, first + count), "invalid robot", str(error))
         return
+    rows = [range(first + run.start, first + run.stop) for run in runs]
+    reached = [i for i, posture in enumerate(postures) if posture is not None]
+    said = note_geometry(
+        question, robot, goals[reached], [p for p in postures if p is not None],
+        [rows[i] for i in reached], solved.records, solved.texts["near_singularity"],
+    )  # fmt: skip
+    status_of = dict(zip(reached, said, strict=True))
     reachable = []
-    for run, posture, reason in zip(runs, postures, reasons, strict=True):
-        rows = range(first + run.start, first + run.stop)
-        if posture is None:
-            _fail(solved, rows, "out of reach", reason)
+    for i, posture in enumerate(postures):
+        status, reason = status_of.get(i, ("out of reach", reasons[i]))
+        if posture is None or status:
+            _fail(solved, rows[i], status, reason)
         else:
-            reachable += [(row, posture) for row in rows]
+            reachable += [(row, posture) for row in rows[i]]
     if not reachable:
         return
     rows_reached = np.array([row for row, _ in reachable])
@@ -191,8 +198,6 @@ def _solve_reached(
 ) -> None:  # fmt: skip
     """Solve points whose posture exists; most failures become a status here."""
     out = solved.records
-    T = np.array([posture.transforms for posture in postures])
-    _note_singularities(question, robot, T, solved, rows)
     conditions = point_conditions(question, robot, postures, errors)
     T, mismatch = conditions.transforms, conditions.mismatch
     if robot.has_effects:
@@ -270,25 +275,6 @@ def _record_wrenches(
         out["stress"][rows] = stress
         with np.errstate(divide="ignore"):
             out["safety"][rows] = question.strength / stress.max(axis=1)
-
-
-def _note_singularities(
-    question: Question, robot: Robot, T: NDArray, solved: SolvedPoints, rows: NDArray
-) -> None:
-    """Distances to singularities, and the names of those that are near."""
-    # all draws of a posture share its singularities
-    runs = list(_runs(T.reshape(len(T), -1)))
-    near = find_singularities(robot, T[[run.start for run in runs]])
-    names = near.names(robot, question.near)
-    distances = np.stack([getattr(near, kind) for kind in KINDS], axis=1)
-    condition = near.condition
-    for i, run in enumerate(runs):
-        solved.records["singular_distance"][rows[run]] = distances[i]
-        solved.records["condition"][rows[run]] = condition[i]
-        if names[i]:
-            solved.texts["near_singularity"].update(
-                dict.fromkeys(rows[run].tolist(), names[i])
-            )
 
 
 def _record_stiffness(

@@ -304,5 +304,7 @@ def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
         if name not in {"ok", "out of reach"} and "reason" in data.data_vars:
             first = int(np.flatnonzero(status == name)[0])
             reasons = data.data_vars["reason"]
-            lines.append(f"{name}, for one: {reasons.values.ravel()[first]}")
+            reason = str(reasons.values.ravel()[first])
+            own = reason if reason.startswith(name) else f"{name}, for one: {reason}"
+            lines.append(own)
     return "\n".join(lines)

@@ -108,6 +108,7 @@ def sweep(
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.netcdf import stored_dataset
+    from assembly.sweeps.quantities import UNUSABLE
     from assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,
@@ -165,6 +166,8 @@ def sweep(
     held.close()
     if json != "-":
         print(summary_text(summary, data))
+    if set(summary["status"]) <= UNUSABLE:
+        raise typer.Exit(1)
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
