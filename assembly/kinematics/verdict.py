@@ -24,7 +24,7 @@ _ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be passed
 
 
 def verdicts(
-    robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray
+    robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray | None = None
 ) -> list[tuple[str, str]]:
     """Status and reason of postures that were reached.
 
@@ -33,13 +33,14 @@ def verdicts(
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates where they were reached.
         T: (k, n, 4, 4) frames there.
-        near: (k,) bool, which of them may be singular.
+        near: (k,) bool, which of them may be singular; all if absent.
 
     Returns:
         For each :data:`BEYOND_LIMITS`, :data:`SINGULAR` or :data:`BEYOND_SINGULARITY`
         and why; both empty where nothing is to be said.
     """
     limits = [limits_passed(robot, coordinates) for coordinates in q]
+    near = np.ones(len(q), dtype=bool) if near is None else near
     singular = _singular(robot, q, T, near)
     far = beyond_singularity(robot, target, T)
     texts = []

@@ -8,7 +8,12 @@ from numpy.typing import ArrayLike
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.singular_posture import is_singular
-from assembly.kinematics.verdict import SINGULAR, SINGULAR_WORDS
+from assembly.kinematics.verdict import (
+    BEYOND_LIMITS,
+    SINGULAR,
+    SINGULAR_WORDS,
+    limits_passed,
+)
 from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.reduction import FreeMotion
@@ -16,7 +21,7 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import rounded, screw_text
 
 # of the energy: where finite motions change more of it, its first order says nothing
-_MOST = 0.5
+MOST_ENERGY = 0.5
 _LARGE = (
     0.3  # [rad or lengths] motion that is not small; linear closures err by a tenth
 )
@@ -51,16 +56,31 @@ def first_order_status(
     moved = float(np.abs(assembly.clearance_screws / scale).max(initial=0.0))
     if _singular(assembly.posture):
         words = SINGULAR_WORDS
-    elif change > _MOST:
-        words = (
-            f"first order decides nothing here: it is off by {100 * change:.3g} % of "
-            "the energy"
-        )
+    elif change > MOST_ENERGY:
+        words = off_by(change)
     elif "relative_energy" not in linearisation and moved > _LARGE:
         words = f"first order decides nothing here: it moves a joint by {moved:.3g} rad"
     else:
         return {}
     return {"status": SINGULAR, "reason": f"{words}; finite motions: {finite}"}
+
+
+def posture_status(
+    posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
+) -> dict[str, str]:
+    """Status and reason of a posture beyond the joints' limits, or singular.
+
+    Args:
+        posture: of the robot.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+
+    Returns:
+        Keys of the public format; empty at any other posture.
+    """
+    if passed := limits_passed(posture.robot, posture.coordinates):
+        return {"status": BEYOND_LIMITS, "reason": passed}
+    return singular_status(posture, load, gravity)
 
 
 def singular_status(
@@ -83,6 +103,14 @@ def singular_status(
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         finite = f"{failure_status(error)}, {error}"
     return {"status": SINGULAR, "reason": f"{SINGULAR_WORDS}; finite motions: {finite}"}
+
+
+def off_by(change: float) -> str:
+    """That first order is off by a share of the energy."""
+    return (
+        f"first order decides nothing here: it is off by {100 * abs(change):.3g} % of "
+        "the energy"
+    )
 
 
 def _singular(posture: Posture) -> bool:

@@ -47,7 +47,7 @@ def zone_text(zone: dict[str, Any]) -> str:
         f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
         f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
     )
-    return f"{line}\nnot proved: {zone['reason']}" if "reason" in zone else line
+    return f"{line}\n{status_line(zone)}" if zone.get("reason") else line
 
 
 def solution_of(

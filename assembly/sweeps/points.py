@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.kinematics.verdict import SINGULAR
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.zone import MARGIN_READINGS, zone_margins
@@ -21,6 +22,7 @@ from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.point_conditions import (
     assemble_rows,
@@ -360,6 +362,8 @@ def _compare_finite(
         # the linear solution remains valid: only its error is unknown
         solved.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
+    if abs(difference.relative_energy) > MOST_ENERGY:
+        _fail(solved, range(row, row + 1), SINGULAR, off_by(difference.relative_energy))
     out["linearisation_rotation"][row] = np.linalg.norm(difference.rotation)
     out["linearisation_translation"][row] = np.linalg.norm(difference.translation)
     out["linearisation_energy"][row] = difference.relative_energy

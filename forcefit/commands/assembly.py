@@ -71,9 +71,11 @@ def zone(
     json: JsonOption = None,
 ) -> None:
     """Whether clearances alone let the robot assemble; the margin."""
+    from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 
-    margins = zone_of(posture_of(robot, pose, joint))
+    posture = posture_of(robot, pose, joint)
+    margins = zone_of(posture) | singular_status(posture)
     write_json({"robot": robot, "zone": margins}, json)
     if json != "-":
         print(zone_text(margins))

@@ -11,6 +11,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.model.error_distributions import read_sources
+from assembly.model.robot import BeamLink
 from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.parameters import load_design
@@ -20,6 +21,7 @@ from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
+from tests.linkages_for_tests import SLIDER_CRANK, slider_crank
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.three_upu_for_tests import BASE, HEIGHT, PLATFORM, three_upu
 
@@ -286,3 +288,15 @@ def test_sweep_marks_postures_beyond_the_joints_limits():
     beyond = ["beyond_limits", "ok", "ok", "ok", "beyond_limits"]
     assert data["status"].values.ravel().tolist() == beyond
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
+
+
+def test_point_that_finite_motions_change_by_half_has_no_first_order_verdict():
+    """A short rod near its dead centre: first order sees none of its energy."""
+    rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
+    robot = slider_crank(0.3, rod, error=-2e-4)
+    reach = sum(SLIDER_CRANK)
+    targets = grid_targets({"q.slide": np.array([reach - 1e-5, reach - 0.02])})
+    question = Question(robot, components=targets.names, linearisation=True)
+    data = sweep_in_memory(Sweep(question, targets))
+    assert data["status"].values.tolist() == ["singular", "ok"]
+    assert "off by 100 % of the energy" in str(data["reason"].values[0])
