@@ -177,6 +177,24 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
+def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
+    """A remark on gravity that acts on nothing.
+
+    Args:
+        robot: any.
+        gravity: (3,) [m/s^2] or None.
+
+    Returns:
+        One sentence, or none.
+    """
+    if gravity is None or not np.any(gravity) or _masses(robot)[:, [0, 4]].any():
+        return []
+    return [
+        'nothing has a mass: gravity changes nothing; expected "density" of links or '
+        '"mass" of frames'
+    ]
+
+
 @lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
     """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""

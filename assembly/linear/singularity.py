@@ -34,7 +34,7 @@ from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.posture import home_posture
 from assembly.linear.thresholds import rank_of
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.display import html_table, largest_row, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
@@ -98,10 +98,10 @@ class Singularities:
             near_kinds = []
             for kind in KINDS:
                 if getattr(self, kind)[i] < near:
-                    joint = np.abs(moving[kind][i]).argmax()
+                    joint = largest_row(np.abs(moving[kind][i]))
                     text = f"{kind}: {robot.frames[joint].name}"
                     if kind == "parallel":
-                        component = np.abs(self.parallel_screws[i]).argmax()
+                        component = largest_row(np.abs(self.parallel_screws[i]))
                         text += f", platform {SCREW[component]}"
                     near_kinds.append(text)
             texts.append("; ".join(near_kinds))

@@ -283,12 +283,14 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     turns = low.rise * high.rise < 0
     # the mode that changes: the last of the falling ones on the side with more of them
     more = high if high.unstable > low.unstable else low
-    mode = more.modes[:, more.unstable - 1]
+    soft = more.unstable - 1
+    bent = more.modes[:, soft]
     what = "limit point, the load turns" if turns else "branch point, buckles"
     model = more.local.placement.model
     words = mode_text(
-        platform_moves(more.local) @ mode, mode[model.springs], path.parts, model.size
-    )
+        platform_moves(more.local) @ more.modes, soft, bent[model.springs],
+        path.parts, model.size,
+    )  # fmt: skip
     moved = float(high.local.placement.platform_screw[path.component])
     return Event(high.load, "critical", f"{what}: {words}", moved)
 

@@ -12,7 +12,9 @@ from assembly.kinematics.verdict import posture_remarks
 from assembly.linear.assemblies import failure_status
 from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.linear.load import massless
 from assembly.linear.mobility import mobility
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
@@ -78,7 +80,11 @@ def solution_of(
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
-        "remarks": [*robot.remarks, *posture_remarks(posture)],
+        "remarks": [
+            *robot.remarks,
+            *posture_remarks(posture),
+            *massless(robot, gravity),
+        ],
         "load": np.zeros(6) if load is None else np.asarray(load),
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
@@ -96,7 +102,7 @@ def solution_of(
         return (
             results
             | _assembly_results(assembly, bound)
-            | {"linearisation_error": linearisation}
+            | {"linearisation_error": linearisation, "worst_error": worst(assembly)}
             | proof_status("; ".join(unproved_parts))
             # a robot without errors or loads stands there all the same
             | (first_order_status(assembly, linearisation, finite) if forced else {})
@@ -258,7 +264,7 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
-        _screw_bound_text(certificate),
+        _screw_bound_text(certificate, results["worst_error"]),
         *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
@@ -275,20 +281,41 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
     return [f"note: {remark}" for remark in remarks]
 
 
-def _screw_bound_text(bound: dict[str, Any]) -> str:
-    """Largest distance of any platform screw of least energy from the one given."""
-    halves = ("rotation", 1e3), ("translation", 1e6)
-    (turn, shift), loose = (
-        [scale * bound[f"screw_{half}_{kind}"] for half, scale in halves]
-        for kind in ("error", "open")
+def worst(assembly: Assembly) -> dict[str, Any] | None:
+    """Certified bounds of the largest pose error, reading ``frozen`` of (27).
+
+    Args:
+        assembly: at least energy.
+
+    Returns:
+        ``rotation`` [rad] and ``translation`` [m]: at most these; None where nothing
+        is proved.
+    """
+    try:
+        bound = bound_pose_error(assembly, "frozen")
+    except (FreeMotion, SolverFailed):
+        return None
+    return {
+        "reading": "frozen", "rotation": bound.rotation_error[1],
+        "translation": bound.translation_error[1],
+    }  # fmt: skip
+
+
+def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> str:
+    """How well the screw is known, and the certified largest error with play."""
+    turn, shift = 1e3 * bound["screw_rotation_error"], bound["screw_translation_error"]
+    text = f"platform error proved to {turn:.1e} mrad, {1e6 * shift:.1e} um"
+    loose = 1e3 * bound["screw_rotation_open"], 1e6 * bound["screw_translation_open"]
+    if max(loose) <= 1e-9:
+        return text
+    text += "; at the same energy clearances leave it open: "
+    if largest is None or not np.isfinite(largest["rotation"] + largest["translation"]):
+        return text + "without bound"
+    turn, shift = largest["rotation"], largest["translation"]
+    return (
+        f"{text}at most {1e3 * turn:.3g} mrad, {1e6 * shift:.4g} um from nominal "
+        "(certified, reading frozen of assembly error)"
     )
-    text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
-    if max(loose) > 1e-9:
-        text += (
-            "; at the same energy clearances leave open up to "
-            f"{loose[0]:.3g} mrad, {loose[1]:.3g} um"
-        )
-    return text
 
 
 def _factor(value: float | None) -> str:

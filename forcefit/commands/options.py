@@ -4,6 +4,7 @@ Every error message names its option.
 """
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -262,10 +263,20 @@ def declared_under(
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
+    posture = declared_posture(robot, pose, joint)
+    g = parse_gravity(gravity)
+    note_massless(posture.robot, g)
     return apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=finite,
-    )  # fmt: skip
+        posture, parse_load(load), g, parse_covariates(under), finite=finite
+    )
+
+
+def note_massless(robot: Any, gravity: list[float] | None) -> None:
+    """Say on stderr that gravity acts on nothing, if it does not."""
+    from assembly.linear.load import massless
+
+    for remark in massless(robot, gravity):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:

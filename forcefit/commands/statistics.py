@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     LoadOption,
     PoseOption,
     RobotArgument,
+    note_massless,
     parse_gravity,
     parse_load,
     posture_of,
@@ -123,6 +124,7 @@ def statistics(
     posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
     wrench, g = parse_load(load), parse_gravity(gravity)
+    note_massless(posture.robot, g)
     if said := posture_status(posture, wrench, g):
         whose = {"robot": posture.robot.name, "pose": posture.pose()}
         write_json(whose | said, json)

@@ -13,6 +13,7 @@ from forcefit.commands.options import (
     LoadOption,
     RobotArgument,
     UnderOption,
+    note_massless,
     parse_covariates,
     parse_gravity,
     parse_load,
@@ -140,6 +141,7 @@ def sweep(
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
+    note_massless(asked.question.robot, g)
     done = [0]
     solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written
