@@ -11,6 +11,7 @@ from assembly.model.robot import Robot
 # relative size of a singular value of closures that counts as none: they hold to 1e-10,
 # and beside a singularity a posture is known only to some root of that
 SINGULAR = 1e-6
+_NOISE = 30.0  # of it, times what closures leave open
 
 
 @lru_cache(maxsize=64)
@@ -71,3 +72,25 @@ def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
     """(k,) ranks of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
+
+
+def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
+    """How many drives a robot has beyond those that hold it.
+
+    Args:
+        robot: of n frames.
+        T: (n, 4, 4) frames seen from the base.
+        left_open: [rad, m] by closures there: singular values of its size are none.
+
+    Returns:
+        Their number: the rank of all closures minus that with the drives locked.
+    """
+    least = max(SINGULAR, _NOISE * left_open)
+    ranks = []
+    for A in (
+        closure_matrices(robot, T[None])[0][0],
+        locked_closures(robot, T[None])[0],
+    ):
+        values = np.linalg.svd(A, compute_uv=False)
+        ranks.append(int((values > least * values[:1]).sum()))
+    return ranks[0] - ranks[1]

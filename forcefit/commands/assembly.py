@@ -14,7 +14,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
@@ -43,6 +45,8 @@ def solve(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -51,7 +55,9 @@ def solve(
     """Close at least energy: pose error, energy, wrenches, margin."""
     from assembly.report.results import solution_of, solution_text
 
-    applied = declared_under(robot, pose, joint, load, gravity, under)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
+    )
     with one_thread():
         results = solution_of(applied.posture, applied.load, applied.gravity)
     if results["status"] == "ok" and applied.conditions.reads_otherwise:
@@ -68,13 +74,15 @@ def zone(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     json: JsonOption = None,
 ) -> None:
     """Whether clearances alone let the robot assemble; the margin."""
     from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 
-    posture = posture_of(robot, pose, joint)
+    posture = posture_of(robot, pose, joint, rest, mismatch)
     margins = zone_of(posture) | singular_status(posture)
     write_json({"robot": robot, "zone": margins}, json)
     if json != "-":
@@ -88,6 +96,8 @@ def exact(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -96,7 +106,10 @@ def exact(
     """Close the robot with finite motions: closures hold exactly."""
     from assembly.report.results import exact_of, exact_text
 
-    applied = declared_under(robot, pose, joint, load, gravity, under, finite=True)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=True, rest=rest,
+        mismatch=mismatch,
+    )  # fmt: skip
     with one_thread():
         results = exact_of(applied.posture, applied.load, applied.gravity)
     write_json(results, json)
@@ -111,6 +124,8 @@ def error(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     reading: Annotated[
         list[str] | None,
         typer.Option(
@@ -158,7 +173,9 @@ def error(
             option = "--" + key.replace("_", "-")
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
-    applied = declared_under(robot, pose, joint, load, gravity, under)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
+    )
     with one_thread():
         results = pose_error_of(
             applied.posture, reading or None,

@@ -11,7 +11,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
@@ -30,6 +32,8 @@ def deflection(
     ],
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -72,8 +76,9 @@ def deflection(
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=exact or follow
-    )
+        robot, pose, joint, load, gravity, under, finite=exact or follow,
+        rest=rest, mismatch=mismatch,
+    )  # fmt: skip
     with one_thread():
         results = deflection_of(
             applied.posture, component, loads, applied.load, applied.gravity, exact,
