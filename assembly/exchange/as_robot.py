@@ -124,7 +124,9 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             places[body.name] = name, np.eye(4)
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
-        motion = {"joint": joint.kind, "actuated": joint.actuated}
+        motion = {
+            "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits
+        }  # fmt: skip
         name = joint.name if joint.name != BASE else f"{BASE}.joint"
         add(name, parent, T @ turn, position=joint.position, **motion)
         after = turn.T @ joint.after
@@ -205,7 +207,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
         joints.append(
             Joint(
                 name, frame.joint, on[frame.parent], child, T,
-                position=float(q), actuated=frame.actuated,
+                position=float(q), actuated=frame.actuated, limits=frame.limits,
             )
         )  # fmt: skip
         on[frame.name] = child

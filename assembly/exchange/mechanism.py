@@ -50,6 +50,7 @@ class Joint:
         after: (4, 4) of the child, seen from the joint after its motion.
         position: [rad or m] coordinate at home.
         actuated: whether a drive holds it.
+        limits: [rad or m] least and largest coordinate, None where it has none.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Joint:
     after: NDArray = field(default_factory=lambda: HERE)
     position: float = 0.0
     actuated: bool = False
+    limits: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,7 @@ from stiffness.screws import transform
 _ZERO = np.zeros(3)
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
 _REFUSED = ("include", "replicate", "attach", "composite", "flexcomp")
+_JOINT = {"name", "type", "pos", "axis", "ref", "class", "range", "limited"}
 _HELD = ("body", "joint", "freejoint", "inertial", "site", "frame")
 
 
@@ -211,7 +212,7 @@ def _freedoms(
             reading.coordinates.append(7)
             continue
         for key in given.element.attrib:
-            if key not in {"name", "type", "pos", "axis", "ref", "class"}:
+            if key not in _JOINT:
                 reading.extra.setdefault(f"joint {key}", []).append(name)
         anchor = given.numbers("pos", 3, "m", _ZERO)
         placement, back = placed(anchor, np.eye(3)), placed(-anchor, np.eye(3))
@@ -240,9 +241,22 @@ def _freedoms(
             placement=placement,
             axis=axis,
             after=back,
+            limits=_limits(given, kind, reading.angles),
         )
         # the coordinate at rest is ref: the joint's own zero lies before it
         yield replace(joint, placement=placement @ motion(joint, -ref), position=ref)
+
+
+def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
+    """Range of a hinge or slide; ``limited`` absent means that a range binds."""
+    limited = node.text("limited", "auto")
+    binds = limited == "true" or (limited == "auto" and angles.range_limits)
+    if not node.has("range") or not binds:
+        return None
+    ends = node.text("range").split()
+    if len(ends) != 2:
+        raise node.bad("range", f"found {quoted(' '.join(ends))}, expected 2 numbers")
+    return node.limits(*ends, angles.unit if kind == "revolute" else 1.0)
 
 
 def _pose(node: Node, reading: _Reading) -> NDArray:

@@ -32,6 +32,7 @@ from forcefit.inputs.errors import BadInput, nearest, quoted
 _KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal",
           "revolute2")  # fmt: skip
 _FRAMES = ("link", "joint", "frame")
+_AXIS = {"xyz", "limit", "limit lower", "limit upper"}
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
          "link": ("pose", "inertial")}  # fmt: skip
 
@@ -222,6 +223,7 @@ def _joints(
                 placement=placement,
                 axis=axis,
                 after=after,
+                limits=_limits(node) if one != "fixed" else None,
             )
         ], []
     return chain(name, parent, carried, placement, after, parts)
@@ -240,6 +242,17 @@ def _axis(model: _Model, node: Node, tag: str, at: NDArray) -> NDArray:
     return np.asarray(at[:3, :3].T @ model.pose(seen_from)[:3, :3] @ vector)
 
 
+def _limits(node: Node) -> tuple[float, float] | None:
+    """Range of a joint of one freedom."""
+    axis = node.child("axis")
+    limit = None if axis is None else axis.child("limit")
+    if limit is None:
+        return None
+    ends = [limit.child(tag) for tag in ("lower", "upper")]
+    texts = [None if end is None else end.element.text or "" for end in ends]
+    return limit.limits(*texts)
+
+
 def _left_out(model: Node) -> Iterator[str]:
     """What an SDF says and a robot of frames cannot hold."""
     extra: dict[str, list[str]] = {}
@@ -256,9 +269,11 @@ def _left_out(model: Node) -> Iterator[str]:
             elif inner.tag == "inertial" and inner.child("inertia") is not None:
                 extra.setdefault("moments of inertia", []).append(node.text("name"))
             elif inner.tag == "axis":
-                for part in inner.children():
-                    if part.tag != "xyz":
-                        what = f"joint axis {part.tag}"
-                        extra.setdefault(what, []).append(node.text("name"))
+                parts = [part.tag for part in inner.children()]
+                for limit in inner.children("limit"):
+                    parts += [f"limit {part.tag}" for part in limit.children()]
+                for part in sorted(set(parts) - _AXIS):
+                    what = f"joint axis {part}"
+                    extra.setdefault(what, []).append(node.text("name"))
     for what, names in extra.items():
         yield from counted(what, names)

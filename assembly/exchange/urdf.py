@@ -114,7 +114,8 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
         if kind != "fixed":
             axis = _axis(node, "axis", np.array([1.0, 0.0, 0.0]))
         one = _ONE_FREEDOM[kind]
-        return [Joint(name, one, ends[0], ends[1], placement, axis)], []
+        joint = Joint(name, one, ends[0], ends[1], placement, axis)
+        return [replace(joint, limits=_limits(node, kind))], []
     freedoms = ball()
     if kind == "floating":
         freedoms = slides() + ball()
@@ -127,6 +128,17 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
         freedoms = [("tx", "prismatic", turn[:, 0]), ("ty", "prismatic", turn[:, 1]),
                     ("rz", "revolute", turn[:, 2])]  # fmt: skip
     return chain(name, ends[0], ends[1], placement, HERE, freedoms)
+
+
+def _limits(node: Node, kind: str) -> tuple[float, float] | None:
+    """Range of a joint, None of one that is continuous or says none."""
+    limit = node.child("limit")
+    if limit is None or kind in {"fixed", "continuous"}:
+        return None
+    ends = (limit.element.get("lower"), limit.element.get("upper"))
+    # absent means 0 in the format; both absent is how files say that there are none
+    lower, upper = ("0" if end is None else end for end in ends)
+    return None if ends == (None, None) else limit.limits(lower, upper)
 
 
 def pose_of(origin: Node) -> NDArray:
@@ -169,7 +181,12 @@ def _left_out(root: Node, joints: list[Node]) -> tuple[str, ...]:
     extra: dict[str, list[str]] = {}
     for joint in joints:
         for inner in joint.children():
-            if inner.tag not in _HELD and inner.tag != "axis2":
+            if inner.tag == "limit":
+                for what in sorted(set(inner.element.keys()) - {"lower", "upper"}):
+                    extra.setdefault(f"joint limit {what}", []).append(
+                        joint.text("name")
+                    )
+            elif inner.tag not in _HELD and inner.tag != "axis2":
                 extra.setdefault(f"joint {inner.tag}", []).append(joint.text("name"))
     for link in links:
         for inner in link.children():

@@ -82,7 +82,11 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
             continue
         slides = frame.joint == "prismatic"
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
-        if not frame.limits[0] - room <= value <= frame.limits[1] + room:
+        low, high = frame.limits[0] - room, frame.limits[1] + room
+        if frame.passive and not slides:
+            # a whole turn of a joint that no drive counts changes nothing
+            value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
+        if not low <= value <= high:
             texts.append(
                 f"{frame.name} at {value:.6g} {'m' if slides else 'rad'}, limits "
                 f"{frame.limits[0]:g} to {frame.limits[1]:g}"
