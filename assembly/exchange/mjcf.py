@@ -256,7 +256,8 @@ def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None
     ends = node.text("range").split()
     if len(ends) != 2:
         raise node.bad("range", f"found {quoted(' '.join(ends))}, expected 2 numbers")
-    return node.limits(*ends, angles.unit if kind == "revolute" else 1.0)
+    unit = angles.unit if kind == "revolute" else 1.0
+    return node.limits(ends[0], ends[1], unit)
 
 
 def _pose(node: Node, reading: _Reading) -> NDArray:

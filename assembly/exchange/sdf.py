@@ -249,8 +249,8 @@ def _limits(node: Node) -> tuple[float, float] | None:
     if limit is None:
         return None
     ends = [limit.child(tag) for tag in ("lower", "upper")]
-    texts = [None if end is None else end.element.text or "" for end in ends]
-    return limit.limits(*texts)
+    lower, upper = (None if end is None else end.element.text or "" for end in ends)
+    return limit.limits(lower, upper)
 
 
 def _left_out(model: Node) -> Iterator[str]:

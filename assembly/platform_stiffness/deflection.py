@@ -107,6 +107,7 @@ class _Point:
     pressed: frozenset[str]
 
 
+Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
@@ -117,6 +118,7 @@ def load_deflection(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     exact: bool = False,
+    progress: Progress = lambda what, done, most: None,
 ) -> DeflectionCurve:
     """Follow the platform while one component of the load changes.
 
@@ -127,6 +129,8 @@ def load_deflection(
         load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         exact: whether with finite motions, else by problem (22).
+        progress: called at each load with the steps taken there and how many there
+            may be.
 
     Returns:
         The curve with its kinks and critical loads.
@@ -149,7 +153,11 @@ def load_deflection(
     def at(value: float, near: _Point | None) -> _Point:
         wrench = rest.copy()
         wrench[component] = value
-        return _solve(posture, value, wrench, gravity, exact, near)
+        what = f"steps at load {value:.6g}"
+        return _solve(
+            posture, value, wrench, gravity, exact, near,
+            lambda done, most: progress(what, done, most),
+        )  # fmt: skip
 
     points: list[_Point] = []
     events: list[Event] = []
@@ -178,9 +186,10 @@ def load_deflection(
 
 def _solve(
     posture: Posture, value: float, wrench: NDArray, gravity: ArrayLike | None,
-    exact: bool, near: _Point | None,
+    exact: bool, near: _Point | None, progress: Callable[[int, int], None],
 ) -> _Point:  # fmt: skip
     """The equilibrium under one load."""
+    progress(0, 1)
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity)
         names = clearance_names(linear.joints, contacts(linear)[0])
@@ -191,11 +200,13 @@ def _solve(
         else None
     )
     try:
-        equilibrium = solve_exact(posture, wrench, gravity=gravity, near=start)
+        equilibrium = solve_exact(
+            posture, wrench, gravity=gravity, near=start, progress=progress
+        )
     except SolverFailed:
         if start is None:
             raise
-        equilibrium = solve_exact(posture, wrench, gravity=gravity)
+        equilibrium = solve_exact(posture, wrench, gravity=gravity, progress=progress)
     active, force = active_clearances(equilibrium.expansion)
     # what carries rounding alone changes with it
     active &= force > _CARRIES * force.max(initial=0.0)

@@ -1,6 +1,6 @@
 """Results of assemblies as plain values (the keys of the public format) and as text."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -163,6 +163,7 @@ def exact_of(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
     """Results of ``assembly exact`` as plain values.
 
@@ -170,6 +171,7 @@ def exact_of(
         posture: of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
+        progress: of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The keys of ``assembly solve`` for finite motions; ``status`` as there, or
@@ -179,7 +181,7 @@ def exact_of(
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
     }  # fmt: skip
     try:
-        assembly = solve_exact(posture, load, gravity=gravity)
+        assembly = solve_exact(posture, load, gravity=gravity, progress=progress)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {

@@ -26,7 +26,7 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.platform_stiffness import stiffness
-from forcefit.commands.progress import one_thread
+from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.commands.statistics import statistics, tolerances
 from forcefit.commands.sweep import plot, sweep
 from forcefit.inputs.errors import BadInput, checked, nearest
@@ -110,8 +110,11 @@ def exact(
         robot, pose, joint, load, gravity, under, finite=True, rest=rest,
         mismatch=mismatch,
     )  # fmt: skip
-    with one_thread():
-        results = exact_of(applied.posture, applied.load, applied.gravity)
+    with one_thread(), progress_lines() as update:
+        results = exact_of(
+            applied.posture, applied.load, applied.gravity,
+            lambda done, most: update("steps", done, most),
+        )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(exact_text(results))

@@ -18,7 +18,7 @@ from forcefit.commands.options import (
     UnderOption,
     declared_under,
 )
-from forcefit.commands.progress import one_thread
+from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
@@ -79,10 +79,10 @@ def deflection(
         robot, pose, joint, load, gravity, under, finite=exact or follow,
         rest=rest, mismatch=mismatch,
     )  # fmt: skip
-    with one_thread():
+    with one_thread(), progress_lines() as update:
         results = deflection_of(
             applied.posture, component, loads, applied.load, applied.gravity, exact,
-            follow,
+            follow, update,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":
