@@ -13,9 +13,7 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
-    MismatchOption,
     PoseOption,
-    RestOption,
     RobotArgument,
     note_massless,
     parse_gravity,
@@ -50,8 +48,6 @@ def statistics(
     errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
     pose: PoseOption = None,
     joint: JointOption = None,
-    rest: RestOption = None,
-    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     draws: Annotated[
@@ -125,7 +121,7 @@ def statistics(
         check_dataset(output, "draws")
     if figure is not None:
         check_writable(figure, PICTURE)
-    posture = posture_of(robot, pose, joint, rest, mismatch)
+    posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_massless(posture.robot, g)

@@ -11,6 +11,7 @@ from forcefit.commands.options import (
     GravityOption,
     JsonOption,
     LoadOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     note_massless,
@@ -90,6 +91,7 @@ def sweep(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
+    rest: RestOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes on this machine.", min=1, max=1024)
     ] = None,
@@ -135,7 +137,7 @@ def sweep(
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
-                tangent=tangent, frequencies=frequencies,
+                tangent=tangent, frequencies=frequencies, rest=rest,
             ),
         )  # fmt: skip
         if figure is not None:

@@ -255,3 +255,49 @@ def test_statistics_beyond_the_limits_of_a_joint_say_so(run, tmp_path, monkeypat
     assert (status, out) == (
         1, "beyond_limits: x.slide at -0.26 m, limits -0.4 to -0.3\n"
     )  # fmt: skip
+
+
+GAP = """
+name = "gap"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+translation = [1.0, 0.0, 0.0]
+link = { beam = { radius = 0.01, theory = "euler" }, young = 7e10, poisson = 0.3 }
+[[frame]]
+name = "post"
+parent = "base"
+translation = [1.0, 1e-4, 0.0]
+[[closure]]
+frames = ["tip", "post"]
+"""
+
+
+def test_rest_of_a_closure_bends_the_link_that_it_is_given_to(run, tmp_path):
+    """A beam clamped at both ends, one shifted by d: 12 E I / L^3 d^2 / 2."""
+    (tmp_path / "gap.toml").write_text(GAP)
+    status, _, err = run("assembly", "solve", tmp_path / "gap.toml")
+    assert status == 2
+    assert "off by 0.0001 m" in err
+    assert "--rest NAME makes it a geometric error" in err
+    status, out, _ = run("assembly", "solve", tmp_path / "gap.toml", "--rest", "tip")
+    assert status == 0
+    expected = 12 * 7e10 * np.pi * 0.01**4 / 4 * 1e-8 / 2
+    energy = float(out.split("energy: ")[1].split()[0])
+    assert energy == pytest.approx(expected, rel=1e-4)
+    words = ["--rest", "tip", "--grid", "tx=1", "-o", tmp_path / "x.nc"]
+    assert run("assembly", "sweep", tmp_path / "gap.toml", *words)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["solve", "five_bar", "--rest", "ankle"], '--rest: no frame "ankle"'),
+     (["solve", "five_bar", "--mismatch", "glue"], '--mismatch: found "glue"'),
+     (["solve", "five_bar", "--mismatch", "spring", "--pose", "tx=0"],
+      "--mismatch: found --pose, expected spring, with --joint")],
+)  # fmt: skip
+def test_ways_out_of_open_closures_refuse_what_they_cannot_use(run, words, message):
+    status, out, err = run("assembly", *words)
+    assert (status, out) == (2, "")
+    assert message in err
