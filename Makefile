@@ -1,39 +1,44 @@
 # make study   set everything up and run the main job
 # make test    set everything up and run the tests
 # make docs    set everything up and build the site, build/site/index.html
+# PYTHON=python3.13 takes another Python, VENV=PATH another folder for the environment
 
 PYTHON ?= python3
-BIN := .venv/bin
+VENV ?= .venv
+BIN := $(VENV)/bin
+# an environment of another Python is made anew, not taken for ready
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+READY := $(VENV)/ready-$(VERSION)
 
 .PHONY: study test test-slow check docs clean
 
-study: .venv/ready
+study: $(READY)
 	$(BIN)/forcefit study examples/irsbot2.toml
 
-test: .venv/ready
+test: $(READY)
 	$(BIN)/python -m pytest -n auto -m "not slow"
 
-test-slow: .venv/ready
+test-slow: $(READY)
 	$(BIN)/python -m pytest -n auto -m slow
 
-check: .venv/ready
+check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-docs: .venv/docs
+docs: $(READY)-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
-.venv/docs: .venv/ready
+$(READY)-docs: $(READY)
 	$(BIN)/python -m pip install --quiet -e ".[docs]"
 	@touch $@
 
-.venv/ready: pyproject.toml
+$(READY): pyproject.toml
 	@sh .ci/system_packages
-	$(PYTHON) -m venv .venv
+	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet -e ".[dev]"
 	@touch $@
 
 clean:
-	rm -rf .venv build dist
+	rm -rf $(VENV) build dist

@@ -28,7 +28,7 @@ from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.compensation import compensate
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.results import corrected
+from validation.diagnosis.saving import corrected
 from validation.multibody.simulation import SimulationFailed, without_clearance
 from validation.synthetic.again import distances
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign

@@ -85,7 +85,7 @@ def main() -> None:
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
         print(
             f"{kind:9s} {rows} rows, hidden {hidden}: {diagnosis.verdict} "
-            f"{' + '.join(diagnosis.best_by_score)}; {seconds:.0f} s, "
+            f"{' + '.join(diagnosis.effects)}; {seconds:.0f} s, "
             f"at most {memory:.1f} GB so far",
             flush=True,
         )

@@ -12,7 +12,11 @@ from typing import Any
 import numpy as np
 
 WITHIN_90 = 1.645  # [-] standard deviations
-VERDICTS = ("explained", "learned", "none_needed", "ambiguous", "outside_library")
+VERDICTS = (
+    "explained", "learned", "none_needed", "ambiguous", "outside_library",
+    "not_enough_rows",
+)  # fmt: skip
+UNNAMED = ("geometric_errors", "springs")  # listed where no effect is named
 
 
 def score(folder: Path) -> dict[str, Any]:
@@ -33,6 +37,8 @@ def score(folder: Path) -> dict[str, Any]:
     variables: list[bool] = []
     brier: list[float] = []
     seconds: list[float] = []
+    saved: list[float] = []
+    worse: list[bool] = []
     wrong: list[str] = []
     for path in sorted((folder / "answers").glob("*.json")):
         diagnosis = json.loads(path.read_text())
@@ -44,8 +50,11 @@ def score(folder: Path) -> dict[str, Any]:
             outcome[group][result] += 1
         confusion["+".join(names) or "none"][_told(diagnosis)] += 1
         seconds.append(diagnosis.get("seconds", 0.0))
+        if "read_back" in diagnosis:
+            saved.append(abs(diagnosis["read_back"] - 1.0))
+            worse.append(diagnosis["saved_worse"])
         if result in ("false claim", "false outside", "crashed", "missed"):
-            claimed = "+".join(sorted(e["name"] for e in diagnosis.get("effects", [])))
+            claimed = "+".join(_claimed(diagnosis))
             sizes = {k: round(v, 1) for k, v in truth["contribution_rms"].items()}
             wrong.append(
                 f"{path.stem} {truth['robot']}: {sizes or 'none'} -> "
@@ -74,6 +83,8 @@ def score(folder: Path) -> dict[str, Any]:
         "place_right": _share(places),
         "variable_right": _share(variables),
         "brier": _spread(brier),
+        "read_back_off_by": _spread(saved),
+        "saved_worse_than_declared": _share(worse),
         "seconds": _spread(seconds),
         "wrong": wrong,
     }
@@ -84,9 +95,11 @@ def _judge(truth: dict, diagnosis: dict) -> str:
     verdict = diagnosis["verdict"]
     if verdict == "crashed":
         return "crashed"
-    claimed = sorted(effect["name"] for effect in diagnosis.get("effects", []))
+    claimed = _claimed(diagnosis)
     accepted = [sorted(names) for names in truth["accept_effects"]]
     loose = len(truth["accept_verdicts"]) == len(VERDICTS)
+    if verdict == "not_enough_rows":
+        return "abstained"
     if verdict == "ambiguous":
         return "right" if verdict in truth["accept_verdicts"] else "abstained"
     if verdict in {"outside_library", "learned"}:
@@ -98,6 +111,12 @@ def _judge(truth: dict, diagnosis: dict) -> str:
     if truth["kind"] == "outside":
         return "right" if loose and claimed in accepted else "false claim"
     return "right" if claimed in accepted and claimed else "false claim"
+
+
+def _claimed(diagnosis: dict) -> list[str]:
+    """Effects of the library that an answer names."""
+    names = (effect["name"] for effect in diagnosis.get("effects", []))
+    return sorted(name for name in names if name not in UNNAMED)
 
 
 def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
@@ -123,7 +142,7 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
 def _told(diagnosis: dict) -> str:
     """What was claimed, in a word."""
     if diagnosis["verdict"] == "explained":
-        return "+".join(sorted(effect["name"] for effect in diagnosis["effects"]))
+        return "+".join(_claimed(diagnosis)) or "geometry or springs"
     return str(diagnosis["verdict"])
 
 

@@ -14,7 +14,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -27,7 +26,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import read_sources
-from assembly.model.robot import Frame, Robot
+from assembly.model.robot import Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import exact_of, solution_of
 from assembly.robots import load_robot
@@ -49,19 +48,9 @@ from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
 from tests.further_questions_for_tests import FURTHER
 from tests.inner_questions_for_tests import INNER
 from tests.part_questions_for_tests import PARTS
-from tests.planar_arm_for_tests import measured
 from tests.robot_questions_for_tests import ROBOTS
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.tolerances_for_tests import plan_for
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis import figures, results
-from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.scene import worst_robot
-from validation.diagnosis.text import text
-from validation.diagnosis.verdict import calibrate
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.generator import generate_campaign, write_campaign
 
 STORED = Path(__file__).with_name("answers.json")
 ROOT = Path(__file__).parents[1]  # wherever that is checked out
@@ -239,71 +228,6 @@ def bar(section: dict[str, float], interface: str, nudge: float) -> Any:
     }
 
 
-def diagnosed(name: str, nudge: float) -> Any:
-    """What explains a campaign."""
-    campaign = read_campaign(Path(__file__).parent / "campaigns" / name)
-    campaign = dataclasses.replace(campaign, measured=campaign.measured * (1 + nudge))
-    return told_of(diagnose(campaign))
-
-
-def planar(nudge: float) -> Any:
-    """What is learned of a device somewhere in the room that sags; one odd row."""
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = measured(
-            Path(folder) / "arm", seed=1, missing=0.03, configurations=12, outliers=(7,)
-        )
-    readings = campaign.measured * (1 + nudge)
-    readings[:, 5] -= 1e-6 * np.linalg.norm(campaign.loads[:, 3:], axis=1)
-    campaign = dataclasses.replace(campaign, measured=readings, registration="unknown")
-    found = diagnose(campaign)
-    assert found.foretells
-    return told_of(found, simulated=2) | {"corrected": results.corrected(found)}
-
-
-def inaccurate(nudge: float) -> Any:
-    """An arm whose frames are all so far off that finite errors show."""
-    turning = {"joint": "revolute", "actuated": True}
-    robot = Robot("arm", "tool", (
-        Frame("j1", **turning),
-        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], **turning),
-        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], **turning),
-        Frame("tool", "j3", [0.3, 0.05, 0.1]),
-    ))  # fmt: skip
-    errors = np.random.default_rng(3).normal(size=(4, 6)) * np.repeat([8e-3, 2e-3], 3)
-    design = CampaignDesign(configurations=8, rows=20, load=20.0, reach=1.2)
-    made = generate_campaign(
-        robot.with_errors(errors), {}, design, seed=2, program="springs"
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        write_campaign(dataclasses.replace(made, robot=robot), Path(folder) / "arm")
-        campaign = read_campaign(Path(folder) / "arm")
-    readings = campaign.measured * (1 + nudge)
-    return told_of(diagnose(dataclasses.replace(campaign, measured=readings)))
-
-
-def told_of(found: Diagnosis, simulated: int = 0) -> Any:
-    """A diagnosis, and what pages and tables say and draw of it."""
-    told: list[tuple[int, int]] = []
-    tally = None
-    if simulated:
-        tally = calibrate(
-            found.screen, found.best, simulated, lambda *words: told.append(words)
-        )
-    return {
-        "found": found,
-        "table": results.table(found, tally),
-        "text": text(found, tally),
-        "told": told,
-        "shown": [found._repr_html_(), repr(found)],
-        "separability": figures.separability_of(found),
-        "charts": {chart.__name__: chart(found) for chart in (
-            figures.error_chart, figures.ladder_chart, figures.vector_charts,
-            figures.covariate_charts, figures.probability_chart,
-            figures.confounding_chart, worst_robot,
-        )},
-    }  # fmt: skip
-
-
 QUESTIONS: dict[str, Callable[[float], Any]] = {
     **{f"linear {name}": partial(linear, name) for name in WORKSPACE},
     **{f"loaded {n}": partial(loaded, n) for n in ("irsbot2", "hexapod", "3rrr")},
@@ -311,10 +235,6 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
     "tolerances, all": partial(allocated, {"margin_free": 1.0}, 1.0),
     "tolerances, most": partial(allocated, {"energy": 1.0}, 0.9),
     "tube": partial(bar, {"radius": 0.1, "inner_radius": 0.06}, "rigid"),
-    **{f"diagnosis {c}": partial(diagnosed, c)
-       for c in ("constant_temperature", "stand", "encoder_offset")},
-    "inaccurate": inaccurate,
-    "planar": planar,
     **PARTS,
     **ROBOTS,
     **FURTHER,

@@ -1,6 +1,8 @@
 """Reading a page as a program does: its tables, numbers, figures and results."""
 
+import html
 import json
+import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
@@ -82,3 +84,15 @@ def parse(text):
     page = ParsedPage()
     page.feed(text)
     return page
+
+
+def tiles(text):
+    """Answer and note of each conclusion at the top of a page, by its title."""
+    found = re.findall(
+        r"<div class=tile><h3>(.*?)</h3><p class=answer>(.*?)</p>"
+        r"<p class=note>(.*?)</p></div>", text,
+    )  # fmt: skip
+    return {
+        title: tuple(html.unescape(re.sub("<[^>]*>", "", one)) for one in rest)
+        for title, *rest in found
+    }

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from stiffness.fem.elements import lame
-from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import check_surface
 
@@ -32,6 +32,41 @@ def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
         np.column_stack([high, i + facets, j + facets]),
     ])
     return points, triangles
+
+
+def shouldered_shaft(large, small, fillet, around, rows, step=(0.05, 0.12)):
+    """Points and triangles of a shaft along z whose radius steps down at a fillet.
+
+    Rings about 4 mm apart, each turned by half a facet against the one before.
+    """
+    shoulder, end = step
+    turn = np.linspace(0, np.pi / 2, rows + 1)
+    arc = np.column_stack([small + fillet - fillet * np.sin(turn),
+                           shoulder + fillet - fillet * np.cos(turn)])  # fmt: skip
+    outline = np.array([[large, 0], [large, shoulder], *arc, [small, end]])
+    rings = [outline[:1]]
+    for a, b in zip(outline, outline[1:], strict=False):
+        count = max(1, round(float(np.linalg.norm(b - a)) / 0.004))
+        rings.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
+    profile = np.concatenate(rings)
+    number = np.arange(around)
+    angle = 2 * np.pi / around * (number + 0.5 * (np.arange(len(profile))[:, None] % 2))
+    height = np.broadcast_to(profile[:, 1:], angle.shape)
+    points = np.stack([profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle),
+                       height], axis=-1).reshape(-1, 3)  # fmt: skip
+    points = np.concatenate([points, [[0, 0, 0], [0, 0, end]]])
+    following, triangles = (number + 1) % around, []
+    for k in range(len(profile) - 1):
+        a, b = k * around + number, k * around + following
+        c, d = a + around, b + around
+        pair = ((a, b, c), (b, d, c)) if k % 2 == 0 else ((a, b, d), (a, d, c))
+        triangles += [np.column_stack(corners) for corners in pair]
+    for tip, ring in ((False, number), (True, number + (len(profile) - 1) * around)):
+        center = np.full(around, len(points) - 2 + tip)
+        other = ring - number + following
+        sides = (center, ring, other) if tip else (center, other, ring)
+        triangles.append(np.column_stack(sides))
+    return points, np.concatenate(triangles)
 
 
 def box_cells(counts):
@@ -131,3 +166,43 @@ CUBE_TRIANGLES = np.array(
 
 def bar(facets=32, **kwargs):
     return check_surface(*cylinder(facets=facets, **kwargs), "bar")
+
+
+def rounded_outline(half_sizes, corner, inset, steps):
+    """Corners (4 (steps + 1), 2) of a rectangle with round corners, from the right."""
+    centers = np.array(half_sizes) - corner
+    angle = np.pi / 2 * np.arange(steps + 1) / steps
+    points = []
+    for k, signs in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        turn = angle + k * np.pi / 2
+        arc = (corner - inset) * np.column_stack([np.cos(turn), np.sin(turn)])
+        points.append(arc + centers * signs)
+    return np.concatenate(points)
+
+
+def rounded_block(half_sizes, corner, profile, steps):
+    """Rounded outlines, inset as (inset, z) of a profile says, one above the other."""
+    rings = [
+        np.insert(rounded_outline(half_sizes, corner, inset, steps), 2, z, axis=1)
+        for inset, z in profile
+    ]
+    count = len(rings[0])
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    triangles = []
+    for k in range(len(rings) - 1):
+        a, b = k * count, (k + 1) * count
+        triangles += [np.column_stack([i + a, j + a, j + b])]
+        triangles += [np.column_stack([i + a, j + b, i + b])]
+    top, total = (len(rings) - 1) * count, len(rings) * count
+    triangles += [np.column_stack([0 * i + total, j, i])]
+    triangles += [np.column_stack([0 * i + total + 1, i + top, j + top])]
+    ends = [[0, 0, profile[0][1]], [0, 0, profile[-1][1]]]
+    points = np.concatenate([*rings, ends])
+    return check_surface(points, np.concatenate(triangles), "rounded block")
+
+
+def fillet_profile(radius, height, steps):
+    """(inset, z) of a fillet at the foot of a wall."""
+    angle = np.pi / 2 * np.arange(steps + 1) / steps
+    foot = [(radius * (1 - np.sin(a)), radius * (1 - np.cos(a))) for a in angle]
+    return [*foot, (0.0, height)]

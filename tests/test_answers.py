@@ -9,15 +9,10 @@ from tests.answers_for_tests import QUESTIONS, STORED, close, leaves
 
 ANSWERS = json.loads(STORED.read_text())
 RELATIVE = 1e-6
-# fits end a third of a standard deviation from the optimum, wherever they came from
-FITTED = 1e-2
-DIAGNOSES = ("diagnosis", "inaccurate", "planar")
 BOUNDS = 1e-4  # bounds may differ by the tolerance asked for, 1e-6 of some hundredths
 LINEAR = ("linear", "loaded", "drawn", "at once", "of any kind", "placed")
 # others of their kind are asked always
-LONG = (
-    "inaccurate", "planar", "diagnosis constant_temperature", "diagnosis stand", "tube",
-)  # fmt: skip
+LONG = ("tube",)
 
 
 @pytest.mark.parametrize(
@@ -25,8 +20,7 @@ LONG = (
     [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in QUESTIONS],
 )
 def test_answers_are_those_stored(name):
-    fitted = name.startswith(DIAGNOSES)
-    assert not unlike_those_stored(name, FITTED if fitted else RELATIVE)
+    assert not unlike_those_stored(name)
 
 
 @pytest.mark.parametrize("name", [n for n in QUESTIONS if n.startswith(LINEAR)])

@@ -247,7 +247,6 @@ STAGE = {
     "effects": [crank], "gallery": [plans, own_robot], "link_exchange": [links],
     "reports": [campaign, plans, runs], "sweeps": [plans, robots],
     "tolerances": [imperfect], "tracker_import": [tracker],
-    "README": [campaign, plans],
 }  # fmt: skip
 
 

@@ -4,9 +4,12 @@ The expected numbers come from the data's own README, found by others with other
 programs, or from robots whose errors the tests put in themselves.
 """
 
+import csv
 import os
 import sys
 import types
+from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +29,9 @@ from examples.serial_robots.convert import convert as convert_serial
 from examples.serial_robots.convert import find as find_serial
 from examples.voron.convert import convert as convert_voron
 from forcefit.inputs.table import BadInput
-from stiffness.screws import transform
+from stiffness.screws import rotation_vector, transform
 from validation.campaign.campaign_file import read_campaign
+from validation.correction.compensation import compensate
 
 
 def needs(name):
@@ -170,7 +174,7 @@ def test_a_table_of_the_ur5_becomes_a_campaign(q, tmp_path):
     folder = convert_serial(serial_table(tmp_path / "a.csv", q), tmp_path / "out")
     campaign = read_campaign(folder)
     assert campaign.ids == ("m0",)
-    assert campaign.measured[0, 3:] == pytest.approx([-2e-3, 1e-3, -5e-4])
+    assert campaign.measured[0, 3:] == pytest.approx([2e-3, -1e-3, 5e-4])
     with pytest.raises(BadInput, match=r"targets are 0\.01 m off"):
         convert_serial(serial_table(tmp_path / "b.csv", 0.0, 0.041), tmp_path / "b")
 
@@ -189,3 +193,57 @@ def test_targets_of_both_robots_are_where_their_angles_lead(tmp_path):
     for path in data_folder("serial_robots").glob("*.csv"):
         campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
         assert len(campaign) in {1000, 216}
+
+
+def reached_by_the_file(path):
+    """(R, 3) targets and (R, 3) positions read [m], by the tracker's six decimals.
+
+    Of target + difference and target - difference the one whose cells all have six
+    decimals [mm] is what the tracker wrote.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as lines:
+        rows = list(csv.DictReader(lines))
+    target, gap = (
+        np.array([[Decimal(row[f"{k}_{kind}"]) for k in "xyz"] for row in rows])
+        for kind in ("t", "dif")
+    )
+
+    def has_six_decimals(cells):
+        return all(abs(x - round(x, 6)) < Decimal("1e-11") for x in cells.ravel())
+
+    whole = [z for z in (target + gap, target - gap) if has_six_decimals(z)]
+    assert len(whole) == 1
+    return target.astype(float) / 1e3, whole[0].astype(float) / 1e3
+
+
+@needs("serial_robots")
+def test_deviation_of_a_campaign_leads_to_what_the_tracker_wrote(tmp_path):
+    for path in data_folder("serial_robots").glob("*.csv"):
+        campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
+        target, reached = reached_by_the_file(path)
+        found = target + campaign.measured[:, 3:]
+        np.testing.assert_allclose(found, reached, rtol=0, atol=1e-12)
+
+
+@needs("serial_robots")
+def test_commands_of_compensate_as_read_bring_the_arm_nearer_its_targets(tmp_path):
+    """Of the readings only where the tracker stands is corrected: a rigid motion.
+
+    Deviations change little over a few mm, so an arm sent to c instead of its target
+    is read at c + deviation.  With the sign reversed the error would double.
+    """
+    (path,) = data_folder("serial_robots").glob("*UR5*.csv")
+    campaign = read_campaign(convert_serial(path, tmp_path / "ur5")).take(range(100))
+    target, reached = (x[:100] for x in reached_by_the_file(path))
+    nominal = campaign.transforms[:, campaign.robot.index("reflector")]
+    read = transform(nominal[:, :3, 3] + campaign.measured[:, 3:], nominal[:, :3, :3])
+    base = base_pose(nominal, read)
+    screw = [*rotation_vector(base[:3, :3]), *base[:3, 3]]
+    named = [f"base.{axis}" for axis in ("rx", "ry", "rz", "tx", "ty", "tz")]
+    placed = {"registration": dict(zip(named, screw, strict=True))}
+    robot = replace(campaign.robot, effects={**campaign.robot.effects, **placed})
+    found = compensate(replace(campaign, robot=robot), as_read=True)
+    commanded = found.transforms[:, robot.index("reflector"), :3, 3]
+    before = np.linalg.norm(reached - target, axis=1)
+    after = np.linalg.norm(commanded - target + reached - target, axis=1)
+    assert after.mean() < before.mean() / 2

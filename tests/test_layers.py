@@ -32,8 +32,8 @@ SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
     "pytetwild": ("stiffness/mesh/mesh_worker.py",),
     "skfem": ("stiffness/mesh/lagrange.py",),
-    "meshio": ("stiffness/surface/surface_files.py",),
-    "gmsh": ("stiffness/surface/surface_files.py",),
+    "meshio": ("stiffness/surface/surface_worker.py",),
+    "gmsh": ("stiffness/surface/surface_worker.py",),
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
         "assembly/linear/reference.py",
@@ -52,7 +52,7 @@ OWNERS = {
     "pandas": ("assembly/model/tables.py",),
     "h5netcdf": ("assembly/sweeps/netcdf.py",),
     "distributed": ("assembly/sweeps/cluster.py",),
-    "defusedxml": ("assembly/exchange/xml_file.py",),
+    "mujoco": ("assembly/exchange/mujoco_reading.py",),
 }
 HEAVY = (*OWNERS, "pyvista", "matplotlib")
 # of use to sweeps, statistics, files and drawings, not to one posture

@@ -11,8 +11,14 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_python_example_runs_and_is_short():
+def python_example():
+    """The README's lines of Python."""
     (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.S)
+    return code
+
+
+def test_the_python_example_runs_and_is_short():
+    code = python_example()
     assert len(code.strip().splitlines()) <= 20
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
                           check=False)  # fmt: skip

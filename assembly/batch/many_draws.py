@@ -12,9 +12,13 @@ from assembly.linear.closure import (
     virtual_joints,
 )
 from assembly.linear.load import loads_with_weight
-from assembly.linear.reduction import complement, reduce_problem
+from assembly.linear.reduction import FreeMotion, complement, reduce_problem
 from assembly.linear.thresholds import RANK
-from assembly.model.clearance import clearance_bounds, component_bounds
+from assembly.model.clearance import (
+    clearance_bounds,
+    component_bounds,
+    has_bounded_motion,
+)
 from assembly.solvers.conic import cone_starts
 
 __all__ = ["OnePosture", "prepare_energies"]
@@ -31,7 +35,8 @@ def prepare_energies(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        What :meth:`OnePosture.solve` needs.
+        What :meth:`OnePosture.solve` needs.  Bounds of passive joints' own motion are
+        left out, unless a load drives a joint up to its bound.
 
     Raises:
         FreeMotion: a load drives a motion that nothing resists.
@@ -41,7 +46,13 @@ def prepare_energies(
     wrench = np.zeros(6) if load is None else np.asarray(load, dtype=float)
     g = np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float)
     frame_loads = loads_with_weight(posture, wrench, g)
-    reduced = reduce_problem(lin, joints, frame_loads)
+    try:
+        reduced = reduce_problem(lin, joints, frame_loads)
+    except FreeMotion:
+        if not has_bounded_motion(robot):
+            raise
+        joints = virtual_joints(robot, bounded_motion=True)
+        reduced = reduce_problem(lin, joints, frame_loads)
     A = lin.rows
     A_q, A_u, A_y = (A @ part for part in (joints.free, joints.cones, joints.elastic))
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread

@@ -18,7 +18,12 @@ from assembly.batch.posture_loads import PostureLoads
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import VirtualJoints
-from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
+from assembly.linear.energy import (
+    Assembly,
+    CannotAssemble,
+    minimise_energies,
+    solve_assembly,
+)
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN
@@ -108,11 +113,36 @@ class OnePosture:
         return _solve_draws(self, errors)
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
-        """(k, n, 6) [N m, N] through every frame, at its origin in its axes."""
+        """(k, n, 6) [N m, N] of every link's spring, at its frame in its axes."""
         wrenches = np.tensordot(multipliers, self.wrench, axes=(1, 2))
         if self.loads is not None:
             wrenches += self.loads.frame_loads.body.reshape(-1, 6)
         return wrenches
+
+    def assembly(self, errors: NDArray) -> Assembly:
+        """The assembled manipulator of one draw.
+
+        Args:
+            errors: (n, 6) [rad, m] delta l.
+
+        Returns:
+            The solution of (22), within all bounds of passive joints' own motion.
+
+        Raises:
+            CannotAssemble: a closure is open that no clearance and no spring closes.
+            SolverFailed: the cone solver gave up.
+        """
+        posture = replace(self.posture, robot=self.posture.robot.with_errors(errors))
+        if self.loads is None:
+            return solve_assembly(posture)
+        return solve_assembly(posture, self.loads.load, gravity=self.loads.gravity)
+
+    @property
+    def at_tips(self) -> NDArray:
+        """(n, 6) [N m, N] the part of :meth:`wrenches` that is links' own weight."""
+        if self.loads is None:
+            return np.zeros((len(self.posture.robot.frames), 6))
+        return self.loads.frame_loads.at_tips
 
 
 def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
@@ -155,6 +185,7 @@ def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
     rounding = closure_rounding(errors, one.joints, size_of(one.posture.robot))
     drop_zeros(energy, bound, multipliers, rounding, one.loads is not None)
     draws = Draws(
+        errors=errors,
         energy=energy,
         bound=bound,
         clearances=u,
@@ -166,7 +197,7 @@ def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
         _solve_fallback(one, errors, draws)
     else:
         for i in np.flatnonzero(fallback).tolist():
-            _solve_loaded_fallback(one, one.loads, errors[i], draws, i)
+            _solve_loaded_fallback(one, errors[i], draws, i)
     return draws
 
 
@@ -214,15 +245,14 @@ def _solve_fallback(one: OnePosture, errors: NDArray, draws: Draws) -> None:
 
 
 def _solve_loaded_fallback(
-    one: OnePosture, loads: PostureLoads, errors: NDArray, draws: Draws, i: int
+    one: OnePosture, errors: NDArray, draws: Draws, i: int
 ) -> None:
     """Solve draw i again by :func:`assembly.linear.energy.solve_assembly`."""
     for values in (draws.energy, draws.bound, draws.clearances, draws.multipliers,
                    draws.platform_screw):  # fmt: skip
         values[i] = np.nan
-    posture = replace(one.posture, robot=one.posture.robot.with_errors(errors))
     try:
-        assembly = solve_assembly(posture, loads.load, gravity=loads.gravity)
+        assembly = one.assembly(errors)
     except (CannotAssemble, SolverFailed, FreeMotion):
         return
     draws.energy[i] = assembly.energy

@@ -22,6 +22,11 @@ step       ``size``                       0 below ``at``, 1 from there on
 slow_wave  ``sine``, ``cosine``           of x in turns of ``period``
 reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; of a load or a
                                           wrench y its size
+play       ``size``                       -1 to 1: what slips ``depth`` after x turned
+scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
+waves
+reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
+waves
 ========== ============================== =====================================
 
 Sources:
@@ -56,6 +61,7 @@ class Form:
         words: with which a column's name ends, ``""`` for nothing.
         basis: (R, p) columns, from their names, the inputs (R,) each, and the shapes.
         remembers: whether its first variable's past counts.
+        least: variables that it must have.
     """
 
     name: str
@@ -66,6 +72,7 @@ class Form:
     words: tuple[str, ...]
     basis: Callable[[Sequence[str], Inputs, Shapes], NDArray]
     remembers: bool = False
+    least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
         """Whether a number's name is one of a column's, with so many variables."""
@@ -77,7 +84,7 @@ class Form:
         if self.indices is None:
             return not head
         parts = head.split(".")
-        count = 1 if self.name == "reversal" else variables
+        count = variables if self.name in {"powers", "waves", "spline"} else 1
         least, most = self.indices
         return len(parts) == count and all(
             _INDEX.fullmatch(part) and least <= int(part) <= most for part in parts
@@ -175,6 +182,21 @@ def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
 
+def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """Inputs are an angle, and what the waves are multiplied by."""
+    return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
+
+
+def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """Inputs are a direction and an angle."""
+    return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
+
+
+def _play(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """The input is what slips after the variable, from -1 to 1."""
+    return _stacked([inputs[0]] * len(names), inputs)
+
+
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
     """(R, p) columns, each as long as the inputs."""
     rows = len(inputs[0])
@@ -209,6 +231,12 @@ FORMS: dict[str, Form] = {
              _slow_wave),
         Form("reversal", "a jump where the direction turns", 2, {}, (0, 20), ("",),
              _reversal, remembers=True),
+        Form("play", "what slips after its variable turned", 1, {"depth": True}, None,
+             ("size",), _play, remembers=True),
+        Form("scaled_waves", "waves, times a second variable", 2, {}, (0, _MOST),
+             _WAVES, _scaled_waves, least=2),
+        Form("reversal_waves", "waves that turn with the direction", 2, {}, (0, _MOST),
+             _WAVES, _reversal_waves, remembers=True),
     )
 }  # fmt: skip
 

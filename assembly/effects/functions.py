@@ -53,7 +53,8 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
         names = [n.removeprefix("cov.") for n in function.variables if _is_covariate(n)]
         form = FORMS.get(function.form)
         if form is not None and form.remembers:
-            names.append("approach" if form.name == "reversal" else "time")
+            late = "time_constant" in form.shapes
+            names.append("time" if late else "approach")
         owners |= dict.fromkeys(names, function.title)
     return owners
 
@@ -121,6 +122,12 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
     if form is None or not form.remembers:
         return np.column_stack([_now(conditions, first), *inputs])
     history, row = past(conditions, [first])
+    if form.name == "play":
+        depth = parameters_of(function, function.components[0])["depth"]
+        return history.slip(first, depth)[row, None]
+    if form.name == "reversal_waves":
+        angle = inputs[0] if inputs else _now(conditions, first)
+        return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
         # friction grows with the load, whichever way it pushes
         sizes = [

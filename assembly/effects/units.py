@@ -87,7 +87,9 @@ def _parameter_unit(
     if form.name in {"powers", "reversal"}:
         powers = column_indices(name)
         given = given[-1:] if form.name == "reversal" else given
-    elif form.remembers:
+    elif form.name == "scaled_waves":
+        powers = [0, 1]
+    elif form.remembers and len(given) == 1:
         powers = [int(name == "gain" and function.variables[0] not in CLOCKS)]
     unit = dict(whole)
     for each, power in zip(given, powers, strict=True):

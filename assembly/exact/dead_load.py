@@ -18,7 +18,7 @@ M       --             (3, 3)      sum of the points times their forces
 Linearised, these are the loads of :mod:`assembly.linear.load`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -40,11 +40,14 @@ class DeadLoads:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 3, 4) [N m, N] on the body of each frame.
         carried: (n, 3, 4) [N m, N] on what each frame's joint carries.
+        distributed: (n, 3, 4) [N m, N] the part of ``bodies`` that acts along beams, or
+            zero.
     """
 
     load: NDArray
     bodies: NDArray
     carried: NDArray
+    distributed: NDArray = field(default_factory=lambda: np.zeros((3, 4)))
 
     @cached_property
     def beyond_platform(self) -> bool:
@@ -73,7 +76,7 @@ def dead_loads(
     """
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    on_bodies, carried = np.zeros((2, count, 3, 4))
+    on_bodies, carried, distributed = np.zeros((3, count, 3, 4))
     if np.any(point):
         platform = posture.robot.index(posture.robot.platform)
         on_bodies[platform] = np.outer(wrench[3:], [*np.asarray(point), 1.0])
@@ -84,8 +87,8 @@ def dead_loads(
         on_bodies[:, :, 3] += given[:, 3:]
     if gravity is not None:
         g = np.asarray(gravity, dtype=float)
-        _add_weights(posture, posture.robot.errors, g, on_bodies, carried)
-    return DeadLoads(wrench, on_bodies, carried)
+        distributed = _add_weights(posture, posture.robot.errors, g, on_bodies, carried)
+    return DeadLoads(wrench, on_bodies, carried, distributed)
 
 
 def dead_loads_of_rows(
@@ -117,9 +120,10 @@ def dead_loads_of_rows(
 
 def _add_weights(
     posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
-) -> None:
-    """Add the weights of links with a density and of bodies with a mass."""
+) -> NDArray:
+    """Add weights of bodies and links; return what of it acts along links, at tips."""
     robot, nominal = posture.robot, nominally_carried(posture)
+    distributed = np.zeros_like(on_bodies)
     for i, frame in enumerate(robot.frames):
         place = np.array([*frame.centre_of_mass, 1.0])
         on_bodies[..., i, :, :] += frame.mass * g[..., None] * place
@@ -128,8 +132,10 @@ def _add_weights(
             continue
         length, axis = beam_axis(frame)
         section = declared_section(link.section, link.poisson)
-        W = link.density * section.area * length * g[..., None]
-        on_bodies[..., i, :, :] += W * np.array([*(-length * axis / 12), 0.5])
+        W = link.density * section.area * length * g
+        at_tip = W[..., None] * np.array([*(-length * axis / 12), 0.5])
+        distributed[..., i, :, :] = at_tip
+        on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
         if parent >= 0:  # else the base carries it
             # the beam's start and tangent, seen from the parent's frame after its
@@ -142,7 +148,8 @@ def _add_weights(
             middle = (T[..., :3, 3] - along) / 2 + along / 12
             half = np.full((*middle.shape[:-1], 1), 0.5)
             row = np.concatenate([middle, half], axis=-1)[..., None, :]
-            carried[..., parent, :, :] += W * row
+            carried[..., parent, :, :] += W[..., None] * row
+    return distributed
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
@@ -233,6 +240,16 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
         body, joint = body + on_path, joint + on_path
         joint[last] -= on_path[last]
     return body, joint
+
+
+def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
+    """(n, 6) [N m, N] weights of links as they count at their tips, in axes there."""
+    T = place.body_ends
+    G = np.broadcast_to(loads.distributed, (len(T), 3, 4))
+    moment, force, _ = _read(G, T, T[:, :3, 3])
+    return np.concatenate([
+        np.einsum("nji,nj->ni", T[:, :3, :3], part) for part in (moment, force)
+    ], axis=-1)  # fmt: skip
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:

@@ -34,6 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.dead_load import (
     DeadLoads,
     dead_loads,
+    distributed_at_tips,
     work_of,
     wrenches_on_frames,
 )
@@ -241,17 +242,23 @@ class ExactAssembly:
 
     @property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on the inner through each body.
+        """(n, 6) [N m, N] of each link's spring: K_E times its deformation.
 
         At the frame where it is, after its small motions, in its axes there.
         """
         return self._through[0]
 
     @property
+    def tip_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] what the outer part exerts on each body, at its tip."""
+        own = distributed_at_tips(self.placement, self.loads)
+        return self.wrenches - own[self.cut.last]
+
+    @property
     def joint_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] the same through each joint.
 
-        They differ from :attr:`wrenches` by loads on the body, its weight for one.
+        They differ from :attr:`tip_wrenches` by loads on the body at the frame.
         """
         return self._through[1]
 

@@ -22,6 +22,7 @@ from assembly.exchange.mechanism import (
     chain,
 )
 from assembly.exchange.orientation import onto
+from assembly.exchange.springs import other_springs, springs_at_rest
 from assembly.model.robot import BASE, BeamLink, Frame, Robot, beam_axis
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.sections import declared_section
@@ -95,6 +96,10 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         BadInput: no body can be the platform.
     """
     platform = mechanism.platform or guess_platform(mechanism)
+    mechanism = _without_base(mechanism)
+    springs = springs_at_rest(mechanism)
+    left_out = mechanism.left_out + other_springs(mechanism)
+    mechanism = replace(mechanism, left_out=left_out)
     mechanism = _with_ends(replace(mechanism, platform=platform))
     carriers = {joint.parent for joint in mechanism.joints}
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
@@ -127,7 +132,8 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
         motion = {
             "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits
         }  # fmt: skip
-        name = joint.name if joint.name != BASE else f"{BASE}.joint"
+        motion["joint_stiffness"] = springs.get(joint.name)
+        name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
         after = turn.T @ joint.after
         seen = body.mass or body.name in met or body.name not in carriers
@@ -138,6 +144,19 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     closures = tuple((places[k.first][0], places[k.second][0]) for k in mechanism.loops)
     robot = Robot(mechanism.name, places[platform][0], tuple(frames), closures)
     return RobotAndMechanism(robot, mechanism, places)
+
+
+def _without_base(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with another name for a joint called as what stands still."""
+    names = {joint.name for joint in mechanism.joints}
+    if BASE not in names:
+        return mechanism
+    other = _unlike(f"{BASE}.joint", names)
+    joints = tuple(
+        replace(j, name=other) if j.name == BASE else j for j in mechanism.joints
+    )
+    taken = f'joint "{BASE}" is frame "{other}": "{BASE}" is what stands still'
+    return replace(mechanism, joints=joints, taken=(*mechanism.taken, taken))
 
 
 def guess_platform(mechanism: Mechanism) -> str:
@@ -157,11 +176,24 @@ def guess_platform(mechanism: Mechanism) -> str:
         depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
     if len(depth) == 1:
         raise BadInput(f"{mechanism.name}: found no joint, expected at least one")
-    carriers = {joint.parent for joint in mechanism.joints}
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
-    ends = [name for name in depth if name not in carriers]
+    # what only closes a loop is no body of the robot's own
+    closing = [j for j in mechanism.joints if _closes(j, mechanism)]
+    made = {joint.child for joint in closing}
+    met |= {joint.parent for joint in closing}
+    carriers = {j.parent for j in mechanism.joints if j.child not in made}
+    ends = [name for name in depth if name not in carriers | made]
     free = [name for name in ends if name not in met]
     return max(free or ends, key=lambda name: depth[name])
+
+
+def _closes(joint: Joint, mechanism: Mechanism) -> bool:
+    """Whether a joint is a part of one that closes a loop."""
+    return any(
+        loop.first == f"{loop.name}.tip"
+        and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
+        for loop in mechanism.loops
+    )
 
 
 def _with_ends(mechanism: Mechanism) -> Mechanism:

@@ -1,4 +1,4 @@
-"""``forcefit convert``: robots of other programs in and out, each proved after writing.
+"""``forcefit convert``: robots of other programs in and out, read back after writing.
 
 ============  ==========================================================  ==========
 kind          read                                                        written
@@ -11,37 +11,22 @@ kind          read                                                        writte
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from assembly.exchange.as_robot import (
-    RobotAndMechanism,
-    mechanism_of_robot,
-    points_as_joints,
-    robot_of_mechanism,
-)
+from assembly.exchange.as_robot import RobotAndMechanism, mechanism_of_robot
 from assembly.exchange.calibrated import not_rigid, with_calibration
+from assembly.exchange.conversion import Conversion
 from assembly.exchange.fidelity import FAITHFUL, largest_difference
-from assembly.exchange.home_pose import (
-    CLOSED,
-    close_loops,
-    loop_residual,
-    nearest_closed,
-)
-from assembly.exchange.loops_file import (
-    LoopsFile,
-    find_loops_file,
-    loops_text,
-    read_loops,
-    with_points,
-)
+from assembly.exchange.foreign import READERS, robot_of_file
+from assembly.exchange.home_pose import CLOSED, loop_residual, nearest_closed
+from assembly.exchange.loops_file import LoopsFile, loops_text, read_loops
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
 from assembly.exchange.mjcf_writing import mjcf_text
+from assembly.exchange.mujoco_reading import compare
 from assembly.exchange.overlay import lay_over
-from assembly.exchange.sdf import read_sdf
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
 from assembly.files.robot_file import read_robot, robot_of, robot_table, write_robot
@@ -49,10 +34,8 @@ from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Robot
 from assembly.robots import load_robot
 from forcefit.inputs.errors import BadInput, quoted
-from forcefit.inputs.table import Table
 from forcefit.inputs.writing import ROBOT, Kind, check_writable, write_text
 
-_READERS = {".urdf": read_urdf, ".xml": read_mjcf, ".sdf": read_sdf}
 _BEGINS = (XML_MARK.lower().encode(),)
 _KINDS = {
     ".toml": ROBOT,
@@ -62,68 +45,6 @@ _KINDS = {
 _LOOPS = Kind(
     "a loops file written by forcefit", (".yaml",), (b"# written by forcefit",)
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Conversion:
-    """What became of a robot.
-
-    Attributes:
-        robot: as it stands in the robot file, or as it was read from one.
-        files: written.
-        open_before: [rad, m] what the loops leave open where the file's own home is.
-        open_after: [rad, m] likewise in the home that was found.
-        drives_held: whether the drives stand where the file has them.
-        difference: largest of any body's pose in 100 random postures, read back.
-        left_out: what the new file cannot hold, in words.
-        taken: what the files leave open, and what was taken, in words.
-    """
-
-    robot: Robot
-    files: tuple[Path, ...]
-    open_before: float
-    open_after: float
-    drives_held: bool
-    difference: float
-    left_out: tuple[str, ...]
-    taken: tuple[str, ...] = ()
-
-    def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
-        return {
-            "robot": self.robot.name,
-            "platform": self.robot.platform,
-            "frames": len(self.robot.frames),
-            "closures": len(self.robot.closures),
-            "files": [str(path) for path in self.files],
-            "home": {
-                "open_before": self.open_before,
-                "open_after": self.open_after,
-                "drives_held": self.drives_held,
-            },
-            "largest_difference": self.difference,
-            "left_out": list(self.left_out),
-            "taken": list(self.taken),
-        }
-
-    def text(self) -> str:
-        """A few lines for people."""
-        robot = self.robot
-        count = len(robot.closures)
-        lines = [
-            f"{robot.name}: {len(robot.frames)} frames, "
-            f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
-            f"read back in 100 random postures: bodies within {self.difference:.1e}",
-        ]
-        if count:
-            moved = "" if self.drives_held else "; the drives had to move"
-            lines.append(
-                f"home: loops open by {self.open_before:.2g} rad or m in the file's "
-                f"own, {self.open_after:.1e} in the one found{moved}"
-            )
-        lines += [f"taken: {line}" for line in self.taken]
-        lines += [f"left out: {line}" for line in self.left_out]
-        return "\n".join([*lines, f"written: {', '.join(map(str, self.files))}"])
 
 
 def convert(
@@ -154,101 +75,54 @@ def convert(
             the same robot; nothing is written then.
     """
     source, target = Path(source), Path(target)
-    ending = target.suffix.lower()
-    if ending not in _KINDS:
-        given = f"the ending {quoted(target.suffix)}" if target.suffix else "no ending"
-        raise BadInput(f"{target}: found {given}, expected {' or '.join(_KINDS)}")
-    beside = target.with_suffix(".yaml") if ending == ".urdf" else None
-    check_writable(target, _KINDS[ending])
-    if beside is not None:
-        check_writable(beside, _LOOPS)
-    if source.suffix.lower() in _READERS:
-        conversion, placed = _from_others(source, loops, overlay, points)
-    elif points:
-        raise BadInput(f"--points: found some beside {source}, which says its own")
-    elif loops is not None:
-        raise BadInput(f"--loops: found one beside {source}, which says its own loops")
-    else:
-        conversion, placed = _declared(source, overlay), None
-    return _written(conversion, placed, target)
-
-
-def _from_others(
-    source: Path,
-    loops: Path | str | None,
-    overlay: Path | str | None,
-    points: Sequence[str] | None,
-) -> tuple[Conversion, RobotAndMechanism]:
-    """The robot of a file of another program."""
-    ending = source.suffix.lower()
-    if loops is None and ending == ".urdf":
-        loops = find_loops_file(source)
-    beside = None if loops is None else read_loops(loops)
-    if points:
-        if beside is None:
-            raise BadInput(f"--points: found some, but {source} has no loops file")
-        beside = with_points(beside, points)
-    read = _READERS[ending]
-    mechanism, taken = read(source, beside), tuple[str, ...]()
-    before = loop_residual(mechanism, mechanism.home)
-    home, held = mechanism.home, True
-    if mechanism.loops:
-        try:
-            home, held = close_loops(mechanism, str(source))
-        except BadInput as error:
-            if points is not None or beside is None or not beside.as_generated:
-                raise
-            mechanism = read(source, with_points(beside, ["all"]))
-            try:
-                home, held = close_loops(mechanism, str(source))
-            except BadInput:
-                raise error from None
-            before = loop_residual(mechanism, mechanism.home)
-            taken = (
-                "every loop for a point (3d): all of them are said to be 6d, which is "
-                "what generators write, and so they cannot close "
-                f"({str(error).removeprefix(f'{source}: ')}); --points says which are",
-            )
-    mechanism = points_as_joints(mechanism, home)
-    placed = robot_of_mechanism(mechanism)
-    content = robot_table(placed.robot)
-    root = (
-        Table(content, str(source), "")
-        if overlay is None
-        else lay_over(content, overlay)
-    )
-    robot = robot_of(root, source.stem)
-    weight = mechanism.bodies[mechanism.root].mass
-    left_out = list(mechanism.left_out)
-    if weight:
-        left_out.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
-    if mechanism.platform is None:
-        left_out.append(
-            f"no platform is named: {robot.platform} was taken, the end of the longest "
-            "chain (an overlay's platform says another)"
-        )
-    after = home_posture(robot).mismatch
-    conversion = Conversion(
-        robot=robot,
-        files=(),
-        open_before=before,
-        open_after=after,
-        drives_held=held,
-        difference=0.0,
-        left_out=tuple(left_out),
-        taken=taken,
-    )
-    return conversion, placed
-
-
-def _declared(source: Path, overlay: Path | str | None) -> Conversion:
-    """The robot of a robot file, or a built-in one."""
+    check_target(target)
+    if source.suffix.lower() in READERS:
+        conversion, placed = robot_of_file(source, loops, overlay, points)
+        return _written(conversion, placed, target)
+    for option, given in (("--points", points), ("--loops", loops)):
+        if given:
+            raise BadInput(f"{option}: found some beside {source}, which says its own")
     robot = load_robot(source)
     if overlay is not None:
         content = robot_table(robot, Path(overlay).parent)
         robot = robot_of(lay_over(content, overlay), robot.name)
+    return write_converted(robot, target)
+
+
+def check_target(target: Path) -> None:
+    """Refuse a file that could not be written, before the computation.
+
+    Args:
+        target: of the file; beside a URDF a YAML is written.
+
+    Raises:
+        BadInput: its ending is not one of a robot's files, or it or the YAML exists and
+            is another program's, or cannot be written.
+    """
+    ending = target.suffix.lower()
+    if ending not in _KINDS:
+        given = f"the ending {quoted(target.suffix)}" if target.suffix else "no ending"
+        raise BadInput(f"{target}: found {given}, expected {' or '.join(_KINDS)}")
+    check_writable(target, _KINDS[ending])
+    if ending == ".urdf":
+        check_writable(target.with_suffix(".yaml"), _LOOPS)
+
+
+def write_converted(robot: Robot, target: Path) -> Conversion:
+    """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
+
+    Args:
+        robot: any.
+        target: a ``.toml``, ``.urdf`` or ``.xml`` file.
+
+    Returns:
+        What was written and how well it is the robot.
+
+    Raises:
+        BadInput: the file cannot be written, or would be another robot.
+    """
     mismatch = home_posture(robot).mismatch
-    return Conversion(
+    conversion = Conversion(
         robot=robot,
         files=(),
         open_before=mismatch,
@@ -257,6 +131,7 @@ def _declared(source: Path, overlay: Path | str | None) -> Conversion:
         difference=0.0,
         left_out=(),
     )
+    return _written(conversion, None, target)
 
 
 def _written(
@@ -280,6 +155,11 @@ def _written(
                 write_text(text, trial.with_suffix(path.suffix))
             back = _read_back(trial)
             difference = largest_difference(replace(built, mechanism=back))
+            comparison = compare(built.mechanism, trial)
+            comparisons = (*conversion.comparisons, comparison)
+            conversion = replace(conversion, comparisons=comparisons)
+            if not comparison.agrees:
+                raise BadInput(f"{comparison.text()}; nothing is written")
     if not difference <= FAITHFUL:
         raise BadInput(
             f"{target}: what was written is another robot: bodies are off by "

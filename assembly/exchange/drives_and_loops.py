@@ -1,12 +1,19 @@
 """What a loops file adds to a robot's own: loops, drives, ball joints, a home."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from assembly.exchange.coupling import Coupling
 from assembly.exchange.loops_file import LoopsFile, unknown_name
-from assembly.exchange.mechanism import Joint, Loop, Mechanism, ball, chain
+from assembly.exchange.mechanism import (
+    Joint,
+    Loop,
+    Mechanism,
+    ball,
+    chain,
+)
 from assembly.exchange.xml_file import counted
-from forcefit.inputs.errors import BadInput
+from forcefit.inputs.errors import BadInput, quoted
 
 
 def with_loops(
@@ -47,6 +54,12 @@ def with_loops(
                 key = f"closed_loop[{i}]"
                 raise BadInput(unknown_name(loops, key, name, list(ends)))
         first, second = (ends[name] for name in pair)
+        if first == second:
+            raise BadInput(
+                f"{loops.file}: closed_loop[{i}]: found {quoted(pair[0])} and "
+                f"{quoted(pair[1])}, both of which end at {quoted(first)}; expected "
+                "two places"
+            )
         closed.append(Loop(f"loop{count + i}", first, second, point=point))
     platform = loops.platform
     if platform is not None and platform not in ends:
@@ -56,6 +69,7 @@ def with_loops(
     elif not driven and not closed:
         driven = set(parts)
     drives = {part for name in driven & set(parts) for part in parts[name]}
+    drives |= {coupling.follower for coupling in mechanism.couplings}
     joints = tuple(
         replace(
             joint,
@@ -64,7 +78,9 @@ def with_loops(
         )
         for joint in mechanism.joints
     )
+    joints = _followed(joints, mechanism.couplings, loops)
     left_out = list(mechanism.left_out)
+    left_out += _couplings_said(joints, mechanism.couplings)
     left_out += counted("keys of the loops file", list(loops.passed_over))
     if not any(joint.actuated for joint in joints):
         left_out.append("no drive is named (name_mot): every joint is passive")
@@ -75,6 +91,39 @@ def with_loops(
         platform=mechanism.platform if platform is None else ends[platform],
         left_out=tuple(left_out),
     )
+
+
+def _followed(
+    joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
+) -> tuple[Joint, ...]:
+    """Joints that follow others, at home where their leaders take them."""
+    at = {joint.name: joint.position for joint in joints}
+    for coupling in couplings:
+        name = coupling.follower
+        value = coupling.at(at.get(coupling.leader or "", 0.0))[0]
+        given = loops.home.get(name, value)
+        if abs(given - value) > 1e-9 * max(1.0, abs(value)):
+            raise BadInput(
+                f"{loops.file}: home.{name}: found {given:g}, but it follows another "
+                f"joint ({coupling.text()}); expected {value:.12g} or none"
+            )
+        at[name] = value
+    return tuple(replace(joint, position=at[joint.name]) for joint in joints)
+
+
+def _couplings_said(
+    joints: tuple[Joint, ...], couplings: Sequence[Coupling]
+) -> Iterator[str]:
+    """Joints that follow others become drives of their own, which must be said."""
+    driven = {joint.name for joint in joints if joint.actuated}
+    for coupling in couplings:
+        line = f"mimic: {coupling.text()} is a drive of its own: command it so"
+        if coupling.leader is not None and coupling.leader not in driven:
+            line += (
+                f" ({coupling.leader} is passive: no force passes from one to the "
+                "other)"
+            )
+        yield line
 
 
 def _retyped(

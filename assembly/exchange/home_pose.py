@@ -7,7 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.exchange.mechanism import Mechanism
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    Mechanism,
+)
 from assembly.exchange.orientation import onto
 from assembly.exchange.tree import place_frames
 from assembly.model.robot import JOINTS
@@ -110,7 +113,10 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
 
 def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
     """Levenberg-Marquardt from one start: the coordinates where it ends."""
-    free = loops.moving & loops.concerned & ~(hold & loops.actuated)
+    followers = [follower for follower, *_ in loops.coupled]
+    driven = loops.actuated.copy()
+    driven[followers] = False  # they go where their leaders take them
+    free = loops.moving & loops.concerned & ~(hold & driven)
     unit = np.where(loops.kinds == 2, loops.size, 1.0)
     q, damping = start.astype(float), 1e-3
     r, J = loops.equations(q)
@@ -148,7 +154,10 @@ def _size(mechanism: Mechanism) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Loops:
-    """The loops' equations; every joint turns about or slides along its own z here."""
+    """The equations of loops and of joints that follow others.
+
+    Every joint turns about or slides along its own z here.
+    """
 
     mechanism: Mechanism
     size: float
@@ -208,7 +217,22 @@ class _Loops:
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
+        # followers come after their leaders
+        for follower, leader, _ in reversed(self.coupled):
+            if leader >= 0:
+                marks[leader] |= marks[follower]
+        for follower, leader, _ in self.coupled:
+            marks[follower] |= leader >= 0 and marks[leader]
         return marks
+
+    @cached_property
+    def coupled(self) -> list[tuple[int, int, Coupling]]:
+        """Rows of follower and leader, -1 without one, and their rule."""
+        row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
+        return [
+            (row[one.follower], row.get(one.leader or "", -1), one)
+            for one in self.mechanism.couplings
+        ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """What is open, translations over the size, and its derivatives by q."""
@@ -234,4 +258,13 @@ class _Loops:
             r = np.concatenate([turn, A[:3, 3] - B[:3, 3]]) * scale
             residuals.append(r[asked])
             rows.append(((moved[0] - moved[1]) * scale[:, None])[asked])
+        for follower, leader, rule in self.coupled:
+            value, slope = rule.at(float(q[leader]) if leader >= 0 else 0.0)
+            row = np.zeros(len(q))
+            row[follower] = 1.0
+            if leader >= 0:
+                row[leader] -= slope
+            unit = self.size if self.kinds[follower] == 2 else 1.0
+            residuals.append(np.array([q[follower] - value]) / unit)
+            rows.append(row[None] / unit)
         return np.concatenate(residuals), np.vstack(rows)

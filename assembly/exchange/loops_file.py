@@ -3,8 +3,8 @@
 The convention of the example_parallel_robots: ``closed_loop`` pairs names of joints or
 links that coincide, ``type`` says ``6d`` or ``3d`` (only the points), ``name_mot``
 names the drives; ``joint_name`` and ``joint_type`` make a joint SPHERICAL, FIXED or a
-UJOINT_XY, _YZ, _ZX, which CAD exports write as one turn.  ``home`` (coordinates by
-joint) and ``platform`` are ours; other readers pass over them.
+UJOINT about two axes (_XY, _YX, ..), which CAD exports write as one turn.  ``home``
+(coordinates by joint) and ``platform`` are ours; other readers pass over them.
 
 The authors' generator writes ``6d`` for every loop, "that is not very general", and
 leaves the rest to be corrected by hand.  So a file that says nothing else may not mean
@@ -25,8 +25,9 @@ from forcefit.inputs.table import Table, read_text
 _KNOWN = (
     "closed_loop", "type", "name_mot", "joint_name", "joint_type", "home", "platform",
 )  # fmt: skip
-TURNS = {"FIXED": "", "SPHERICAL": "xyz", "UJOINT_XY": "xy", "UJOINT_YZ": "yz",
-         "UJOINT_ZX": "zx"}  # fmt: skip
+TURNS = {"FIXED": "", "SPHERICAL": "xyz"} | {
+    f"UJOINT_{axes.upper()}": axes for axes in ("xy", "yz", "zx", "yx", "zy", "xz")
+}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.coupling import Coupling
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import UNIT_VECTORS, rotation_matrix, transform
 
@@ -51,6 +52,8 @@ class Joint:
         position: [rad or m] coordinate at home.
         actuated: whether a drive holds it.
         limits: [rad or m] least and largest coordinate, None where it has none.
+        stiffness: [N m/rad or N/m] of a spring in its freedom, 0 without one.
+        rest: [rad or m] coordinate at which that spring carries nothing.
     """
 
     name: str
@@ -63,6 +66,8 @@ class Joint:
     position: float = 0.0
     actuated: bool = False
     limits: tuple[float, float] | None = None
+    stiffness: float = 0.0
+    rest: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +103,9 @@ class Mechanism:
         loops: pairs of places that meet.
         platform: name of a body, None where the file does not say.
         left_out: what the file says and a mechanism cannot hold, in words.
+        taken: what the file leaves open, and what was taken, in words.
+        couplings: joints that follow others, no leader after its follower.
+        unweighed: names of bodies whose mass is that of meshes, which are not read.
     """
 
     name: str
@@ -107,6 +115,9 @@ class Mechanism:
     loops: tuple[Loop, ...] = ()
     platform: str | None = None
     left_out: tuple[str, ...] = ()
+    taken: tuple[str, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    unweighed: tuple[str, ...] = ()
 
     @property
     def home(self) -> NDArray:

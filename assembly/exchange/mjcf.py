@@ -2,62 +2,79 @@
 
 Sources:
     MuJoCo documentation, XML reference: angles are in degrees unless the compiler says
-    radian; joints turn at ``pos`` in the body, in the order written; connect and weld
-    hold what coincides in the initial configuration unless sites or relpose say more.
+    radian; joints turn at ``pos`` in the body, in the order written; a ``frame`` places
+    what stands in it and is no body.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.coupling import leaders_first
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
     WORLD,
     Body,
     Joint,
-    Loop,
     Mechanism,
-    ball,
     body_poses,
-    motion,
     parents_first,
 )
-from assembly.exchange.mjcf_orientation import Angles, orientation
+from assembly.exchange.mjcf_expansion import SEQUENCE, UNIT, expanded
+from assembly.exchange.mjcf_joint import at_key, one_freedom, several_freedoms
+from assembly.exchange.mjcf_mass import MassRules, body_of, shape_mass, written_mass
+from assembly.exchange.mjcf_orientation import Angles, orientation, site_pose
+from assembly.exchange.mjcf_ties import LOADED, Ties
 from assembly.exchange.xml_file import Node, counted, placed, read_xml
 from forcefit.inputs.errors import nearest, quoted
-from stiffness.screws import transform
 
 _ZERO = np.zeros(3)
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
-_REFUSED = ("include", "replicate", "attach", "composite", "flexcomp")
-_JOINT = {"name", "type", "pos", "axis", "ref", "class", "range", "limited"}
-_HELD = ("body", "joint", "freejoint", "inertial", "site", "frame")
+_REFUSED = ("composite", "flexcomp", "flex")
+_SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "default",
+             "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
+             "tendon", "actuator")  # fmt: skip
+_READ = ("name", "type", "pos", "axis", "ref", "class")  # of a joint
+_SPRING = ("stiffness", "springref")
+_RANGE = ("range", "limited")
+_COUNTS = {"ball": 4, "free": 7}  # of a joint's numbers in a key
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where elements stand: their body, (4, 4) in it, defaults and unit of angles."""
+
+    body: str
+    offset: NDArray
+    childclass: str
+    angles: Angles
 
 
 @dataclass
 class _Reading:
     """What is gathered while the bodies of a file are walked through."""
 
-    angles: Angles
+    rules: MassRules
     defaults: dict[str, dict[str, dict[str, str]]]
     bodies: dict[str, Body] = field(default_factory=lambda: {WORLD: Body(WORLD)})
     joints: list[Joint] = field(default_factory=list)
     parts: dict[str, list[str]] = field(default_factory=dict)
     sites: dict[str, tuple[str, NDArray]] = field(default_factory=dict)
     extra: dict[str, list[str]] = field(default_factory=dict)
-    coordinates: list[str | int] = field(default_factory=list)  # order of qpos
+    coordinates: dict[str, str] = field(default_factory=dict)  # kinds, in order of qpos
+    number: int = 0  # of bodies so far
+    unweighed: list[str] = field(default_factory=list)
 
 
 def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     """Mechanism of an MJCF file.
 
     Args:
-        path: the file.
+        path: the file; others that it includes or attaches are read too.
         loops: a file that adds to its loops and drives, or None.
 
     Returns:
@@ -66,39 +83,43 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     Raises:
         BadInput: a rule of the format is broken, or an element is not known here.
     """
-    root = read_xml(path, "mujoco")
-    for tag in _REFUSED:
-        for element in root.element.iter(tag):
-            raise Node(element, root.file).bad(
-                "", "found it; expected one file in which every body is written out"
-            )
-    reading = _Reading(Angles.of(root), _defaults(root))
-    world = root.child("worldbody")
-    if world is None:
+    root = expanded(read_xml(path, "mujoco"))
+    for node in root.descendants():
+        if node.tag in _REFUSED:
+            raise node.bad("", "found it; expected rigid bodies written out")
+    reading = _Reading(MassRules.of(root), _defaults(root))
+    if root.child("worldbody") is None:
         raise root.bad("worldbody", "missing")
-    _walk(world, WORLD, np.eye(4), "main", reading)
-    joints, mimics = _coupled(root, reading)
-    base, order = parents_first(joints, reading.bodies, str(path))
+    for world in root.children("worldbody"):
+        _walk(world, _Place(WORLD, np.eye(4), "main", Angles.of(root)), reading)
+    for node in root.children():
+        if node.tag not in _SECTIONS:
+            reading.extra.setdefault(f"element {node.tag}", []).append("")
+    base, order = parents_first(reading.joints, reading.bodies, str(path))
     mechanism = Mechanism(
-        name=root.text("model", Path(path).stem), root=base, bodies=reading.bodies,
-        joints=order,
+        name=root.text("model", Path(path).stem), root=base,
+        bodies=reading.rules.applied(reading.bodies), joints=order,
     )  # fmt: skip
+    rests = {j.name: j.position for j in order if j.name in reading.coordinates}
+    equality = reading.defaults["main"].get("equality", {})
+    ties = Ties(root, equality, reading.sites, rests, reading.parts, reading.extra)
     # constraints hold where the file is written, before any key
-    closed = tuple(_loops(root, reading, body_poses(mechanism, mechanism.home)))
-    mechanism = replace(mechanism, joints=_at_key(root, reading, order))
-    extra = {k: v for k, v in reading.extra.items() if v}
-    left_out = tuple(line for k, v in extra.items() for line in counted(k, v))
-    mechanism = replace(mechanism, loops=closed, left_out=left_out + mimics)
-    driven = {
-        node.text("joint")
-        for group in root.children("actuator")
-        for node in group.children()
-        if node.has("joint")
-    }
-    for name in driven - set(reading.parts):
-        hint = nearest(name, reading.parts)
-        raise root.bad("actuator", f"found {quoted(name)}, no joint{hint}")
-    mechanism = replace(mechanism, platform=_platform(root, reading))
+    closed = tuple(ties.loops(body_poses(mechanism, mechanism.home)))
+    driven = ties.driven()
+    couplings = leaders_first(list(ties.couplings(driven)), str(path))
+    ties.tendons()
+    joints = _at_key(root, reading, order)
+    left_out = tuple(line for k, v in reading.extra.items() for line in counted(k, v))
+    free = [name for name, kind in reading.coordinates.items() if kind == "free"]
+    floating = counted("free joints that no loop ties to the ground", free)
+    unweighed = tuple(reading.unweighed)
+    if unweighed and reading.rules.total > 0:  # all masses depend on theirs
+        unweighed = tuple(name for name in reading.bodies if name != WORLD)
+    mechanism = replace(
+        mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
+        platform=_platform(root, reading), unweighed=unweighed,
+        taken=() if closed else floating,
+    )  # fmt: skip
     return with_loops(mechanism, loops, reading.parts, driven)
 
 
@@ -119,13 +140,18 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         own = {tag: dict(values) for tag, values in inherited.items()}
         for inner in node.children():
             if inner.tag != "default":
+                # connect, weld and joint of constraints share their defaults
                 own.setdefault(inner.tag, {}).update(inner.element.attrib)
         classes[name] = own
         for inner in node.children("default"):
             gather(inner, own, inner.text("class"))
 
     for node in root.children("default"):
-        gather(node, classes["main"], node.text("class", "main"))
+        name = node.text("class", "main")
+        attached = node.has("attached")
+        gather(node, {} if attached else classes["main"], name)
+        if not attached:  # the outermost class is main, whatever it is called
+            classes["main"] = classes[name]
     return classes
 
 
@@ -141,129 +167,119 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
     return Node(element, node.file)
 
 
-def _walk(
-    node: Node, body: str, offset: NDArray, childclass: str, reading: _Reading
-) -> None:
-    """What stands in a body, or in a frame at an offset inside of it."""
+def _inside(frame: Node, place: _Place) -> _Place:
+    """Where the elements of a frame stand."""
+    T = place.offset @ _pose(frame, place.angles)
+    angles = place.angles
+    if frame.has(UNIT):  # of another model
+        angles = Angles(frame.number(UNIT, "rad"), frame.text(SEQUENCE))
+    return _Place(place.body, T, frame.text("childclass", place.childclass), angles)
+
+
+def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
+    """Elements of a body as they are written, in frames too, bodies not opened."""
     for inner in node.children():
+        if inner.tag == "frame":
+            yield from _elements(inner, _inside(inner, place))
+        else:
+            yield inner, place
+
+
+def _walk(node: Node, place: _Place, reading: _Reading) -> None:
+    """What stands in a body beside its joints and its mass."""
+    for inner, at in _elements(node, place):
         if inner.tag == "body":
-            _add_body(inner, body, offset, childclass, reading)
-        elif inner.tag == "frame":
-            at = offset @ _pose(inner, reading)
-            _walk(inner, body, at, inner.text("childclass", childclass), reading)
+            _add_body(inner, at, reading)
         elif inner.tag == "site":
-            site = _filled(inner, childclass, reading)
+            site = _filled(inner, at.childclass, reading)
             if site.has("name"):
-                at = offset @ _pose(site, reading)
-                reading.sites[site.text("name")] = body, at
-        elif inner.tag not in _HELD:
+                T = at.offset @ site_pose(site, at.angles)
+                reading.sites[site.text("name")] = at.body, T
+        elif inner.tag not in {"joint", "freejoint", "inertial"}:
             name = inner.text("name", "")
             reading.extra.setdefault(inner.tag, []).append(name)
 
 
-def _add_body(
-    node: Node, parent: str, offset: NDArray, childclass: str, reading: _Reading
-) -> None:
+def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
     """A body, the joints it stands on, and all inside of it."""
-    name = node.text("name", f"body{len(reading.bodies)}")
+    reading.number += 1
+    name = node.optional("name") or f"body{reading.number}"
     if name in reading.bodies:
         raise node.bad("name", "found it twice; expected names that differ")
-    childclass = node.text("childclass", childclass)
-    at = offset @ _pose(node, reading)
-    mass, centre = 0.0, _ZERO
-    inertial = node.child("inertial")
-    if inertial is not None:
-        mass = inertial.number("mass", "kg")
-        centre = inertial.numbers("pos", 3, "m", _ZERO)
-    elif node.child("geom") is not None:
-        reading.extra.setdefault("masses that MuJoCo makes of shapes", []).append(name)
-    reading.bodies[name] = Body(name, mass, centre)
-    freedoms = list(_freedoms(node, name, childclass, reading))
+    childclass = node.text("childclass", at.childclass)
+    place = _Place(name, np.eye(4), childclass, at.angles)
+    reading.bodies[name] = _massive(node, place, reading)
+    freedoms = list(_freedoms(node, place, reading))
+    T = at.offset @ _pose(node, at.angles)
     if not freedoms:
-        reading.joints.append(Joint(f"{name}.joint", "fixed", parent, name, at))
-    on = parent
+        reading.joints.append(Joint(f"{name}.joint", "fixed", at.body, name, T))
+    on = at.body
     for i, joint in enumerate(freedoms):
         last = i == len(freedoms) - 1
         child = name if last else f"{joint.name}.after"
         if not last:
             reading.bodies[child] = Body(child)
-        placement = at @ joint.placement if i == 0 else joint.placement
+        placement = T @ joint.placement if i == 0 else joint.placement
         reading.joints.append(
             replace(joint, parent=on, child=child, placement=placement)
         )
         on = child
-    _walk(node, name, np.eye(4), childclass, reading)
+    _walk(node, place, reading)
 
 
-def _freedoms(
-    node: Node, body: str, childclass: str, reading: _Reading
-) -> Iterator[Joint]:
+def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
+    """A body with its mass, of what is written and of its shapes."""
+    written, shapes = None, []
+    for inner, at in _elements(node, place):
+        if inner.tag == "inertial":
+            written = written_mass(inner, at.offset)
+        elif inner.tag == "geom":
+            geom = _filled(inner, at.childclass, reading)
+            T = at.offset @ site_pose(geom, at.angles)
+            made = shape_mass(geom, T, reading.rules)
+            if made is not None:
+                shapes.append(made)
+            elif place.body not in reading.unweighed:
+                reading.unweighed.append(place.body)
+    kind = reading.rules.from_shapes
+    if kind == "false" or (written is not None and kind == "auto"):
+        reading.unweighed = [one for one in reading.unweighed if one != place.body]
+    return body_of(place.body, written, shapes, reading.rules)
+
+
+def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
     """The joints of a body, of one freedom each, in the body's axes."""
-    for inner in node.children("joint", "freejoint"):
-        given = _filled(inner, childclass, reading)
-        name = given.text("name", f"{body}.joint{len(reading.parts) + 1}")
+    number = 0
+    for inner, at in _elements(node, place):
+        if inner.tag not in {"joint", "freejoint"}:
+            continue
+        number += 1
+        given = _filled(inner, at.childclass, reading)
+        name = given.optional("name") or f"{place.body}.joint{number}"
         if name in reading.parts:
             raise inner.bad("name", "found it twice; expected names that differ")
         kind = "free"
         if inner.tag == "joint":
             kind = _KINDS[given.choice("type", tuple(_KINDS), "hinge")]
-        if kind == "free":
-            reading.extra.setdefault("free joints, held at rest", []).append(body)
-            reading.coordinates.append(7)
-            continue
-        for key in given.element.attrib:
-            if key not in _JOINT:
-                reading.extra.setdefault(f"joint {key}", []).append(name)
-        anchor = given.numbers("pos", 3, "m", _ZERO)
-        placement, back = placed(anchor, np.eye(3)), placed(-anchor, np.eye(3))
-        if kind == "ball":
-            turns = ball()
-            reading.parts[name] = [f"{name}.{part}" for part, _, _ in turns]
-            reading.coordinates.append(4)
-            for i, (part, turn, axis) in enumerate(turns):
-                first, last = i == 0, i == len(turns) - 1
-                yield Joint(
-                    f"{name}.{part}", turn, "", "",
-                    placement=placement if first else np.eye(4), axis=axis,
-                    after=back if last else np.eye(4),
-                )  # fmt: skip
-            continue
-        reading.parts[name] = [name]
-        reading.coordinates.append(name)
-        axis = given.unit_vector("axis", np.array([0.0, 0.0, 1.0]))
-        ref = given.number("ref", "angle or m", 0.0)
-        ref *= reading.angles.unit if kind == "revolute" else 1.0
-        joint = Joint(
-            name=name,
-            kind=kind,
-            parent="",
-            child="",
-            placement=placement,
-            axis=axis,
-            after=back,
-            limits=_limits(given, kind, reading.angles),
-        )
-        # the coordinate at rest is ref: the joint's own zero lies before it
-        yield replace(joint, placement=placement @ motion(joint, -ref), position=ref)
+            simple = kind != "ball" and len(given.optional("stiffness").split()) < 2
+            read = (*_READ, *_SPRING) if simple else _READ
+            read = read if kind == "ball" else (*read, *_RANGE)
+            for key in given.element.attrib:
+                if key not in read:
+                    what = f"joint {key}{LOADED if key in _SPRING else ''}"
+                    reading.extra.setdefault(what, []).append(name)
+        reading.coordinates[name] = kind
+        if kind in _COUNTS:
+            several = several_freedoms(given, name, kind, at.offset)
+        else:
+            several = [one_freedom(given, name, kind, at.offset, at.angles)]
+        reading.parts[name] = [joint.name for joint in several]
+        yield from several
 
 
-def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
-    """Range of a hinge or slide; ``limited`` absent means that a range binds."""
-    limited = node.text("limited", "auto")
-    binds = limited == "true" or (limited == "auto" and angles.range_limits)
-    if not node.has("range") or not binds:
-        return None
-    ends = node.text("range").split()
-    if len(ends) != 2:
-        raise node.bad("range", f"found {quoted(' '.join(ends))}, expected 2 numbers")
-    unit = angles.unit if kind == "revolute" else 1.0
-    return node.limits(ends[0], ends[1], unit)
-
-
-def _pose(node: Node, reading: _Reading) -> NDArray:
+def _pose(node: Node, angles: Angles) -> NDArray:
     """(4, 4) of an element with ``pos`` and any kind of orientation."""
-    shift = node.numbers("pos", 3, "m", _ZERO)
-    return placed(shift, orientation(node, reading.angles))
+    return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 
 def _at_key(
@@ -271,87 +287,17 @@ def _at_key(
 ) -> tuple[Joint, ...]:
     """Joints at the positions of the key named home."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
+    counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:
-        if key.text("name", "") != "home" or not key.has("qpos"):
-            reading.extra.setdefault("key", []).append(key.text("name", ""))
+        if key.optional("name") != "home" or not key.has("qpos"):
+            reading.extra.setdefault("key", []).append(key.optional("name"))
             continue
-        counts = [1 if isinstance(c, str) else c for c in reading.coordinates]
-        values = key.numbers("qpos", sum(counts), "rad or m")
-        at = dict(zip(reading.coordinates, np.cumsum([0, *counts[:-1]]), strict=False))
-        if 4 in counts:
-            reading.extra.setdefault("ball joints' turn in the key", []).append("home")
-        joints = tuple(
-            replace(j, position=float(values[at[j.name]])) if j.name in at else j
-            for j in joints
-        )
+        values = key.numbers("qpos", sum(counts.values()), "rad or m")
+        place = {joint.name: i for i, joint in enumerate(joints)}
+        moved, at = list(joints), 0
+        for name, count in counts.items():
+            i = place[reading.parts[name][0]]
+            moved[i] = at_key(key, moved[i], values[at : at + count])
+            at += count
+        joints = tuple(moved)
     return joints
-
-
-def _coupled(root: Node, reading: _Reading) -> tuple[list[Joint], tuple[str, ...]]:
-    """Joints that follow another become drives of their own, which must be said."""
-    joints, remarks = list(reading.joints), []
-    for group in root.children("equality"):
-        for node in group.children("joint"):
-            name = node.text("joint1")
-            if name not in reading.parts:
-                hint = nearest(name, reading.parts)
-                raise node.bad("joint1", f"found {quoted(name)}, no joint{hint}")
-            joints = [
-                replace(j, actuated=True) if j.name == name else j for j in joints
-            ]
-            remarks.append(
-                f"mimic: {name} follows {node.text('joint2', 'a constant')}: it is a "
-                "drive of its own, command it so"
-            )
-    return joints, tuple(remarks)
-
-
-def _loops(root: Node, reading: _Reading, poses: dict[str, NDArray]) -> Iterator[Loop]:
-    """``connect`` and ``weld`` as loops."""
-    count = 0
-    for group in root.children("equality"):
-        for node in group.children():
-            if node.tag == "joint":
-                continue
-            if (
-                node.tag not in {"connect", "weld"}
-                or node.text("active", "") == "false"
-            ):
-                reading.extra.setdefault(f"equality {node.tag}", []).append(
-                    node.text("name", "")
-                )
-                continue
-            count += 1
-            point = node.tag == "connect"
-            name = node.text("name", f"loop{count}")
-            if node.has("site1"):
-                (a, A), (b, B) = (
-                    _known(node, key, reading.sites) for key in ("site1", "site2")
-                )
-                yield Loop(name, a, b, A, B, point)
-                continue
-            a = _known(node, "body1", {k: k for k in poses})
-            b = WORLD
-            if node.has("body2"):
-                b = _known(node, "body2", {k: k for k in poses})
-            A, B = np.eye(4), np.eye(4)
-            back = np.linalg.inv(poses[b]) @ poses[a]
-            if point:
-                A = placed(node.numbers("anchor", 3, "m"), np.eye(3))
-                B = transform((back @ A)[:3, 3], np.eye(3))
-            else:
-                given = node.numbers("relpose", 7, "m, -", np.zeros(7))
-                B = back
-                if given[3:].any():
-                    # of body2 seen from body1
-                    A = placed(given[:3], Angles.quaternion(given[3:]))
-                    B = np.eye(4)
-            yield Loop(name, a, b, A, B, point)
-
-
-def _known(node: Node, key: str, valid: dict[str, Any]) -> Any:
-    """What a name stands for."""
-    name = node.text(key)
-    if name not in valid:
-        raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")
-    return valid[name]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exchange.orientation import from_euler, from_quaternion, onto
-from assembly.exchange.xml_file import Node
+from assembly.exchange.xml_file import Node, placed
 from stiffness.screws import rotation_matrix
 
 
@@ -40,11 +40,6 @@ class Angles:
         return Angles(
             1.0 if unit == "radian" else math.pi / 180, sequence, automatic == "true"
         )
-
-    @staticmethod
-    def quaternion(q: NDArray) -> NDArray:
-        """(3, 3) of ``[w x y z]``."""
-        return from_quaternion(q)
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:
@@ -84,3 +79,30 @@ def orientation(node: Node, angles: Angles) -> NDArray:
     if node.has("zaxis"):
         return onto(node.unit_vector("zaxis"))
     return np.eye(3)
+
+
+def site_pose(node: Node, angles: Angles) -> NDArray:
+    """(4, 4) of a site or shape, which may be placed by its two ends.
+
+    Args:
+        node: with ``pos`` and an orientation, or ``fromto``.
+        angles: how its file writes them.
+
+    Returns:
+        Its place; by two ends the middle between them, z from the second to the first.
+
+    Raises:
+        BadInput: both ``pos`` and ``fromto``, or two ends that are one.
+    """
+    if not node.has("fromto"):
+        return placed(
+            node.numbers("pos", 3, "m", np.zeros(3)), orientation(node, angles)
+        )
+    ends = node.numbers("fromto", 6, "m")
+    along = ends[:3] - ends[3:]
+    length = float(np.linalg.norm(along))
+    if node.has("pos") or length < 1e-12:
+        raise node.bad(
+            "fromto", "expected two different points, and no pos beside them"
+        )
+    return placed((ends[:3] + ends[3:]) / 2, onto(along / length))

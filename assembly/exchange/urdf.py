@@ -5,12 +5,13 @@ Sources:
     frame after its motion; an absent axis is x; rpy are turns about fixed axes.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from assembly.exchange.coupling import Coupling, leaders_first
 from assembly.exchange.drives_and_loops import with_loops
 from assembly.exchange.loops_file import LoopsFile
 from assembly.exchange.mechanism import (
@@ -18,18 +19,16 @@ from assembly.exchange.mechanism import (
     Body,
     Joint,
     Mechanism,
-    ball,
     chain,
     parents_first,
-    slides,
 )
-from assembly.exchange.orientation import from_roll_pitch_yaw, onto
-from assembly.exchange.xml_file import Node, counted, placed, read_xml
+from assembly.exchange.ties import may_tie, refuse_ties
+from assembly.exchange.urdf_joint import joint_freedoms, pose_of
+from assembly.exchange.urdf_loops import with_closing_joints
+from assembly.exchange.xml_file import Node, counted, read_xml
 from forcefit.inputs.errors import BadInput, quoted
 
-_ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute",
-                "prismatic": "prismatic", "fixed": "fixed"}  # fmt: skip
-_KINDS = (*_ONE_FREEDOM, "spherical", "universal", "planar", "floating")
+_CONVERTED = ("link", "joint", "material", "transmission", "loop_joint")
 _ZERO = np.zeros(3)
 _DRAWN = ("visual", "collision")
 _HELD = {"origin", "parent", "child", "axis", "mimic"}
@@ -50,6 +49,9 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
         BadInput: a rule of the format is broken, or a joint is of no known type.
     """
     root = read_xml(path, "robot")
+    for node in root.descendants():
+        if node.tag.startswith("xacro:"):
+            raise node.bad("", "found a macro, expected the URDF that xacro makes")
     bodies: dict[str, Body] = {}
     for node in root.children("link"):
         body = _body(node)
@@ -58,29 +60,37 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
         bodies[body.name] = body
     if not bodies:
         raise BadInput(f"{path}: link: missing; expected at least one")
-    nodes = list(root.children("joint"))
+    links = dict(bodies)
+    nodes = [node for node in root.children() if node.tag.split(":")[-1] == "joint"]
     joints: dict[str, Joint] = {}
     parts: dict[str, list[str]] = {}
     for node in nodes:
         several, between = _joints(node)
-        name = node.text("name")
-        if name in parts:
-            raise node.bad("name", "found it twice; expected names that differ")
-        parts[name] = [joint.name for joint in several]
+        _add(node, parts, several)
         joints |= {joint.name: joint for joint in several}
         bodies |= {body.name: body for body in between}
-    joints, mimics = _follow_mimics(nodes, joints)
+    couplings = leaders_first(list(_couplings(nodes, joints)), str(path))
     base, order = parents_first(list(joints.values()), bodies, str(path))
     mechanism = Mechanism(
         name=root.text("name", Path(path).stem),
         root=base,
         bodies=bodies,
         joints=order,
-        left_out=_left_out(root, nodes) + mimics,
+        left_out=_left_out(root, nodes, links),
+        couplings=couplings,
     )
+    mechanism = with_closing_joints(mechanism, root, parts)
     transmissions = root.children("transmission")
     driven = {n.text("name") for t in transmissions for n in t.children("joint")}
     return with_loops(mechanism, loops, parts, driven)
+
+
+def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
+    """Take up the parts of a joint, whose name must be new."""
+    name = node.text("name")
+    if name in parts:
+        raise node.bad("name", "found it twice; expected names that differ")
+    parts[name] = [joint.name for joint in several]
 
 
 def _body(node: Node) -> Body:
@@ -99,8 +109,6 @@ def _body(node: Node) -> Body:
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
     """A joint as joints of one freedom, and the bodies between them."""
-    name = node.text("name")
-    kind = node.choice("type", _KINDS, "")
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)
@@ -109,31 +117,19 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
         ends.append(end.text("link"))
     origin = node.child("origin")
     placement = HERE if origin is None else pose_of(origin)
-    if kind in _ONE_FREEDOM:
-        axis = np.array([0.0, 0.0, 1.0])
-        if kind != "fixed":
-            axis = _axis(node, "axis", np.array([1.0, 0.0, 0.0]))
-        one = _ONE_FREEDOM[kind]
-        joint = Joint(name, one, ends[0], ends[1], placement, axis)
-        return [replace(joint, limits=_limits(node, kind))], []
-    freedoms = ball()
-    if kind == "floating":
-        freedoms = slides() + ball()
-    elif kind == "universal":
-        first = _axis(node, "axis", np.array([1.0, 0.0, 0.0]))
-        second = _axis(node, "axis2", onto(first)[:, 1])
-        freedoms = [("first", "revolute", first), ("second", "revolute", second)]
-    elif kind == "planar":
-        turn = onto(_axis(node, "axis", np.array([1.0, 0.0, 0.0])))
-        freedoms = [("tx", "prismatic", turn[:, 0]), ("ty", "prismatic", turn[:, 1]),
-                    ("rz", "revolute", turn[:, 2])]  # fmt: skip
-    return chain(name, ends[0], ends[1], placement, HERE, freedoms)
+    freedoms = joint_freedoms(node)
+    name = node.text("name")
+    if len(freedoms) > 1:
+        return chain(name, ends[0], ends[1], placement, HERE, freedoms)
+    ((_, kind, axis),) = freedoms
+    joint = Joint(name, kind, ends[0], ends[1], placement, axis)
+    return [replace(joint, limits=_limits(node))], []
 
 
-def _limits(node: Node, kind: str) -> tuple[float, float] | None:
+def _limits(node: Node) -> tuple[float, float] | None:
     """Range of a joint, None of one that is continuous or says none."""
     limit = node.child("limit")
-    if limit is None or kind in {"fixed", "continuous"}:
+    if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
     # absent means 0 in the format; both absent is how files say that there are none
@@ -141,43 +137,31 @@ def _limits(node: Node, kind: str) -> tuple[float, float] | None:
     return None if ends == (None, None) else limit.limits(lower, upper)
 
 
-def pose_of(origin: Node) -> NDArray:
-    """(4, 4) of an element with ``xyz`` and ``rpy``."""
-    turn = from_roll_pitch_yaw(origin.numbers("rpy", 3, "rad", _ZERO))
-    return placed(origin.numbers("xyz", 3, "m", _ZERO), turn)
-
-
-def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
-    """(3,) unit direction of an element inside a joint."""
-    axis = node.child(tag)
-    return default if axis is None else axis.unit_vector("xyz", default)
-
-
-def _follow_mimics(
-    nodes: list[Node], joints: dict[str, Joint]
-) -> tuple[dict[str, Joint], tuple[str, ...]]:
-    """Joints that follow another become drives of their own, which must be said."""
-    remarks = []
+def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
+    """Joints that follow another (``<mimic>``)."""
     for node in nodes:
         mimic = node.child("mimic")
         if mimic is None:
             continue
         name, leader = node.text("name"), mimic.text("joint")
-        if leader not in joints or name not in joints:
-            raise mimic.bad("joint", f"found {quoted(leader)}, no joint of one freedom")
+        for one in (leader, name):
+            if one not in joints or joints[one].kind == "fixed":
+                raise mimic.bad(
+                    "joint", f"found {quoted(one)}, no joint of one freedom"
+                )
         factor = mimic.number("multiplier", "-", 1.0)
-        offset = mimic.number("offset", "rad or m", 0.0)
-        joints = joints | {name: replace(joints[name], actuated=True, position=offset)}
-        remarks.append(
-            f"mimic: {name} = {factor:g} * {leader} + {offset:g} is a drive of its "
-            "own: command it so"
-        )
-    return joints, tuple(remarks)
+        yield Coupling(name, leader, (mimic.number("offset", "rad or m", 0.0), factor))
 
 
-def _left_out(root: Node, joints: list[Node]) -> tuple[str, ...]:
+def _left_out(
+    root: Node, joints: list[Node], bodies: Mapping[str, Body]
+) -> tuple[str, ...]:
     """What a URDF says and a robot of frames cannot hold."""
     links = list(root.children("link"))
+    owners = {name: name for name in bodies}
+    # Drake's frames on links
+    owners |= {f.optional("name"): f.optional("link") for f in root.children("frame")}
+    named = {*bodies, *(joint.text("name") for joint in joints)}
     extra: dict[str, list[str]] = {}
     for joint in joints:
         for inner in joint.children():
@@ -197,6 +181,13 @@ def _left_out(root: Node, joints: list[Node]) -> tuple[str, ...]:
             elif inner.child("inertia") is not None:
                 extra.setdefault("moments of inertia", []).append(link.text("name"))
     for other in root.children():
-        if other.tag not in {"link", "joint", "material", "transmission"}:
+        if other.tag.split(":")[-1] not in _CONVERTED:
+            for inner in other.children() if other.tag == "gazebo" else (other,):
+                if inner.tag != "joint":
+                    refuse_ties(inner, owners)
+                said = may_tie(inner, named)
+                if said:
+                    name = inner.optional("name") or other.optional("reference")
+                    extra.setdefault(f"{inner.tag}{said}", []).append(name)
             extra.setdefault(f"element {other.tag}", []).append("")
     return tuple(line for what, names in extra.items() for line in counted(what, names))

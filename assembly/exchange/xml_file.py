@@ -1,6 +1,7 @@
 """XML files read: no entities, no other file, and every mistake one message."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,10 @@ from forcefit.inputs.table import read_text
 from stiffness.screws import transform
 
 _DEEPEST = 200  # elements inside elements
+# comments, which others let hold "--", and declarations, which they let stand late
+_SKIPPED = re.compile(
+    r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
+)
 
 _ENDLESS = 1e3  # [rad or m] limits as far as this bind nothing
 
@@ -52,6 +57,24 @@ class Node:
             if not tags or element.tag in tags:
                 yield Node(element, self.file)
 
+    def descendants(self) -> Iterator["Node"]:
+        """All elements inside, at any depth, and this one first."""
+        for element in self.element.iter():
+            yield Node(element, self.file)
+
+    @property
+    def content(self) -> str:
+        """Text of the element without blanks around it."""
+        return (self.element.text or "").strip()
+
+    def names_in(self, valid: Container[str]) -> list[str]:
+        """Which of some names the element holds, in attributes and texts, in order."""
+        found: dict[str, None] = {}
+        for node in self.descendants():
+            words = [*node.element.attrib.values(), node.content]
+            found |= {word: None for word in map(str.strip, words) if word in valid}
+        return list(found)
+
     def child(self, tag: str) -> "Node | None":
         """The first element inside of this name, None without one."""
         return next(self.children(tag), None)
@@ -59,6 +82,10 @@ class Node:
     def has(self, key: str) -> bool:
         """Whether an attribute is there."""
         return self.element.get(key) is not None
+
+    def optional(self, key: str) -> str:
+        """An attribute's text without blanks around it, empty if absent or empty."""
+        return str(self.element.get(key, "")).strip()
 
     def text(self, key: str, default: str | None = None) -> str:
         """An attribute's text.
@@ -163,47 +190,69 @@ class Node:
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
 
-def read_xml(path: Path | str, root: str) -> Node:
-    """Root element of an XML file.
+def read_xml(path: Path | str, *roots: str) -> Node:
+    """Root element of an XML file, as tolerant readers of robots take it.
 
     Args:
         path: the file.
-        root: name that its root element must have.
+        roots: names that its root element may have.
 
     Returns:
-        The element.
+        The element.  Namespaces are not resolved: a name keeps its prefix, known or
+        not, and ``xmlns`` changes nothing.
 
     Raises:
         BadInput: the file cannot be read, is not XML, declares entities or a document
             type, or is something else.
     """
-    from xml.etree.ElementTree import ParseError
-
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
-    text = read_text(path)
-    try:
-        element = fromstring(text, forbid_dtd=True)
-    except ParseError as error:  # its text ends with line and column
-        reason = one_line(str(error), 200)
-        raise BadInput(f"{path}: not valid XML: {reason}") from None
-    except DefusedXmlException:
-        raise BadInput(
-            f"{path}: found a document type or an entity, expected neither: what they "
-            "name would be read too"
-        ) from None
-    except ValueError as error:
-        raise BadInput(f"{path}: not valid XML: {one_line(str(error), 200)}") from None
-    if element.tag != root:
+    text = _SKIPPED.sub(_blank_lines, read_text(path))
+    element = _parsed(text, path)
+    if element.tag not in roots:
         tag = quoted(str(element.tag))
-        raise BadInput(f"{path}: found the root element {tag}, expected {root}")
+        expected = " or ".join(roots)
+        raise BadInput(f"{path}: found the root element {tag}, expected {expected}")
     layer, depth = [element], 0
     while layer:
         layer, depth = [inner for outer in layer for inner in outer], depth + 1
         if depth > _DEEPEST:
             raise BadInput(f"{path}: elements stand more than {_DEEPEST} deep")
     return Node(element, str(path))
+
+
+def _parsed(text: str, path: Path | str) -> Any:
+    """Root element of a text without entities and document types."""
+    from xml.etree.ElementTree import TreeBuilder
+    from xml.parsers.expat import ExpatError, ParserCreate
+
+    def refuse(*_: object) -> int:
+        raise BadInput(
+            f"{path}: found a document type or an entity, expected neither: what they "
+            "name would be read too"
+        )
+
+    builder = TreeBuilder()
+    parser = ParserCreate()  # without a separator: prefixes stay in the names
+    parser.buffer_text = True
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(text, True)
+    except ExpatError as error:  # its text ends with line and column
+        reason = one_line(str(error), 200)
+        raise BadInput(f"{path}: not valid XML: {reason}") from None
+    except ValueError as error:
+        raise BadInput(f"{path}: not valid XML: {one_line(str(error), 200)}") from None
+    return builder.close()
+
+
+def _blank_lines(match: re.Match[str]) -> str:
+    """Line ends of what is skipped, so that messages count lines as editors do."""
+    text = match[0]
+    return text if text.startswith("<![CDATA[") else "\n" * text.count("\n")
 
 
 def placed(translation: NDArray, rotation: NDArray) -> NDArray:

@@ -22,7 +22,7 @@ from assembly.model.robot import BASE, Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted
 
 FUNCTION = "function"
-_POSITIVE = ("time_constant", "period")
+_POSITIVE = ("time_constant", "period", "depth")
 _KINDS_OF_VARIABLES = (
     "q.<frame>, wrench.<frame>.<mx..fz>, load.<mx..fz>, load.force, position.<x..z>, "
     "time, approach, cov.<name>"
@@ -137,6 +137,9 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
     form, count = FORMS[function.form], len(function.variables)
     if count > form.most:
         message = f"found {count}, expected at most {form.most} for {form.name}"
+        raise table.bad("variables", message)
+    if count < form.least:
+        message = f"found {count}, expected {form.least} for {form.name}"
         raise table.bad("variables", message)
     first = function.variables[0]
     if form.remembers and first.startswith("wrench."):

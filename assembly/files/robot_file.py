@@ -1,6 +1,7 @@
 """Robot files read and written (``docs/robot_files.md``), every rule checked."""
 
 import math
+import os.path
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,7 @@ def declared_robot(root: Table, name: str) -> Robot:
     tables = root.tables("frame"), root.tables("closure")
     effects = root.tables("effect")
     ranges = _learned_range(root)
+    point, diagnosis = _reference_point(root), _diagnosis(root)
     root.finish()
     if not 0 < len(tables[0]) <= _MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -109,7 +111,7 @@ def declared_robot(root: Table, name: str) -> Robot:
         remarks = _remarks(tables[0])
         robot = Robot(
             name, platform, frames, closures, description, learned_range=ranges,
-            remarks=remarks,
+            reference_point=point, diagnosis=diagnosis, remarks=remarks,
         )  # fmt: skip
         robot = with_effects(robot, effects)
         _check_meeting_frames(robot)
@@ -132,6 +134,44 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
         ranges[name] = (float(least), float(most))
     table.finish()
     return ranges
+
+
+def _reference_point(root: Table) -> tuple[float, float, float] | None:
+    """Point at which the robot was identified, platform axes, None if not given."""
+    if not root.has("reference_point"):
+        return None
+    x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
+    return x, y, z
+
+
+def _diagnosis(root: Table) -> dict[str, Any]:
+    """What the file says of the diagnosis that made it, a path made absolute."""
+    # a record for people and programs: texts, numbers and lists are kept as they are
+    content: dict[str, Any] = {}
+    if root.has("diagnosis"):
+        table = root.table("diagnosis")
+        for key in list(table.content):
+            value = table.get(key)
+            if not _is_record(value):
+                fault = f"found {describe(value)}, expected texts, numbers or lists"
+                raise table.bad(key, fault)
+            content[key] = value
+        table.finish()
+    if root.has("covariance"):
+        content["covariance"] = root.text("covariance", expected="a path")
+    path = content.get("covariance")
+    if isinstance(path, str):
+        content["covariance"] = str((Path(root.file).parent / path).resolve())
+    return content
+
+
+def _is_record(value: object) -> bool:
+    """Whether a value is a text, a finite number, a truth value or a list of such."""
+    if isinstance(value, list):
+        return all(_is_record(one) for one in value)
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, str | int)
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
@@ -289,8 +329,11 @@ def write_robot(robot: Robot, path: Path | str) -> None:
     """
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
-    effects = table.pop("effect", [])
+    effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})
     lines = [ROBOT_MARK, *(f"{k} = {_toml(v)}" for k, v in table.items())]
+    if diagnosis:
+        lines += ["", "[diagnosis]"]
+        lines += [f"{k} = {_toml(v)}" for k, v in diagnosis.items()]
     kinds = {"frame": frames, "closure": closures, "effect": effects}
     for kind, tables in kinds.items():
         for inner in tables:
@@ -315,6 +358,14 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     table["platform"] = robot.platform
     if robot.learned_range:
         table["learned_range"] = dict(robot.learned_range)
+    if robot.reference_point is not None:
+        table["reference_point"] = list(robot.reference_point)
+    if robot.diagnosis:
+        table["diagnosis"] = dict(robot.diagnosis)
+        path = table["diagnosis"].get("covariance")
+        if path and folder is not None:
+            relative = os.path.relpath(path, folder.resolve())
+            table["diagnosis"]["covariance"] = relative
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]

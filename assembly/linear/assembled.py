@@ -6,7 +6,8 @@ symbol  code                  shape     meaning
 dx_p    ``platform_screw``    (6,)      platform error at its origin, base axes
 dc      ``clearance_screws``  (n, 6)    clearances, and small motions of passive joints
 de, db  ``link_screws`` ..    (n, 6)    deformations of links and joints
-w       ``wrenches``          (n, 6)    through each frame, at it in its axes
+w       ``wrenches``          (n, 6)    of each link's spring, at the frame in its axes
+--      ``tip_wrenches``      (n, 6)    through the section at each link's tip
 E       ``energy``            J         of all springs
 ======  ====================  ========  ==============================================
 
@@ -25,7 +26,13 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import Linearisation, VirtualJoints
-from assembly.linear.load import FrameLoads, loads_on_frames, weights
+from assembly.linear.load import (
+    FrameLoads,
+    loads_on_frames,
+    weights,
+    with_distributed,
+    wrenches_at_starts,
+)
 from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
@@ -77,7 +84,7 @@ class Assembly:
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly solve`` prints of it."""
-        forces = np.linalg.norm(without_rounding(self.wrenches)[:, 3:], axis=1)
+        forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
         most = largest_row(forces)  # bodies in a row carry the same force
         return {
             "pose": f"{numbers(self.posture.pose().values())} m, rad",
@@ -179,17 +186,36 @@ class Assembly:
 
     @cached_property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on the inner through each body.
+        """(n, 6) [N m, N] of each link's spring: K_E times the link's deformation.
 
-        At the frame's origin, in its axes; equal to K_E times the link's deformation.
+        At the frame's origin, in its axes.  The link's own weight counts at its two
+        ends here; :attr:`tip_wrenches` are what its section at the tip transmits.
         """
         return self._closing + self.frame_loads.body.reshape(-1, 6)
+
+    @cached_property
+    def tip_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] what the outer part exerts on each body, at its tip.
+
+        At the frame's origin, in its axes; the body's own weight acts along it.
+        """
+        return self.wrenches - self.frame_loads.at_tips
+
+    @cached_property
+    def start_wrenches(self) -> NDArray:
+        """(n, 6) [N m, N] what links under their own weight transmit at their starts.
+
+        At the link's start, in its frame's axes; NaN for bodies without such a weight.
+        """
+        at_tips = self.frame_loads.at_tips
+        starts = wrenches_at_starts(self.posture.robot, self.tip_wrenches, at_tips)
+        return starts if at_tips.any() else np.full_like(starts, np.nan)
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] the same through each joint, equal to K_B times its screw.
 
-        They differ from :attr:`wrenches` by loads on the body, its weight for one.
+        They differ from :attr:`tip_wrenches` by loads on the body at the frame.
         """
         return self._closing + self.frame_loads.joint.reshape(-1, 6)
 
@@ -319,4 +345,5 @@ def all_loads(
     if gravity is not None:
         body_weights, carried = weights(posture, gravity)
         bodies = body_weights if bodies is None else body_weights + np.asarray(bodies)
-    return loads_on_frames(posture, load, bodies, carried)
+    loads = loads_on_frames(posture, load, bodies, carried)
+    return loads if gravity is None else with_distributed(loads, posture, gravity)

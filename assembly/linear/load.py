@@ -7,14 +7,15 @@ joint's clearance and spring do not.  A load on what j's joint carries acts afte
 The weight of a beam is spread over its length.  Its equivalent at the two ends is half
 the weight at each, and the moments of a beam clamped at both, -+ r x W / 12: the tip
 then deflects and turns as under the distributed load (exactly at the ends; between them
-the beam deflects a little more).
+the beam deflects a little more).  What the section at the tip transmits is the wrench
+of the beam's spring less its equivalent there: :func:`weights_at_tips`.
 
 Sources:
     Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
     load: end moments q L^2 / 12).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -38,13 +39,22 @@ class FrameLoads:
     Attributes:
         body: (..., 6n) [N m, N] on errors and deformations of bodies.
         joint: (..., 6n) [N m, N] on clearances, springs and motions of joints.
+        distributed: (..., 6n) [N m, N] the part of ``body`` that acts along the links,
+            as it counts at their tips; or zero.
     """
 
     body: NDArray
     joint: NDArray
+    distributed: NDArray = field(default_factory=lambda: np.zeros(()))
 
     def __bool__(self) -> bool:
         return bool(np.any(self.body) or np.any(self.joint))
+
+    @property
+    def at_tips(self) -> NDArray:
+        """(..., n, 6) [N m, N] ``distributed``, by frames."""
+        full = np.broadcast_to(self.distributed, self.body.shape)
+        return full.reshape(*full.shape[:-1], -1, 6)
 
     def rows(self, count: int) -> NDArray:
         """The loads as compiled functions read them.
@@ -195,6 +205,44 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
     ]
 
 
+def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
+    """The part of :func:`weights` that acts along the links and counts at their tips.
+
+    Args:
+        posture: where the robot stands, of n frames; or many postures, as above.
+        gravity: (..., 3) [m/s^2] base axes.
+
+    Returns:
+        (..., n, 6) [N m, N] at each frame's origin, in its axes; the force is half of
+        the link's weight.
+    """
+    table, R = _masses(posture.robot), posture.transforms[..., :3, :3]
+    g = np.asarray(gravity, dtype=float)[..., None, :]
+    W = table[:, 4:5] * np.einsum("...nji,...nj->...ni", R, np.broadcast_to(
+        g, R.shape[:-1]
+    ))  # fmt: skip
+    return np.concatenate([-np.cross(table[:, 5:], W) / 12, W / 2], axis=-1)
+
+
+def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDArray:
+    """What links under their own weight transmit where they start.
+
+    Args:
+        robot: of n frames.
+        tips: (..., n, 6) [N m, N] through each link's section at its tip.
+        distributed: (..., n, 6) [N m, N] of :func:`weights_at_tips`.
+
+    Returns:
+        (..., n, 6) [N m, N] at the link's start, in its frame's axes; NaN where it has
+        no weight of its own.
+    """
+    table = _masses(robot)
+    weight, span = 2 * distributed[..., 3:], table[:, 5:]
+    moment = tips[..., :3] + np.cross(span, tips[..., 3:] + weight / 2)
+    starts = np.concatenate([moment, tips[..., 3:] + weight], axis=-1)
+    return np.where(table[:, 4:5] > 0, starts, np.nan)
+
+
 @lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
     """(n, 8) of every body its mass and centre, of its beam the mass and the beam."""
@@ -234,8 +282,28 @@ def _loads_with_weight(content: Content) -> FrameLoads:
     if gravity.any():
         bodies, carried = weights(content.postures, gravity)
     loads = loads_on_frames(content.postures, load, bodies, carried)
-    loads.body.flags.writeable = loads.joint.flags.writeable = False
+    if bodies is not None:
+        loads = with_distributed(loads, content.postures, gravity)
+    for part in (loads.body, loads.joint, loads.distributed):
+        part.flags.writeable = False
     return loads
+
+
+def with_distributed(
+    loads: FrameLoads, posture: Posture, gravity: ArrayLike
+) -> FrameLoads:
+    """Loads that know which part of them is the links' own weight.
+
+    Args:
+        loads: with :func:`weights` among them.
+        posture: where the robot stands, one or many.
+        gravity: (..., 3) [m/s^2] base axes.
+
+    Returns:
+        The same loads.
+    """
+    at_tips = weights_at_tips(posture, gravity)
+    return replace(loads, distributed=at_tips.reshape(loads.body.shape))
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:

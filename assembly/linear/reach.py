@@ -202,7 +202,7 @@ class ReachableSet:
         if self.unbounded(part):
             return (np.inf, np.inf), self.centre, 0
         solved = one_problem.farthest(
-            self.centre, self.map, self.rows, self.start, self._starts, part, tolerance
+            self.centre, self.map, self.rows, self.start, self.starts, part, tolerance
         )
         if solved is not None:
             (low, high), screw, supports = solved
@@ -227,10 +227,10 @@ class ReachableSet:
             np.require(a, requirements=["C", "W"])
             for a in (self.centre, self.map, self.rows, self.start)
         )
-        return ConvexBody(centre, X, H, start, self._starts)
+        return ConvexBody(centre, X, H, start, self.starts)
 
     @property
-    def _starts(self) -> NDArray:
+    def starts(self) -> NDArray:
         """(cones + 1,) first column of each cone, and nv."""
         return cone_starts(self.group)
 

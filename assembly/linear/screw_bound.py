@@ -12,7 +12,7 @@ the minimiser is not unique.  Both sets of platform screws are convex; how far t
 extend along each axis is a cone programme with a certified height.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from assembly.linear.reach import (
 )
 from assembly.solvers.conic import SolverFailed, cone_sizes
 
+_WIDTH = 3e-5  # of a distance: upper minus lower bound
 _HELD = 0.1  # [-] of a cone: a load that leaves it more room does not hold it
 
 
@@ -38,7 +39,7 @@ class ScrewBound:
         rotation: [rad] at most this; infinite where the platform turns freely.
         translation: [m] likewise, at the platform's origin.
         rotation_open: [rad] of it what clearances leave open at no cost of energy: the
-            screw is not unique.
+            screw is not unique, and the farthest one is at most this far.
         translation_open: [m] likewise.
         rotation_error: [rad] the rest: the numerical error.
         translation_error: [m] likewise.
@@ -59,8 +60,8 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         assembly: the computed one, with its wrenches.
 
     Returns:
-        The bounds, from nothing but its certificate; of boxes around the sets, so up
-        to sqrt(3) times the distances themselves.
+        The bounds, from nothing but its certificate.  Those of the screw and of its
+        error are of boxes around the sets, so up to sqrt(3) times the distances.
     """
     gap, lin = assembly.uncertainty, assembly.linearisation
     open_closures = lin.rows @ assembly.screws.ravel()
@@ -97,14 +98,16 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 
     kept: frozenset[int] = frozenset()
     total = _extents(within_bounds(assembly, "elastic", kept, uncertain))
-    not_unique = _extents(within_bounds(assembly, "elastic", kept, unloaded))
+    open_set = within_bounds(assembly, "elastic", kept, unloaded)
+    not_unique = _extents(open_set)
     with np.errstate(invalid="ignore"):
         error = np.maximum(total - not_unique, 0.0)
     error = np.where(np.isinf(not_unique), 0.0, error)
-    (rotation, translation), open_, errors = (
+    (rotation, translation), boxes, errors = (
         np.linalg.norm(half.reshape(2, 3), axis=1).tolist()
         for half in (total, not_unique, error)
     )
+    open_ = [_farthest(open_set, 3 * i, box) for i, box in enumerate(boxes)]
     return ScrewBound(rotation, translation, *open_, *errors)
 
 
@@ -125,6 +128,17 @@ def _room(
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]
+
+
+def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
+    """[rad or m] certified largest distance from the centre, no more than the box's."""
+    if not 0.0 < box < np.inf:
+        return box
+    about_centre = replace(reachable, centre=np.zeros(6))
+    try:
+        return min(box, about_centre.farthest(part, _WIDTH * box)[0][1])
+    except SolverFailed:
+        return box
 
 
 def _extents(reachable: ReachableSet) -> NDArray:

@@ -50,9 +50,7 @@ def _deflection(law: ContactLaw, load: float) -> float:
 
 def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
     """(n, 6) [N m, N] through every joint, in the frames' axes."""
-    return (
-        assembly.joint_wrenches if isinstance(assembly, Assembly) else assembly.wrenches
-    )
+    return assembly.joint_wrenches
 
 
 def contact_columns(conditions: Conditions) -> NDArray:

@@ -52,6 +52,30 @@ class History:
         known = last >= begin
         return np.where(known, np.sign(step[last]), given)
 
+    def slip(self, name: str, depth: float) -> NDArray:
+        """Where what slips after a variable stands between its two ends.
+
+        Args:
+            name: of the variable.
+            depth: > 0 change of the variable, from the middle to an end.
+
+        Returns:
+            (H,) from -1 to 1: it follows the variable until it stands at an end, and
+            stays there until the variable turns.  A session begins at the end from
+            which ``approach`` says that it came, or in the middle.
+
+        Sources:
+            Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
+        """
+        step = np.diff(self.values[name], prepend=np.nan) / depth
+        begin = np.nan_to_num(self.values["approach"])
+        state, stands = 0.0, np.empty(len(step))
+        for i, change in enumerate(step.tolist()):
+            moved = begin[i] if self.first[i] else state + change
+            state = min(1.0, max(-1.0, moved))
+            stands[i] = state
+        return stands
+
     def lagged(self, name: str, time_constant: float, *, held: bool = False) -> NDArray:
         """A variable behind a first-order lag that starts from zero at time 0.
 

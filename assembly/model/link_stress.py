@@ -1,7 +1,8 @@
 """The largest stress in every link, from the wrench it transmits.
 
-A link is held at its base and loaded by its frame's wrench at the tip.  Beams follow
-the formulas of :mod:`stiffness.beam.beam_stress`.  Links given by a surface follow the
+A link is held at its base and loaded by its frame's wrench at the tip, a beam with a
+density by its own weight between them too.  Beams follow the formulas of
+:mod:`stiffness.beam.beam_stress`.  Links given by a surface follow the
 stress influence of unit wrenches, by finite elements (:mod:`stiffness.fem.stress`); it
 leaves out points nearer than an interface's radius to a clamped, singular edge.  The
 stress of a link given by its stiffness alone is not known.
@@ -19,6 +20,7 @@ from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 
+WEIGHTLESS = np.zeros(6)  # [N m, N]
 _CHUNK = 64  # wrenches at a time: 64 x 20000 nodes x 6 numbers are 61 MB
 
 
@@ -30,13 +32,15 @@ class LinkStress:
         frame: name of the frame whose body it is.
         row: of that frame.
         method: ``"beam"`` or ``"finite elements"``, with what was left out.
-        peak: (k, 6) [N m, N] wrenches at the frame in its axes to (k,) [Pa].
+        peak: (k, 6) [N m, N] wrenches of the link's spring and, if it has a weight of
+            its own, (k, 6) or (6,) of these the part that it is, at the frame in its
+            axes, to (k,) [Pa].
     """
 
     frame: str
     row: int
     method: str
-    peak: Callable[[NDArray], NDArray]
+    peak: Callable[..., NDArray]
 
 
 @lru_cache(maxsize=16)
@@ -69,13 +73,17 @@ def stressed_names(robot: Robot) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:
+def peak_stresses(
+    robot: Robot, wrenches: ArrayLike, at_tips: ArrayLike = 0.0
+) -> NDArray:
     """Largest von Mises stress in every link of known stress.
 
     Args:
         robot: of n frames.
-        wrenches: (..., n, 6) [N m, N] through every frame, at it in its axes, as
-            :attr:`assembly.linear.assembled.Assembly.wrenches`.
+        wrenches: (..., n, 6) [N m, N] of every link's spring, at its frame in its axes,
+            as :attr:`assembly.linear.assembled.Assembly.wrenches`.
+        at_tips: likewise, of these the part that is the links' own weight, as
+            :attr:`assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
         (..., links) [Pa] in the order of :func:`stressed_links`.
@@ -91,22 +99,25 @@ def peak_stresses(robot: Robot, wrenches: ArrayLike) -> NDArray:
         )
     links = stressed_links(robot)
     flat = w.reshape(-1, *w.shape[-2:])
+    own = np.broadcast_to(at_tips, w.shape).reshape(flat.shape)
     peaks = np.full((len(flat), len(links)), np.nan)
     solved = np.isfinite(flat).all(axis=(1, 2))
     for i, link in enumerate(links):
-        peaks[solved, i] = link.peak(flat[solved, link.row])
+        peaks[solved, i] = link.peak(flat[solved, link.row], own[solved, link.row])
     return peaks.reshape(*w.shape[:-2], len(links))
 
 
-def _of_beam(frame: Frame) -> Callable[[NDArray], NDArray]:
+def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     """Peak stress of a beam."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
 
-    def peak(wrench: NDArray) -> NDArray:
-        in_section_axes = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
-        return peak_beam_stress(section, length, in_section_axes)[0]
+    def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
+        tip = wrench - at_tip
+        in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
+        weight = 2 * at_tip[..., 3:] @ R  # half of it counts at the tip
+        return peak_beam_stress(section, length, in_section_axes, weight)[0]
 
     return peak
 
@@ -121,7 +132,8 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
     influence = stress_influence(solved)
     R = mesh_turn(frame, solved.link.tip - solved.link.base)
 
-    def peak(wrench: NDArray) -> NDArray:
+    def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
+        wrench = wrench - at_tip
         in_mesh_axes = np.hstack([wrench[:, :3] @ R, wrench[:, 3:] @ R])
         peaks = np.zeros(len(in_mesh_axes))
         for first in range(0, len(in_mesh_axes), _CHUNK):
@@ -130,4 +142,6 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
             peaks[first : first + _CHUNK] = von_mises(stress).max(axis=1)
         return peaks
 
-    return LinkStress(frame.name, row, f"finite elements: {influence.region}", peak)
+    error = f"estimated error {influence.relative_error():.2g}"
+    method = f"finite elements, {error}: {influence.region}"
+    return LinkStress(frame.name, row, method, peak)

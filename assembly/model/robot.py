@@ -6,6 +6,7 @@ What a frame is: :mod:`assembly.model.frame`, whose names may be imported from h
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +54,10 @@ class Robot:
         functions: general effects that it is known to have.
         learned_range: least and largest value of what varied where its effects were
             learned, by public name.
+        reference_point: (3,) [m] the point at which it was identified, platform axes;
+            None where it never was.
+        diagnosis: what the file says of the diagnosis that made it: verdict, rows
+            fitted, hold-out error, digest of the campaign, path of the covariance.
         remarks: defaults of its file that are easily overlooked.
     """
 
@@ -67,6 +72,8 @@ class Robot:
     )
     functions: tuple[Function, ...] = ()
     learned_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    reference_point: tuple[float, float, float] | None = None
+    diagnosis: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr

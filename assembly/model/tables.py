@@ -6,6 +6,7 @@ is asked for.
 """
 
 from collections.abc import Mapping
+from itertools import product
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -82,7 +83,7 @@ class ForcedAssembly(Protocol):
         """(n, 6) [rad, m]."""
 
     @property
-    def wrenches(self) -> NDArray:
+    def tip_wrenches(self) -> NDArray:
         """(n, 6) [N m, N] through bodies."""
 
     @property
@@ -110,7 +111,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
         "clearance_screw": assembly.clearance_screws,
         "link_screw": assembly.link_screws,
         "joint_screw": assembly.joint_screws,
-        "wrench": assembly.wrenches,
+        "wrench": assembly.tip_wrenches,
         "joint_wrench": assembly.joint_wrenches,
     }
     single = {
@@ -144,29 +145,70 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
     return _dataset(values, _OF_POINTS, "point", np.arange(count))
 
 
-def frame_table(data: "xarray.Dataset", rows: str) -> "pandas.DataFrame":
-    """The variables over one dimension as a table, a column for each component.
+def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
+    """The variables over some dimensions as a table, a column for each component.
 
     Args:
-        data: of this module.
-        rows: the dimension that becomes the index.
+        data: any, such as of this module; variables that lack one of the dimensions
+            are left out.
+        rows: the dimensions that become the index, a row for each of their points.
 
     Returns:
         Table whose columns are (variable, component), component empty for plain
-        numbers; units by variable are in its ``attrs["units"]``.
+        numbers and joined by points where a variable has several further dimensions;
+        units by variable and dimension are in its ``attrs["units"]``.
     """
     import pandas
 
     columns: dict[tuple[str, str], NDArray] = {}
-    kept = {str(k): v for k, v in data.data_vars.items() if v.dims[:1] == (rows,)}
+    sizes = {row: data.sizes[row] for row in rows}
+    # such as the components of postures in a list
+    kept = {
+        str(name): v.variable.set_dims(sizes) for name, v in data.coords.items()
+        if name not in data.dims and v.dims and {*v.dims} <= {*rows}
+    }  # fmt: skip
+    kept |= {
+        str(name): v.variable for name, v in data.data_vars.items()
+        if {*rows} <= {*v.dims}
+    }  # fmt: skip
     for name, variable in kept.items():
-        labels = [""] if variable.ndim == 1 else data[variable.dims[1]].values
-        flat = variable.values.reshape(len(variable), len(labels))
-        columns |= {(name, str(c)): flat[:, k] for k, c in enumerate(labels)}
-    table = pandas.DataFrame(columns, index=pandas.Index(data[rows].values, name=rows))
+        further = [d for d in variable.dims if d not in rows]
+        labels = [".".join(map(str, one)) for one in product(
+            *(data[d].values for d in further)
+        )]  # fmt: skip
+        ordered = variable.transpose(*rows, *further).values
+        flat = ordered.reshape(-1, len(labels))
+        columns |= {(name, c): flat[:, k] for k, c in enumerate(labels)}
+    axes = [data[row].values for row in rows]
+    index = (
+        pandas.Index(axes[0], name=rows[0]) if len(rows) == 1
+        else pandas.MultiIndex.from_product(axes, names=rows)
+    )  # fmt: skip
+    table = pandas.DataFrame(columns, index=index)
     table.columns.names = ["variable", "component"]
-    table.attrs["units"] = {name: v.attrs["units"] for name, v in kept.items()}
+    kept |= {row: data[row].variable for row in rows}
+    table.attrs["units"] = {n: v.attrs.get("units", "") for n, v in kept.items()}
     return table
+
+
+def component_unit(unit: str, component: str) -> str:
+    """Unit of one component of a variable that mixes angles and lengths.
+
+    Args:
+        unit: of the variable, such as ``"rad, m"``.
+        component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
+            are rotation and translation.
+
+    Returns:
+        The unit of that component; the variable's where that is one already.
+    """
+    kinds = [label[:1].upper() for label in component.split(".")]
+    if unit.count(", ") == 1:
+        return unit.split(", ")[kinds[-1] in {"T", "F"}]
+    if " .. " in unit and len(kinds) == 2:
+        turns, moments = kinds[0] == "R", kinds[1] == "M"
+        return f"{'rad' if turns else 'm'}/{'(N m)' if moments else 'N'}"
+    return unit
 
 
 def _dataset(

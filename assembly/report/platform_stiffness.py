@@ -254,7 +254,7 @@ def _cell(value: float) -> str:
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
     """The table of who gives way, in per cent of the compliance."""
     rows = share_rows(shares)
-    table = _largest_rows(rows)
+    table = largest_rows(rows)
     width = max(map(len, (*table, "part")))
     head = "".join(f"{name:>9s}" for name in DIRECTIONS)
     lines = ["", "shares in the compliance along each direction, per cent",
@@ -283,8 +283,15 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
     ]
 
 
-def _largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
-    """The first rows, and all others together."""
+def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
+    """The first rows of shares, and all others together.
+
+    Args:
+        rows: of :func:`share_rows`, the largest first.
+
+    Returns:
+        All of them, where there are few.
+    """
     names = list(rows)
     if len(names) <= _SHOWN + 1:
         return rows
@@ -308,7 +315,7 @@ def plot_shares(results: dict[str, Any]) -> "Figure":
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.subplots()
     bottom = np.zeros(6)
-    for name, row in _largest_rows(rows).items():
+    for name, row in largest_rows(rows).items():
         height = 100 * np.nan_to_num(row)
         axes.bar(DIRECTIONS, height, bottom=bottom, label=plot_label(name))
         bottom = bottom + height

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
 from assembly.linear.error_body import PARTS, ErrorBody, error_body
 from assembly.linear.reach import reachable_screws
@@ -50,6 +51,7 @@ def plot_assembly(
         body = error_body(reach, errors)
         size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())
         add_error_body(plotter, body, assembly.posture.platform[:3, 3], size, reading)
+        _fill_window(plotter)
     return plotter
 
 
@@ -87,14 +89,42 @@ def robot_plotter(
             radius=0.008 * size
         )
         plotter.add_mesh(line, color="crimson" if frame.link else "steelblue")
+    _add_joint_axes(plotter, assembly.posture, size)
     caption = (
-        f"displacements x {exaggeration_factor:g}; red: elastic links; grey: nominal"
+        f"displacements x {exaggeration_factor:g}; red: elastic links; grey: nominal; "
+        "axes of joints orange: driven, black: passive"
     )
     plotter.add_text(caption, font_size=9, name="caption")
     plotter.add_axes()
     plotter.view_vector((0.55, -1.0, 0.35))
-    plotter.camera.zoom(1.5)
+    _fill_window(plotter)
     return plotter
+
+
+def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
+    """Short rods along the axes of all joints, at their nominal places."""
+    import pyvista
+
+    for frame, T in zip(posture.robot.frames, posture.transforms, strict=True):
+        if frame.joint == "fixed":
+            continue
+        half = 0.05 * size * T[:3, 2]
+        rod = pyvista.Line(T[:3, 3] - half, T[:3, 3] + half).tube(radius=0.004 * size)
+        plotter.add_mesh(rod, color="darkorange" if frame.actuated else "#202020")
+
+
+def _fill_window(plotter: Any) -> None:
+    """Point the camera at the middle of what is drawn, as near as all of it fits."""
+    camera, share = plotter.camera, 0.85  # of the window, for captions above and below
+    low, high = np.reshape(plotter.bounds, (3, 2)).T
+    corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
+                        for bits in np.ndindex(2, 2, 2)])  # fmt: skip
+    plotter.reset_camera()
+    width, height = plotter.window_size
+    matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1, 1)
+    view = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+    seen = np.column_stack([corners, np.ones(8)]) @ view.T
+    camera.zoom(share / np.abs(seen[:, :2] / seen[:, 3:]).max())
 
 
 def add_error_body(

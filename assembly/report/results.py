@@ -141,11 +141,15 @@ def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
             "clearance": assembly.clearance_screws[i],
             "link": assembly.link_screws[i],
             "joint": assembly.joint_screws[i],
-            "wrench": assembly.wrenches[i],
+            "wrench": assembly.tip_wrenches[i],
             "joint_wrench": assembly.joint_wrenches[i],
         }
         for i, f in enumerate(robot.frames)
     }
+    if isinstance(assembly, Assembly):
+        for f, start in zip(robot.frames, assembly.start_wrenches, strict=True):
+            if np.isfinite(start).all():
+                frames[f.name]["start_wrench"] = start
     closures = [
         {"frames": list(pair), "wrench": assembly.closure_wrenches[k]}
         for k, pair in enumerate(robot.closures)

@@ -90,7 +90,7 @@ def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
 def _forces(assembly: Assembly) -> list[dict[str, Any]]:
     """Forces [N] that elastic links transmit at their tips, base axes."""
     posture = assembly.posture
-    turned = posture.transforms[:, :3, :3] @ assembly.wrenches[:, 3:, None]
+    turned = posture.transforms[:, :3, :3] @ assembly.tip_wrenches[:, 3:, None]
     largest = float(np.abs(turned).max(initial=0.0))
     return [
         {"body": i, "force": force}

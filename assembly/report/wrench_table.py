@@ -21,6 +21,8 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
         Lines of one table for each.
     """
     rows = {name: frame["wrench"] for name, frame in frames.items()}
+    starts = {name: frame["start_wrench"] for name, frame in frames.items()
+              if "start_wrench" in frame}  # fmt: skip
     shut = {" - ".join(pair["frames"]): pair["wrench"] for pair in closures}
     width = max(map(len, (*rows, *shut, "closure")))
     units = [f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH]
@@ -34,6 +36,9 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
 
     lines = ["", "wrenches through the bodies, at each frame's origin in its axes"]
     lines += table("frame", rows)
+    if starts:
+        lines += ["", "the same where links under their own weight start"]
+        lines += table("frame", starts)
     if shut:
         lines += ["", "wrenches of the closures, at the platform's origin, base axes"]
         lines += table("closure", shut)

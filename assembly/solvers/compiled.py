@@ -31,9 +31,16 @@ from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.extending import lower_builtin, type_callable
 
 from assembly.solvers.layouts import Layout
-from forcefit.native.libraries import announce
+from forcefit.native.libraries import (
+    announce,
+    folder_of_compiled,
+    kept_beside_sources,
+)
 
-_OPTIONS = {"cache": True, "error_model": "numpy", "nogil": True}
+_FOLDER = folder_of_compiled()
+if _FOLDER is not None and not kept_beside_sources():
+    config.CACHE_DIR = str(_FOLDER)  # numba's own places cannot be written either
+_OPTIONS = {"cache": _FOLDER is not None, "error_model": "numpy", "nogil": True}
 _parts: dict[Callable, "_Part"] = {}
 # tried first: before, each access to an array's entry tries those of some twenty other
 # types, which takes a seventh of the time
@@ -157,6 +164,8 @@ class _Part:
 
 def _survive_moves(compiled: Any) -> None:
     """Take what is on disk for nothing where it names what an update has moved."""
+    if _FOLDER is None:
+        return
     file = compiled._cache._cache_file
     load_index = file._load_index
 

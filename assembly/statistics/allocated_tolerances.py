@@ -7,13 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.model.error_distributions import KINDS
+from assembly.statistics.clearance_positions import contact_length_of, play_means
+from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
 from assembly.sweeps.identity import robot_hash
 from forcefit.inputs.display import html_table, short_repr
 
 if TYPE_CHECKING:
     import xarray
+
+
+_SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}  # factor and unit of tolerances
+_SHARE_OF = {
+    "reciprocal": "of the price",
+    "logarithm": "of the saving by looser tolerances",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +44,8 @@ class Allocation:
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
             meet the limits too; NaN where nothing is proven.
         verification: by fresh draws: yields with their intervals.
+        perfect_parts: by limit on a pose error, what clearances alone take of it [rad
+            or m], and at which posture.
     """
 
     plan: Plan
@@ -47,6 +58,7 @@ class Allocation:
     worst: dict[str, tuple[float, float]] = field(default_factory=dict)
     proven_scale: float = float("nan")
     verification: dict[str, Any] = field(default_factory=dict)
+    perfect_parts: dict[str, tuple[float, str]] = field(default_factory=dict)
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -57,7 +69,7 @@ class Allocation:
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
     """An allocation as plain values."""
-    plan = allocation.plan
+    plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
             "name": name,
@@ -65,6 +77,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
             "unit": _unit(allocation, g),
             "scaled_alike": allocation.uniformly_scaled[g],
             "cost": plan.costs[g],
+            "share": float(shares[g]),
             "loosest_allowed": plan.most[g],
             "at_loosest": bool(allocation.tolerances[g] >= plan.most[g] * (1 - 1e-3)),
         }
@@ -85,7 +98,66 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
         "proven_scale": allocation.proven_scale,
         "verification": allocation.verification,
         "play": plan.clearance_model if plan.limits_pose else None,
+        "contact_length": _contact_length(plan),
+        **_distribution(plan),
+        "draws": plan.draws,
+        "seed": plan.seed,
+        "perfect_parts": {
+            key: _taken(allocation, key, value, at)
+            for key, (value, at) in allocation.perfect_parts.items()
+        },
     }
+
+
+def price_shares(allocation: Allocation) -> NDArray:
+    """Share of each class in what looser tolerances would save.
+
+    At least cost the saving for a relative change of a tolerance is the multiplier of
+    the limit times the change of the limited quantity: cost / tolerance, or the cost if
+    the law is logarithmic.  It has no unit, so angles and lengths compare.
+
+    Args:
+        allocation: the tolerances.
+
+    Returns:
+        (G,) shares that add up to 1.
+    """
+    plan = allocation.plan
+    savings = plan.costs.astype(float)
+    if plan.cost == "reciprocal":
+        savings = savings / allocation.tolerances
+    shares: NDArray = savings / savings.sum()
+    return shares
+
+
+def _taken(
+    allocation: Allocation, key: str, reached: float, at: str
+) -> dict[str, float | str]:
+    """What clearances alone take of a limit, and what the errors would be without."""
+    plan, limit = allocation.plan, allocation.plan.limits[key]
+    # pose errors by errors and by clearances add up, nearly; tolerances scale with them
+    looser = limit / (limit - reached) if reached < limit else np.inf
+    without = allocation.price / looser
+    if plan.cost == "logarithm":
+        without = allocation.price - float(plan.costs.sum() * np.log(looser))
+    return {
+        "reached": reached, "limit": limit, "unit": UNITS[key], "at": at,
+        "looser_without": looser, "price_without": without,
+    }  # fmt: skip
+
+
+def _distribution(plan: Plan) -> dict[str, Any]:
+    """How errors are distributed within their tolerances."""
+    kind = KINDS[int(plan.sources.kind[0])]
+    cut = float(plan.sources.limit[0]) if kind == "truncated" else None
+    return {"distribution": kind, "deviations": cut}
+
+
+def _contact_length(plan: Plan) -> float | None:
+    """[m] contact length of the contact model, None for the others."""
+    if not plan.limits_pose or plan.clearance_model != "contact":
+        return None
+    return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
@@ -96,16 +168,19 @@ def _unit(allocation: Allocation, group: int) -> str:
 
 def allocation_text(results: dict[str, Any]) -> str:
     """An allocation for people."""
-    scales = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}
     lines = []
     for one in results["tolerances"]:
-        scale, unit = scales[one["unit"]]
+        scale, unit = _SHOWN[one["unit"]]
         line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
-        lines.append(line + (" (the loosest allowed)" if one["at_loosest"] else ""))
+        note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
+        lines.append(f"{line} ({note})")
+    if lines:
+        lines.append(f"in brackets: the share {_SHARE_OF[results['cost']]}")
     if results["play"]:
-        lines.append(
-            f"pose errors: play {results['play']}: {CLEARANCE_MODELS[results['play']]}"
-        )
+        means = play_means(results["play"], results["contact_length"])
+        lines.append(f"pose errors: play {results['play']}: {means}")
+    taken = results["perfect_parts"].items()
+    lines += [_taken_text(key, one) for key, one in taken if one["reached"] > 0.0]
     lines.append(_price_text(results))
     for key, worst in results["worst"].items():
         proven = (
@@ -127,6 +202,18 @@ def allocation_text(results: dict[str, Any]) -> str:
             f"asked {results['yield']:g}: {check['verdict']}{_looks_text(check)}"
         )
     return "\n".join(lines)
+
+
+def _taken_text(key: str, one: dict[str, Any]) -> str:
+    """What clearances alone take of a limit."""
+    scale, unit = _SHOWN[one["unit"]]
+    reached, limit = scale * one["reached"], scale * one["limit"]
+    return (
+        f"clearances alone take {reached:.4g} of the {limit:.4g} {unit} of {key} (at "
+        f"{one['at']}): without them tolerances could be about "
+        f"{one['looser_without']:.3g} times looser, at a price of about "
+        f"{one['price_without']:.3g}"
+    )
 
 
 def _looks_text(check: dict[str, Any]) -> str:

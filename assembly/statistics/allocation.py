@@ -56,7 +56,7 @@ def allocate(
     """
     replay = replay or Replay()
     requirement = Requirement(postures, plan, replay)
-    requirement.check_perfect_parts()
+    perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement
     if not requirement.convex:
         # no convex limit: start from the proportions that a limit of energy gives
@@ -81,6 +81,7 @@ def allocate(
         price_bound=price_bound if requirement.is_convex else np.nan,
         cuts=cuts,
         verification=verification,
+        perfect_parts=perfect_parts,
     )
     if plan.asked_yield == 1.0:
         worst_cases, proven_scale = prove_worst(requirement, tolerances, progress)

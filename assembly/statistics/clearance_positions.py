@@ -10,6 +10,11 @@ uniform  uniformly distributed over the set (billiard walk)
 contact  displaced by a wrench of random direction on the platform until in contact
 least    that of the solution of (22): one possible position of many
 ======== =====================================================================
+
+A direction of wrenches needs a length: the random moment, divided by it, is as large as
+the random force.  The positions depend on it, so it is named with every result; where
+the loads in service are known, they say how the clearances close, and no length is
+needed.
 """
 
 from collections.abc import Sequence
@@ -20,13 +25,15 @@ from numpy.typing import NDArray
 from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
 from assembly.kinematics.nominal import size_of
+from assembly.model.robot import Robot
 from assembly.solvers.conic import minimise_energy
+from assembly.statistics.bounded_motion import bounded_position, draws_at_bounds
 
 # the option --play and its explanation
 CLEARANCE_MODELS = {
     "worst": "clearances anywhere they may be, the largest pose errors count, eq. (27)",
     "uniform": "clearances uniform over all places they may be",
-    "contact": "clearances taken up in a random direction",
+    "contact": "clearances displaced to contact by a wrench of random direction",
     "least": "clearances where the solution leaves them, one possible place of many",
 }
 CLEARANCE_STREAM = 1  # of random numbers; 0 is the errors'
@@ -37,6 +44,7 @@ def position_clearances(
     draws: Draws,
     clearance_model: str,
     generators: Sequence[np.random.Generator],
+    contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
     """Platform screws with the clearances at positions of a clearance model.
 
@@ -45,11 +53,11 @@ def position_clearances(
         draws: of :meth:`~assembly.batch.many_draws.OnePosture.solve`, k draws.
         clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
         generators: of random numbers, one for each draw; none for "least".
+        contact_length: [m] of the contact model, see :func:`contact_length_of`.
 
     Returns:
-        (k, 6) [rad, m]; NaN where a draw has no solution in unit cones (the bound of a
-        passive joint's own motion is active).  (k,) bool: False where the walks of the
-        uniform model had not mixed at their greatest length, see
+        (k, 6) [rad, m]; NaN where a draw has no solution.  (k,) bool: False where the
+        walks of the uniform model had not mixed at their greatest length, see
         :func:`assembly.statistics.uniform_clearance.sample_uniform_position`.
 
     Raises:
@@ -59,21 +67,70 @@ def position_clearances(
         valid = tuple(name for name in CLEARANCE_MODELS if name != "worst")
         raise ValueError(f"play is {clearance_model!r}, expected one of {valid}")
     mixed = np.ones(len(draws.energy), dtype=bool)
-    if clearance_model == "least" or not len(prepared.G.T):
+    if clearance_model == "least":
         return draws.platform_screw, mixed
-    clearances = draws.clearances.copy()
-    loaded = loaded_clearances(prepared, draws)
-    nu = clearances.shape[1]
-    solved = ~np.isnan(clearances).any(axis=1)
-    patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
-    position = _at_random if clearance_model == "uniform" else _at_contact
-    for i, pattern in enumerate(patterns):
-        some = np.flatnonzero((pattern_of_draw.ravel() == i) & solved)
-        clearances[some], mixed[some] = position(
-            prepared, pattern, clearances[some], [generators[k] for k in some.tolist()]
+    wrenches = None
+    if clearance_model == "contact":
+        length = contact_length or contact_length_of(prepared.posture.robot)
+        wrenches = _random_wrenches(generators, length)
+    screws = draws.platform_screw.copy()
+    at_bounds = draws_at_bounds(prepared, draws)
+    for i in np.flatnonzero(at_bounds).tolist():
+        wrench = None if wrenches is None else wrenches[i]
+        screws[i], mixed[i] = bounded_position(
+            prepared, draws.errors[i], wrench, generators[i]
         )
-    moved = (clearances - draws.clearances) @ prepared.screws[:, :nu].T
-    return draws.platform_screw + moved, mixed
+    left = np.isfinite(draws.energy) & ~at_bounds
+    if prepared.starts[-1] and left.any():
+        moved, mixed[left] = _moved_clearances(
+            prepared, draws, left, wrenches, generators
+        )
+        screws[left] += moved @ prepared.screws[:, : prepared.starts[-1]].T
+    return screws, mixed
+
+
+def _moved_clearances(
+    prepared: OnePosture, draws: Draws, left: NDArray, wrenches: NDArray | None,
+    generators: Sequence[np.random.Generator],
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """Motions of the clearances in the draws ``left``, and whether the walks mixed."""
+    clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
+    loaded = loaded_clearances(prepared, draws)
+    patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
+    for i, pattern in enumerate(patterns):
+        rows = np.flatnonzero((pattern_of_draw.ravel() == i) & left)
+        if wrenches is None:
+            rngs = [generators[k] for k in rows.tolist()]
+            clearances[rows], mixed[rows] = _at_random(
+                prepared, pattern, clearances[rows], rngs
+            )
+        else:
+            clearances[rows] = _at_contact(
+                prepared, pattern, clearances[rows], wrenches[rows]
+            )
+    return (clearances - draws.clearances)[left], mixed[left]
+
+
+def contact_length_of(robot: Robot) -> float:
+    """[m] default length that makes forces of moments: the robot's longest body."""
+    return size_of(robot)
+
+
+def play_means(clearance_model: str, contact_length: float | None = None) -> str:
+    """A clearance model in words, with the length that the contact model needs."""
+    words = CLEARANCE_MODELS[clearance_model]
+    if clearance_model != "contact" or contact_length is None:
+        return words
+    return f"{words} (moments / {contact_length:.4g} m, contact length, as forces)"
+
+
+def _random_wrenches(
+    generators: Sequence[np.random.Generator], length: float
+) -> NDArray:
+    """(k, 6) wrenches on the platform: moments over the length are as forces."""
+    scale = np.repeat([1.0, 1.0 / length], 3)
+    wrenches = np.array([rng.normal(size=6) for rng in generators])
+    return wrenches.reshape(-1, 6) * scale
 
 
 def _at_random(
@@ -98,22 +155,18 @@ def _at_random(
 
 
 def _at_contact(
-    prepared: OnePosture, loaded: NDArray, clearances: NDArray,
-    generators: Sequence[np.random.Generator],
-) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Clearances displaced along a random wrench until in contact."""
+    prepared: OnePosture, loaded: NDArray, clearances: NDArray, wrenches: NDArray
+) -> NDArray:
+    """Clearances displaced along wrenches (k, 6) on the platform until in contact."""
     from assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
-    length = size_of(prepared.posture.robot)
-    scale = np.array([1, 1, 1, 1 / length, 1 / length, 1 / length])
-    wrenches = np.array([rng.normal(size=6) * scale for rng in generators])
-    directions = wrenches.reshape(-1, 6) @ prepared.screws[:, : clearances.shape[1]]
+    directions = wrenches @ prepared.screws[:, : clearances.shape[1]]
     positions, ends = np.ascontiguousarray(clearances), np.empty_like(clearances)
     move_to_contact(rows, prepared.starts, free, positions, directions, ends)
     for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
         ends[k] = _contact_fallback(prepared, rows, free, positions[k], directions[k])
-    return ends, np.ones(len(clearances), dtype=bool)
+    return ends
 
 
 def free_starts(prepared: OnePosture, free: NDArray) -> NDArray:

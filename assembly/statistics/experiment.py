@@ -18,6 +18,7 @@ from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     CLEARANCE_STREAM,
+    contact_length_of,
     position_clearances,
 )
 from assembly.statistics.quantities import POSE_ERRORS
@@ -48,6 +49,8 @@ class Experiment:
             empty for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
             upper minus lower bound; inf for one that is not needed.
+        contact_length: [m] by which random moments of the contact model are as large as
+            forces; None for the robot's longest body.
     """
 
     posture: Posture
@@ -60,6 +63,7 @@ class Experiment:
     gravity: tuple[float, ...] | None = None
     stiffness: str = ""
     precision: tuple[float, float] = PRECISION
+    contact_length: float | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -69,6 +73,15 @@ class Experiment:
                 f"play is {self.clearance_model!r}, expected one of "
                 f"{tuple(CLEARANCE_MODELS)}"
             )
+        if self.contact_length is not None and not 0 < self.contact_length < np.inf:
+            raise ValueError(f"contact length is {self.contact_length}, expected > 0 m")
+
+    @property
+    def used_contact_length(self) -> float | None:
+        """[m] contact length of the contact model, None for the others."""
+        if self.clearance_model != "contact":
+            return None
+        return self.contact_length or contact_length_of(self.posture.robot)
 
     @cached_property
     def energies(self) -> OnePosture:
@@ -164,7 +177,7 @@ class Experiment:
             )
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
-                self.energies, solved, self.clearance_model, rngs
+                self.energies, solved, self.clearance_model, rngs, self.contact_length
             )
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
@@ -173,10 +186,13 @@ class Experiment:
         rows["platform_screw"] = screws
         wrenches = without_rounding(self.energies.wrenches(solved.multipliers))
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
-            sizes = np.sqrt((wrenches[..., part] ** 2).sum(axis=-1))
+            through = wrenches[..., part] - self.energies.at_tips[..., part]
+            sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
         if self.links:
-            rows["stress"] = peak_stresses(self.posture.robot, wrenches)
+            rows["stress"] = peak_stresses(
+                self.posture.robot, wrenches, self.energies.at_tips
+            )
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:

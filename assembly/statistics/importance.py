@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.ranking import kind_of
 
 STREAMS = (2, 3)  # of random numbers, see assembly.model.error_distributions
 MOST_FAILED = 0.05  # of the draws compared; with more the errors are dependent
@@ -183,11 +184,9 @@ def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
     """
     if by not in {"source", "frame", "kind"}:
         raise ValueError(f"by is {by!r}, expected 'source', 'frame' or 'kind'")
-    keys = []
-    for label in sources.labels:
-        frame, _, component = label.rpartition(".")
-        leg, dot, rest = frame.partition(".")
-        kind = f"{rest if dot else leg}.{component}"
-        keys.append({"source": label, "frame": frame, "kind": kind}[by])
+    keys = [
+        {"source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)}[by]
+        for label in sources.labels
+    ]
     names = list(dict.fromkeys(keys))
     return [(n, np.flatnonzero([k == n for k in keys])) for n in names]

@@ -1,10 +1,13 @@
 """The importance of errors as a data set, plain values and a table for people.
 
 Two sizes are given beside the shares of the variance.  A group's *part* is the standard
-deviation of the platform's screw that involves the group.  Divided by the standard
-deviation of the group's errors it is their *gain*: micrometres of the platform for each
-micrometre of error.  Both are of the platform's vector, so a platform that follows an
-error has a gain of 1.
+deviation of the platform's screw that involves the group, from the same sample.  The
+*gain* is a derivative, micrometres of the platform for each micrometre of error, and
+exact: see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's
+vector, so a platform that follows an error has a gain of 1.
+
+Shares are estimates.  Groups whose intervals overlap are not distinguished by them, and
+have their possible ranks in common: see :mod:`assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -14,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import (
     MOST_FAILED,
@@ -22,6 +24,14 @@ from assembly.statistics.importance import (
     SaltelliDesign,
     sobol_indices,
     source_groups,
+)
+from assembly.statistics.importance_slopes import error_units, platform_gains
+from assembly.statistics.ranking import (
+    NOT_DISTINGUISHED,
+    leaders,
+    named_together,
+    possible_ranks,
+    rank_text,
 )
 
 if TYPE_CHECKING:
@@ -34,7 +44,7 @@ _MEANINGS = {
     "total_index": "share of the variance that involves a group",
     "failed_share": "base draws left out, for a draw compared has no answer",
     "part": "deviation of the platform's screw that involves a group, by component",
-    "gain": "the same for each rad or m of the group's errors; NaN if it has both",
+    "gain": "exact slope of the platform's screw with the errors; NaN if rad and m",
 }
 
 
@@ -126,8 +136,8 @@ def importance_dataset(
     columns = [rows[n].max(axis=1) if rows[n].ndim == 2 else rows[n] for n in names]
     results = np.column_stack([*columns, rows["platform_screw"]])
     importance = sobol_indices(design, results, level)
-    part, gain = _parts(importance.total[-6:, :, 0] * importance.variance[-6:, None],
-                        experiment.sources, design)  # fmt: skip
+    part = _parts(importance.total[-6:, :, 0] * importance.variance[-6:, None])
+    gain = platform_gains(experiment, design)
     indices, moves = ("quantity", "group", "estimate"), ("component", "group")
     kept = slice(0, len(names))
     values = {
@@ -145,7 +155,7 @@ def importance_dataset(
         "quantity": names, "group": list(importance.groups),
         "estimate": ["value", "lower", "upper"],
         "component": ["rotation", "translation"],
-        "error_unit": ("group", _units(experiment.sources, design)),
+        "error_unit": ("group", error_units(experiment.sources, design)),
     }  # fmt: skip
     attributes = {
         "importance_draws": len(design.A),
@@ -154,24 +164,14 @@ def importance_dataset(
     return xarray.Dataset(data, labels, attributes)
 
 
-def _parts(
-    variances: NDArray, sources: ErrorSources, design: SaltelliDesign
-) -> tuple[NDArray, NDArray]:
-    """(2, d) parts and gains from the variance (6, d) of the screw due to groups."""
+def _parts(variances: NDArray) -> NDArray:
+    """(2, d) parts from the variance (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
     # a component that does not vary has no index, and adds nothing to the part
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
-    spread = np.array([sources.variance[columns].sum() for _, columns in design.groups])
-    alike = np.array([u != "rad, m" for u in _units(sources, design)])
-    return part, np.where(alike, part / np.sqrt(spread), np.nan)
-
-
-def _units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
-    """Units of the errors of each group."""
-    angles = [sources.component[columns] < 3 for _, columns in design.groups]
-    return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]
+    return part
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
@@ -181,7 +181,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         data: with it, or merged with the draws.
 
     Returns:
-        Base draws, the indices of each quantity, and by group part and gain; the share
+        Base draws, the indices of each quantity with the ranks that their intervals
+        allow, and by group part and gain; the share
         of draws discarded and, where there are no indices, a reason.
     """
     groups = [str(g) for g in data["group"].values]
@@ -200,6 +201,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
             results["reason"] = "it does not vary"
         for key in ("first_index", "total_index"):
             results[key] = dict(zip(groups, of_quantity[key].values, strict=True))
+        results["rank"] = possible_ranks(results["total_index"])
         quantities[q] = results
     platform = {
         group: {
@@ -219,11 +221,12 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """The same as a table for people, the largest parts first."""
+    """The same as a table for people, the largest shares first."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
-        f"{report['play']} in the shares, least in what moves the platform:"
+        f"{report['play']} in the shares, least in what moves the platform (its slopes "
+        "are exact):"
     ]
     for name, one in quantities.items():
         if "reason" in one:
@@ -233,26 +236,44 @@ def importance_text(report: Mapping[str, Any]) -> str:
                 f"{name}: up to {one['largest_share_left_out']:.1%} of the draws have "
                 "no answer and are left out"
             )
-    total = quantities["translation"]["total_index"]
-    platform = report["platform"]
+    translation, platform = quantities["translation"], report["platform"]
+    total, rank = translation["total_index"], translation.get("rank", {})
     order = sorted(
-        platform, key=lambda g: -np.nan_to_num(platform[g]["translation_part"])
-    )
+        platform,
+        key=lambda g: (-np.nan_to_num(total[g][0]),
+                       -np.nan_to_num(platform[g]["translation_part"])),
+    )  # fmt: skip
     width = max(map(len, ("error", *order[:_ROWS])))
     head = f"{'error':{width}}  platform [um]  for each um  for each mrad"
-    lines.append(f"{head}  [mrad]  share of translation's variance")
-    for group in order[:_ROWS]:
-        one = platform[group]
-        gain = {
-            "m": (f"{one['translation_gain']:11.3g}", " " * 13),
-            "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
-        }.get(one["error_unit"], (" " * 11, " " * 13))
-        value, low, high = total[group]
-        lines.append(
-            f"{group:{width}}  {1e6 * one['translation_part']:13.3g}  {gain[0]}  "
-            f"{gain[1]}  {1e3 * one['rotation_part']:6.3g}  "
-            f"{value:.3f} ({low:.3f} to {high:.3f})"
-        )
+    lines.append(f"{head}  [mrad]  share of translation's variance  rank")
+    lines += [
+        f"{group:{width}}  {_moves_text(platform[group])}  "
+        f"{_interval_text(total[group]):31}  {rank_text(rank.get(group))}".rstrip()
+        for group in order[:_ROWS]
+    ]
     if len(order) > _ROWS:
         lines.append(f"and {len(order) - _ROWS} more, see --json")
+    if any(first < last for first, last in rank.values()):
+        lines.append(NOT_DISTINGUISHED)
+    if rank:
+        largest = [name for name in order if name in leaders(rank)]
+        lines.append(f"largest: {', '.join(named_together(largest, rank))}")
     return "\n".join(lines)
+
+
+def _moves_text(one: Mapping[str, Any]) -> str:
+    """Part and exact slope of a group, in the table's columns."""
+    gain = {
+        "m": (f"{one['translation_gain']:11.4g}", " " * 13),
+        "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
+    }.get(one["error_unit"], (" " * 11, " " * 13))
+    return (
+        f"{1e6 * one['translation_part']:13.3g}  {gain[0]}  {gain[1]}  "
+        f"{1e3 * one['rotation_part']:6.3g}"
+    )
+
+
+def _interval_text(share: NDArray) -> str:
+    """A share with its interval."""
+    value, low, high = share
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from assembly.kinematics.posture import POSE
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
     ImportanceOptions,
@@ -27,6 +27,7 @@ from assembly.statistics.importance_table import (
     importance_design,
     importance_rows,
 )
+from assembly.statistics.perfect_parts import stored_perfect_parts
 from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
@@ -157,9 +158,10 @@ def _solved(
                 future.cancel()
 
 
-def provenance(experiment: Experiment) -> dict[str, str | int]:
+def provenance(experiment: Experiment) -> dict[str, str | int | float]:
     """Values that must be equal for two runs to give the same draws."""
     posture, sources = experiment.posture, experiment.sources
+    contact = experiment.used_contact_length
     numbers = [
         sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
         sources.least, sources.limit, sources.signed, posture.transforms,
@@ -171,6 +173,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int]:
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
         "play": experiment.clearance_model,
+        **({} if contact is None else {"contact_length": contact}),
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
         "stress": int(experiment.stress),
@@ -198,12 +201,13 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
             "stiffness": ("draw", "wrench_component"),
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
     meanings = MEANINGS | {
-        k: f"{MEANINGS[k]}; {CLEARANCE_MODELS[experiment.clearance_model]}"
+        k: f"{MEANINGS[k]}; "
+        f"{play_means(experiment.clearance_model, experiment.used_contact_length)}"
         for k in POSE_ERRORS
     }
     if experiment.clearance_model == "worst":
         meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
-        meanings["platform_screw"] += f"; {CLEARANCE_MODELS['least']}"
+        meanings["platform_screw"] += f"; {play_means('least')}"
     variables = {
         name: (
             dims.get(name, ("draw",)), rows[name],
@@ -219,4 +223,5 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         labels |= {"wrench_component": list(WRENCH), "motion": np.arange(6)}
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
-    return xarray.Dataset(variables, labels, provenance(experiment) | at)
+    alone = {"perfect_parts": stored_perfect_parts(experiment)}
+    return xarray.Dataset(variables, labels, provenance(experiment) | at | alone)

@@ -1,13 +1,15 @@
 """Figures of draws, importance and tolerances, from their data sets alone."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.quantities import POSE_ERRORS
-from forcefit.inputs.errors import plot_label
+from assembly.sweeps.panels import named_panels, quantity
+from forcefit.inputs.errors import BadInput, plot_label
 
 if TYPE_CHECKING:
     import xarray
@@ -29,76 +31,90 @@ NAMES = {
 }  # fmt: skip
 
 
-def figure_of_draws(data: "xarray.Dataset", kind: str | None) -> "Figure | None":
+def figure_of_draws(
+    data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
+) -> "Figure | None":
     """The figure of a data set of draws or tolerances.
 
     Args:
         data: as saved by ``statistics`` or ``tolerances``, or any other.
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
+        quantities: of a histogram, by the names of :mod:`assembly.sweeps.panels`.
 
     Returns:
         The figure; None for another kind of data set.
 
     Raises:
         ValueError: the data set lacks the variables of the kind.
+        BadInput: a quantity is unknown, or named for another kind of figure.
     """
     if kind is None:
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
         kinds = [name for key, name in own.items() if key in (*data, *data.attrs)]
         kind = kinds[0] if kinds else None
-    figures = {
-        "histogram": histogram_figure, "tornado": tornado_figure,
-        "allocation": allocation_figure,
-    }  # fmt: skip
-    return figures[kind](data) if kind is not None else None
+    if kind is None:
+        return None
+    if kind == "histogram":
+        return histogram_figure(data, quantities)
+    if quantities:
+        raise BadInput(f"--quantity: found with {kind}, expected with a histogram")
+    return tornado_figure(data) if kind == "tornado" else allocation_figure(data)
 
 
-def histogram_figure(data: "xarray.Dataset") -> "Figure":
+def histogram_figure(
+    data: "xarray.Dataset", quantities: Sequence[str] = ()
+) -> "Figure":
     """Histograms with medians, 95 % quantiles and most probable values.
 
     Args:
         data: of :func:`assembly.statistics.monte_carlo.run_draws`.
+        quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
+            with a limit if empty.
 
     Returns:
         A panel for each quantity that varies; bands are 95 % confidence intervals.
 
     Raises:
         ValueError: the data set has no draws.
+        BadInput: a quantity is unknown.
     """
     from matplotlib.figure import Figure
 
     if "draw" not in data.dims or "energy" not in data:
         raise ValueError("histograms need a data set of draws")
     solved = data.isel(draw=np.flatnonzero(data["status"].values == 0))
-    names = [n for n in _SCALES if n in solved and solved[n].size]
-    figure = Figure(figsize=(12, 3.2 * -(-len(names) // 2)), layout="constrained")
-    panels = figure.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
-    for panel, name in zip(panels, names, strict=False):
-        _histogram(panel, name, solved[name].values)
+    shown = [panel[:3] for panel in named_panels(data, quantities)] or [
+        (name, scale, f"{NAMES[name]} [{unit}]")
+        for name, (scale, unit) in _SCALES.items()
+        if name in solved and solved[name].size
+    ]
+    figure = Figure(figsize=(12, 3.2 * -(-len(shown) // 2)), layout="constrained")
+    panels = figure.subplots(-(-len(shown) // 2), 2, squeeze=False).ravel()
+    for panel, (name, scale, text) in zip(panels, shown, strict=False):
+        _histogram(panel, text, scale * quantity(solved, name).values)
         if name in POSE_ERRORS:
             panel.set_title(f"play {data.attrs['play']}", fontsize=9)
         if name in _MARGINS:
             half = quantile(np.nan_to_num(data[name].values, nan=np.inf), 0.5)["value"]
             title = f"median of all {data.sizes['draw']} draws: {half:.3g}"
             panel.set_title(title, fontsize=9)
-    for panel in panels[len(names) :]:
+    for panel in panels[len(shown) :]:
         panel.set_axis_off()
     figure.suptitle(
         f"{plot_label(str(data.attrs.get('robot', '')))}: "
         f"of the {solved.sizes['draw']} of {data.sizes['draw']} draws that assemble, "
         f"seed {data.attrs.get('seed', '')}"
         f"\npose errors: play {data.attrs['play']}: "
-        f"{CLEARANCE_MODELS[data.attrs['play']]}"
+        f"{play_means(data.attrs['play'], data.attrs.get('contact_length'))}"
     )
     return figure
 
 
-def _histogram(panel: Any, name: str, values: Any) -> None:
-    """One panel."""
-    scale, unit = _SCALES[name]
-    x = scale * (values.max(axis=1) if values.ndim == 2 else values)
+def _histogram(panel: Any, text: str, values: Any) -> None:
+    """One panel; of a variable with components their largest."""
+    x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
-    panel.set(xlabel=f"{NAMES[name]} [{unit}]", ylabel="draws")
+    panel.set(xlabel=text, ylabel="draws")
     if len(x) < 2 or np.ptp(x) == 0:
         panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center")
         return
@@ -106,7 +122,7 @@ def _histogram(panel: Any, name: str, values: Any) -> None:
     for label, colour, estimate in (
         ("median", "navy", quantile(x, 0.5)),
         ("95 %", "firebrick", quantile(x, 0.95)),
-        ("most probable", "darkgreen", most_probable(x, positive=True)),
+        ("most probable", "darkgreen", most_probable(x, positive=bool((x >= 0).all()))),
     ):
         panel.axvline(
             estimate["value"], color=colour, label=f"{label} {estimate['value']:.3g}"

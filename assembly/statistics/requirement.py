@@ -46,6 +46,8 @@ class Plan:
         seed: of all draws.
         clearance_model: for limits of pose errors, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
+        contact_length: [m] of the contact model, see
+            :class:`assembly.statistics.experiment.Experiment`.
     """
 
     sources: ErrorSources
@@ -60,6 +62,7 @@ class Plan:
     draws: int = 1000
     seed: int = 1
     clearance_model: str = "worst"
+    contact_length: float | None = None
 
     @property
     def limits_pose(self) -> bool:
@@ -114,7 +117,7 @@ class Requirement:
             Experiment(
                 p, plan.sources, margins=False, stress="stress" in plan.limits,
                 clearance_model=plan.clearance_model if plan.limits_pose else "least",
-                precision=(rotation, translation),
+                contact_length=plan.contact_length, precision=(rotation, translation),
             )
             for p in self.postures
         ]  # fmt: skip
@@ -224,6 +227,7 @@ class Requirement:
                 values,
                 key,
                 self.plan.clearance_model,
+                self.plan.contact_length,
             ),
             values,
             key,
@@ -238,33 +242,51 @@ class Requirement:
         def search() -> tuple:
             corner = worst_corner(
                 self.prepared[key][i], self.plan.sources, spread, corners, key,
-                self.plan.clearance_model,
+                self.plan.clearance_model, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
 
         value, signs, slopes = self.replay.recall(search, spread, corners, key, i)
         return Corner(float(value), signs, slopes)
 
-    def check_perfect_parts(self) -> None:
-        """Refuse limits on pose errors that clearances alone exceed, without errors.
+    def perfect_parts(self) -> dict[str, tuple[float, str]]:
+        """What clearances alone take of each limit on a pose error, without errors.
+
+        Returns:
+            By quantity the largest pose error [rad or m] over all postures, a lower
+            bound, and where; none of other clearance models than the worst.
 
         Raises:
-            BadInput: there is one; it gives the largest pose error.
+            BadInput: one of them exceeds its limit.
         """
         if self.plan.clearance_model != "worst" or not self.plan.limits_pose:
-            return
+            return {}
         lower, _ = self.utilisations(np.zeros((1, len(self.plan.sources))))
-        worst = int(lower[:, 0].argmax())
-        key, i = self.cases[worst]
-        if lower[worst, 0] > 1.0 and key in POSE_ERRORS:
-            limit, unit = self.plan.limits[key], UNITS[key]
-            at = self.postures[i].pose().items()
+        reached = {}
+        for key in POSE_ERRORS:
+            rows = [row for row, (k, _) in enumerate(self.cases) if k == key]
+            if not rows:
+                continue
+            row = rows[int(lower[rows, 0].argmax())]
+            limit, share = self.plan.limits[key], float(lower[row, 0])
+            at = self.postures[self.cases[row][1]].pose().items()
             where = ", ".join(f"{k} = {v:.4g}" for k, v in at if abs(v) > 1e-9)
-            raise BadInput(
-                f"limit {key}: even perfect parts reach {limit * lower[worst, 0]:.4g} "
-                f"{unit} by clearances alone at {where or 'the origin'}; expected at "
-                f"most {limit:g} {unit} (or --play least, if clearances stay as solved)"
-            )
+            reached[key] = limit * share, where or "the origin"
+        self._refuse_broken(reached)
+        return reached
+
+    def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
+        """Refuse the limit that clearances alone exceed the most."""
+        limits = self.plan.limits
+        for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
+            value, where = reached[key]
+            if value > limits[key]:
+                unit = UNITS[key]
+                raise BadInput(
+                    f"limit {key}: even perfect parts reach {value:.4g} {unit} by "
+                    f"clearances alone at {where}; expected at most {limits[key]:g} "
+                    f"{unit} (or --play least, if clearances stay as solved)"
+                )
 
     def check_taken_up(self) -> None:
         """Refuse errors that neither clearances nor springs take up at some posture.

@@ -7,7 +7,7 @@ from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
 from assembly.batch.many_margins import PostureMargins
 from assembly.model.error_distributions import ErrorSources, draw_generator
-from assembly.model.link_stress import LinkStress, stressed_links
+from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
@@ -24,6 +24,7 @@ _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 def respond(
     prepared: PostureMargins | OnePosture, sources: ErrorSources, values: NDArray,
     key: str = "energy", clearance_model: str = "worst",
+    contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """A quantity for given errors, and its slopes with each of them.
 
@@ -37,6 +38,8 @@ def respond(
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
             worst, value and slopes are those of the largest error found.  With uniform
             and contact positions the slopes are those of the solution of (22).
+        contact_length: [m] of the contact model, see
+            :class:`assembly.statistics.experiment.Experiment`.
 
     Returns:
         (k,) and (k, m); NaN where there is no solution.
@@ -55,10 +58,10 @@ def respond(
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
-        some = _selected(draws, solved)
+        some = draws.taken(solved)
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
-                prepared, some, errors[solved], key, clearance_model, solved
+                prepared, some, key, (clearance_model, contact_length), solved
             )
             by_wrench = np.zeros_like(wrenches[solved])
         else:
@@ -71,29 +74,26 @@ def respond(
 
 
 def _pose_error(
-    prepared: OnePosture, draws: Draws, errors: NDArray, key: str, clearance_model: str,
+    prepared: OnePosture, draws: Draws, key: str, model: tuple[str, float | None],
     numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
     """Size of a pose error, and its slopes with platform screw and clearances."""
-    part = 3 * POSE_ERRORS.index(key)
+    part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance_model == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
-        bounds, screws = bound_worst_errors(prepared, draws, errors, precision)
+        bounds, screws = bound_worst_errors(prepared, draws, draws.errors, precision)
         which = POSE_ERRORS.index(key)
         by_screw, by_clearance = worst_error_slopes(
             prepared, draws, key, screws[:, which]
         )
         return bounds[:, which, 0], by_screw, -by_clearance
     generators = [draw_generator(1, i, CLEARANCE_STREAM) for i in numbers.tolist()]
-    screws, _ = position_clearances(prepared, draws, clearance_model, generators)
+    screws, _ = position_clearances(
+        prepared, draws, clearance_model, generators, contact_length
+    )
     slopes = np.zeros_like(screws)
     size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])
     return size, slopes, None
-
-
-def _selected(draws: Draws, rows: NDArray) -> Draws:
-    """Some of the draws."""
-    return Draws(*(getattr(draws, name)[rows] for name in Draws.__dataclass_fields__))
 
 
 def _wrench_quantity(
@@ -101,17 +101,21 @@ def _wrench_quantity(
 ) -> tuple[NDArray, NDArray]:
     """The largest moment, force or stress, and its slopes with the wrenches."""
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
+    at_tips = prepared.at_tips
     if key != "stress":
-        sizes, own = _size(wrenches[:, :, _PARTS[key]])
+        sizes, own = _size((wrenches - at_tips)[:, :, _PARTS[key]])
         worst = sizes.argmax(axis=1)
         slopes[draws, worst, _PARTS[key]] = own[draws, worst]
         return sizes[draws, worst], slopes
     links = stressed_links(prepared.posture.robot)
-    peaks = np.stack([link.peak(wrenches[:, link.row]) for link in links], axis=1)
+    each = [link.peak(wrenches[:, link.row], at_tips[link.row]) for link in links]
+    peaks = np.stack(each, axis=1)
     worst = peaks.argmax(axis=1)
     for i, link in enumerate(links):
         some = np.flatnonzero(worst == i)
-        slopes[some, link.row] = _stress_slopes(link, wrenches[some, link.row])
+        slopes[some, link.row] = _stress_slopes(
+            link, wrenches[some, link.row], at_tips[link.row]
+        )
     return peaks[draws, worst], slopes
 
 
@@ -121,7 +125,9 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
 
-def _stress_slopes(link: LinkStress, wrenches: NDArray) -> NDArray:
+def _stress_slopes(
+    link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
+) -> NDArray:
     """(k, 6) slopes of the peak stress with a link's wrench."""
     # differences of the formula, not of the solution: a fibre's stress is the root of
     # a quadratic form, and central differences lose 1e-10 of its slope
@@ -131,6 +137,7 @@ def _stress_slopes(link: LinkStress, wrenches: NDArray) -> NDArray:
         for c in range(part.start, part.stop):
             change = step * np.eye(6)[c]
             slopes[:, c] = (
-                link.peak(wrenches + change) - link.peak(wrenches - change)
+                link.peak(wrenches + change, at_tip)
+                - link.peak(wrenches - change, at_tip)
             ) / (2 * step)
     return slopes

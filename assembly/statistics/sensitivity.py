@@ -51,7 +51,7 @@ def solution_slopes(
 
     Args:
         prepared: the posture.
-        draws: of :meth:`OnePosture.solve`, k draws, none under a load.
+        draws: of :meth:`OnePosture.solve`, k draws.
         by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
         by_screw: (k, 6) and with the platform's screw.
         by_clearance: (k, nu) and with the clearances, in units of their cones.
@@ -65,6 +65,8 @@ def solution_slopes(
     closure_columns = A @ prepared.joints.cones
     H = prepared.redundant.T @ closure_columns
     forces = draws.multipliers @ closure_columns
+    if prepared.loads is not None:
+        forces += prepared.loads.frame_loads.joint @ prepared.joints.cones
     P, N = _active_clearances(prepared, draws, forces)
     size = nu + len(H)
     K = np.zeros((k, size, size))
@@ -93,9 +95,10 @@ def _active_clearances(
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
     # inside a zone multipliers y are rounding: energies y^2 / 2 beside forces G y
-    some = np.flatnonzero(
-        draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(axis=1, initial=0.0)
+    pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
+        axis=1, initial=0.0
     )
+    some = np.flatnonzero(pressed | (prepared.loads is not None))
     largest = np.abs(forces).max(axis=1, initial=0.0)
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         own = forces[some, first:end]

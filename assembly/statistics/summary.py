@@ -5,6 +5,7 @@ that assemble, whose number is given with each.  Margins exist for all draws, an
 summarised for all as well.  Every pose error is given with its clearance model.
 """
 
+import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
-from assembly.statistics.clearance_positions import CLEARANCE_MODELS
+from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.estimates import (
     bracketed,
     mean,
@@ -21,6 +22,7 @@ from assembly.statistics.estimates import (
     quantile,
 )
 from assembly.statistics.importance_table import importance_report, importance_text
+from assembly.statistics.perfect_parts import limits_broken, perfect_text
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.stiffness_spread import (
     stiffness_report,
@@ -56,9 +58,11 @@ def summarise(
         level: of confidence of all intervals.
 
     Returns:
-        ``draws`` and how many of them are ``assembled``; ``play`` and what it means;
+        ``draws`` and how many of them are ``assembled``; ``play``, what it means and
+        its ``contact_length`` [m];
         ``assembles`` (with any energy, rigidly in both readings), ``exceeds`` and
-        ``within_limits`` with the probabilities among all draws; mean, quantiles and
+        ``within_limits`` with the probabilities among all draws; what perfect parts
+        reach (``perfect_parts``) and which limits they break; mean, quantiles and
         most probable value of every quantity among those that assemble, of margins
         also among all; mean, covariance and most probable platform screw.
 
@@ -69,10 +73,11 @@ def summarise(
     if strength is not None:
         limits.setdefault("stress", strength)
     count, play = data.sizes["draw"], str(data.attrs["play"])
+    length = data.attrs.get("contact_length")
     solved = data["status"].values == 0
     report: dict[str, Any] = {
         "draws": count, "assembled": int(solved.sum()), "confidence": level,
-        "play": play, "play_means": CLEARANCE_MODELS[play],
+        "play": play, "play_means": play_means(play, length), "contact_length": length,
         "assembles": {"forced": proportion(int(solved.sum()), count, level)},
         "duality_gap": float(np.nanmax(data["duality_gap"].values, initial=0.0)),
     }  # fmt: skip
@@ -84,6 +89,8 @@ def summarise(
         unmixed = int((data["play_mixed"].values[solved] == 0).sum())
         report["play_not_mixed"] = unmixed
     report |= _yields(data, solved, limits, level)
+    report["perfect_parts"] = json.loads(data.attrs.get("perfect_parts", "{}"))
+    report["perfect_parts_break"] = limits_broken(report["perfect_parts"], limits)
     report["quantities"] = {
         key: _described(data, key, solved, level)
         for key in UNITS
@@ -192,6 +199,11 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
         f"pose errors: play {summary['play']}: {summary['play_means']}",
     ]
+    if summary["play"] == "contact" and not summary.get("load"):
+        lines.append(
+            "the contact length decides which clearances close; with the load of "
+            "service (--load) they close as it presses them"
+        )
     if summary.get("play_not_mixed"):
         lines.append(
             f"warning: in {summary['play_not_mixed']} draws uniform clearances are not "
@@ -204,6 +216,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     if "within_limits" in summary:
         results = summary["within_limits"]
         lines.append(f"{_titled('yield', results)}, all limits met: {_share(results)}")
+    lines += perfect_text(summary)
     lines.append(f"of the {assembled} of {draws} draws that assemble:")
     if not assembled:
         lines[-1] += " nothing to say"

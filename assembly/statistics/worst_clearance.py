@@ -12,7 +12,6 @@ Under a load the same holds for energy minus work: only clearances that no load 
 are free.
 """
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
-from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.energy import CannotAssemble
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
@@ -101,16 +100,9 @@ def _under_load(
     prepared: OnePosture, errors: NDArray, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
     """Bounds and screws of one loaded draw; NaN if the solver failed."""
-    assert prepared.loads is not None
-    posture = replace(
-        prepared.posture, robot=prepared.posture.robot.with_errors(errors)
-    )
     try:
-        assembly = solve_assembly(
-            posture, prepared.loads.load, gravity=prepared.loads.gravity
-        )
         error_bound = bound_pose_error(
-            assembly, READING,
+            prepared.assembly(errors), READING,
             tolerance_rotation=precision[0], tolerance_translation=precision[1],
         )  # fmt: skip
     except (CannotAssemble, SolverFailed, FreeMotion):

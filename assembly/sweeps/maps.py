@@ -3,12 +3,13 @@
 Functions take a data set and return a figure; none solves, shows or saves.
 """
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
 
@@ -17,32 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# variable, factor, title, colours: the six panels of the paper's figure 5, then those
-# that replace the last two where they were not asked for
-_PAPER = (
-    ("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
-    ("energy", 1.0, "minimum assembly energy [J]", "inferno"),
-    ("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
-    ("translation", 1e3, "platform position error [mm]", "viridis"),
-    ("rotation_error_play", 1e3,
-     "orientation error by clearances alone [mrad]", "viridis"),
-    ("translation_error_play", 1e3,
-     "position error by clearances alone [mm]", "viridis"),
-)  # fmt: skip
-_RIGID = ("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
-_SAFETY = ("safety", 1.0, "yield strength over peak stress [-]", "viridis")
-_STIFFNESS = (
-    ("softest", 1e-6, "softest eigen-stiffness [N/um]", "viridis"),
-    ("stiffness_condition", 1.0, "condition of the stiffness [-]", "magma_r"),
-)
-
-_FREQUENCY = ("lowest", 1.0, "lowest natural frequency [Hz]", "viridis")
-
-Panel = tuple[str, float, str, str]
-
 
 def figure_of(
-    data: "xarray.Dataset", at: Mapping[str, float | str] | None = None
+    data: "xarray.Dataset",
+    at: Mapping[str, float | str] | None = None,
+    quantities: Sequence[str] = (),
 ) -> "Figure":
     """Maps of a sweep over two axes, or lines along one.
 
@@ -50,19 +30,22 @@ def figure_of(
         data: of a sweep, as saved.
         at: values on other axes, by name, the nearest is taken; unless a draw is
             chosen, the median of the draws is shown.
+        quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
+            of the paper's figure 5 if empty.
 
     Returns:
-        A figure with six panels.
+        A figure with a panel for each, six if none is named.
 
     Raises:
-        BadInput: an axis is unknown, or more than two are left.
+        BadInput: an axis or a quantity is unknown, or more than two axes are left.
     """
     if "energy" not in data or "status" not in data:
         raise BadInput("figure: found no energy and status; expected those of a sweep")
     view, note = part_of_sweep(data, at or {})
     axes = {str(d): view.sizes[d] for d in view["energy"].dims}
     check_axes(axes)
-    figure = map_figure(view) if len(axes) == 2 else path_figure(view)
+    panels = named_panels(view, quantities) if quantities else None
+    figure = (map_figure if len(axes) == 2 else path_figure)(view, panels)
     if note:
         figure.text(0.995, 0.995, plot_label(note), ha="right", va="top", fontsize=8)
     return figure
@@ -119,7 +102,7 @@ def part_of_sweep(
             )
         data = data.isel({name: place})
         note.append(f"{name} = {labels[place]}")
-    data = data.squeeze(drop=True)
+    data = _squeezed(data)
     if "draw" in data["energy"].dims:
         note.append(f"median of {data.sizes['draw']} draws")
         data = _median(data)
@@ -153,11 +136,20 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
     return middle
 
 
-def map_figure(data: "xarray.Dataset") -> "Figure":
+def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
+    """Without the points' axes of one value."""
+    single = [d for d in data["energy"].dims if data.sizes[d] == 1]
+    return data.squeeze(single, drop=True)
+
+
+def map_figure(
+    data: "xarray.Dataset", panels: Sequence[Panel] | None = None
+) -> "Figure":
     """Maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
         data: of a sweep over two axes with more than one value each.
+        panels: to be shown; the usual ones and the status if absent.
 
     Returns:
         A figure with a panel for each quantity; the contour of margin 1 bounds the
@@ -166,17 +158,14 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
     Raises:
         ValueError: the grid does not have two such axes.
     """
-    from matplotlib.figure import Figure
-
-    data = _along_numbers(data.squeeze(drop=True))
+    data = _along_numbers(_squeezed(data))
     names = [str(d) for d in data["energy"].dims]
     if len(names) != 2:
         raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
     x, y = names
-    figure = Figure(figsize=(11, 11), layout="constrained")
-    axes = figure.subplots(3, 2).ravel()
-    panels = _panels(data)
-    for panel, (key, scale, title, colours) in zip(axes, panels, strict=False):
+    shown = panels or usual_panels(data)
+    figure, axes = _figure_for(len(shown), 3.7)
+    for panel, (key, scale, title, colours) in zip(axes, shown, strict=False):
         values = quantity(data, key).transpose(y, x)
         finite = scale * values.where(np.isfinite(values))
         image = panel.pcolormesh(data[x], data[y], finite, cmap=colours)
@@ -190,30 +179,41 @@ def map_figure(data: "xarray.Dataset") -> "Figure":
             panel.contour(data[x], data[y], finite, levels=[1.0], colors="cyan")
         _mark(panel, data, x, y)
         _label(panel, data, x, y, title)
-    if len(panels) < len(axes):
+    if len(shown) < len(axes):
         _states(axes[-1], data, x, y)
     figure.suptitle(_caption(data), fontsize=10)
     return figure
 
 
-def path_figure(data: "xarray.Dataset") -> "Figure":
+def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
+    """A figure with so many panels and at most one more, side by side."""
+    from matplotlib.figure import Figure
+
+    rows, columns = -(-count // 2), min(count, 2)
+    size = (5.5 * columns, height * rows) if columns > 1 else (7.0, 1.5 * height)
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, list(figure.subplots(rows, columns, squeeze=False).ravel())
+
+
+def path_figure(
+    data: "xarray.Dataset", panels: Sequence[Panel] | None = None
+) -> "Figure":
     """The same quantities along one axis, or from posture to posture of a list.
 
     Args:
         data: of a sweep over one axis.
+        panels: to be shown; the usual ones and the condition if absent.
 
     Returns:
         A figure with a panel for each quantity; crosses mark nearby singularities.
     """
-    from matplotlib.figure import Figure
-
-    data = _along_numbers(data.squeeze(drop=True))
+    data = _along_numbers(_squeezed(data))
     (x,) = (str(d) for d in data["energy"].dims)
     along = data[x].values
     near = _near(data)
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    axes = figure.subplots(3, 2).ravel()
-    for panel, (key, scale, title, _) in zip(axes, _panels(data), strict=False):
+    shown = panels or usual_panels(data)
+    figure, axes = _figure_for(len(shown), 3.0)
+    for panel, (key, scale, title, _) in zip(axes, shown, strict=False):
         values = quantity(data, key).values
         values = scale * np.where(np.isfinite(values), values, np.nan)
         panel.plot(along, values, ".-", color="tab:blue")
@@ -222,7 +222,10 @@ def path_figure(data: "xarray.Dataset") -> "Figure":
             panel.axhline(1.0, color="tab:cyan", linewidth=1)
         panel.set(title=title, xlabel=_axis_name(data, x))
         panel.grid(alpha=0.3)
-    if len(_panels(data)) < len(axes):
+    if panels is not None:
+        for panel in axes[len(shown) :]:
+            panel.set_axis_off()
+    elif len(shown) < len(axes):
         axes[-1].semilogy(along, data["condition"].values, ".-")
         axes[-1].set(
             title="condition, drives to platform [-]", xlabel=_axis_name(data, x)
@@ -238,31 +241,6 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
         data = data.sortby(name)
     return data
-
-
-def _panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels whose variables a data set has."""
-    if "rotation_error_play" in data:
-        return _PAPER
-    middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
-    if "frequency" in data:
-        middle = (_FREQUENCY, middle[1 if "eigen_stiffness" not in data else 0])
-    return (*_PAPER[:2], *middle, _RIGID, _SAFETY)[: 6 if "safety" in data else 5]
-
-
-def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A variable; for pose errors the upper bound, or else half the platform screw."""
-    if key == "softest":
-        return data["eigen_stiffness"].isel(eigen=0, drop=True)
-    if key == "lowest":
-        return data["frequency"].isel(mode=0, drop=True)
-    halves = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-    if key not in halves:
-        return data[key].sel(bound="upper", drop=True) if "play" in key else data[key]
-    if f"{key}_error" in data:
-        return data[f"{key}_error"].sel(bound="upper", drop=True)
-    part = data["platform_screw"].isel(screw=halves[key])
-    return np.sqrt((part**2).sum("screw", skipna=False))
 
 
 def _near(data: "xarray.Dataset") -> NDArray:

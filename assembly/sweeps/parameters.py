@@ -145,9 +145,10 @@ def load_design(name: str | Path) -> Design:
     Raises:
         BadInput: neither a built-in name nor a file.
     """
-    from assembly.robots import BUILT_IN, load_robot
+    from assembly.exchange.robot_files import OTHERS, load_robot
+    from assembly.robots import BUILT_IN
 
-    if str(name) in BUILT_IN:
+    if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
         return design_of(load_robot(name))
     robot = load_robot(name)  # refuses a wrong file before numbers are changed
     return Design(read_toml(Path(name)).content, str(name), robot.name)

@@ -64,15 +64,16 @@ def is_loaded(conditions: Conditions) -> bool:
     return bool(loaded or conditions.laws or conditions.yields)
 
 
-def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray]:
+def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray, NDArray]:
     """Least energies of all rows under loads.
 
     Args:
         conditions: k rows of a robot of n frames.
 
     Returns:
-        Assemblies, screws and certificates in the order given; and the (k, n, 6)
-        [N m, N] wrenches through the bodies.
+        Assemblies, screws and certificates in the order given; the (k, n, 6) [N m, N]
+        wrenches of the links' springs; and (k, n, 6) of these the part that is the
+        links' own weight.
     """
     c = conditions
 
@@ -82,20 +83,22 @@ def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray]:
         return assembly
 
     if c.laws or c.yields:
-        wrenches = np.full((len(c), len(c.robot.frames), 6), np.nan)
+        wrenches, at_tips = np.full((2, len(c), len(c.robot.frames), 6), np.nan)
 
         def noted(i: int) -> Assembly:
             assembly = one(i)
             wrenches[i] = assembly.wrenches
+            at_tips[i] = assembly.frame_loads.at_tips
             return assembly
 
-        return solve_each(c.robot, len(c), noted), wrenches
+        return solve_each(c.robot, len(c), noted), wrenches, at_tips
     loads = loads_with_weight(c.postures, c.load_at_origin(), c.gravity)
     energies = minimise_under_loads(
         c.robot, c.transforms, loads, one, c.errors, c.mismatch
     )
     through = wrenches_of(c.robot, c.transforms, energies.multipliers)
-    return energies, through + loads.body.reshape(through.shape)
+    at_tips = np.broadcast_to(loads.at_tips, through.shape)
+    return energies, through + loads.body.reshape(through.shape), at_tips
 
 
 def wrenches_of(robot: Robot, T: NDArray, multipliers: NDArray) -> NDArray:

@@ -210,9 +210,9 @@ def _solve_reached(
         zone = zone_margins(robot, T, compliant, mismatch, errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
-    wrenches = None
+    wrenches = at_tips = None
     if is_loaded(conditions):
-        energies, wrenches = assemble_rows(conditions)
+        energies, wrenches, at_tips = assemble_rows(conditions)
     else:
         energies = minimise_energies(robot, T, errors, mismatch)
     ok = _solved_rows(energies, failed, solved, rows)
@@ -229,7 +229,8 @@ def _solve_reached(
     if wrenches is None and (question.wrenches or question.strength is not None):
         wrenches = wrenches_of(robot, T, energies.multipliers)
     if wrenches is not None:
-        _record_wrenches(question, robot, wrenches[ok], solved, rows_ok)
+        own = np.zeros_like(wrenches) if at_tips is None else at_tips
+        _record_wrenches(question, robot, wrenches[ok], own[ok], solved, rows_ok)
     if question.clearance_only:
         _bound_clearance_only(perfect, T, mismatch, solved, rows)
     if question.reading is not None and ok:
@@ -264,16 +265,16 @@ def _solved_rows(
 
 
 def _record_wrenches(
-    question: Question, robot: Robot, wrenches: NDArray, solved: SolvedPoints,
-    rows: NDArray,
+    question: Question, robot: Robot, wrenches: NDArray, at_tips: NDArray,
+    solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
     """Wrenches at the frames asked for, and the stress of the links."""
     out = solved.records
     if question.wrenches:
         chosen = [robot.index(name) for name in question.wrenches]
-        out["wrench"][rows] = wrenches[:, chosen]
+        out["wrench"][rows] = (wrenches - at_tips)[:, chosen]
     if question.strength is not None:
-        stress = peak_stresses(robot, wrenches)
+        stress = peak_stresses(robot, wrenches, at_tips)
         out["stress"][rows] = stress
         with np.errstate(divide="ignore"):
             out["safety"][rows] = question.strength / stress.max(axis=1)

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects.robot_effects import check_covariates
+from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import rest_in
 from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import check_masses
-from assembly.robots import load_robot
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.point_conditions import is_loaded, point_conditions

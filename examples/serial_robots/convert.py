@@ -50,12 +50,15 @@ def convert(file: Path, out: Path) -> Path:
     robot = load_robot(HERE / f"{name}.toml")
     q = np.radians([[float(row[joint]) for joint in joints] for row in rows])
     target = np.array([[float(row[f"{k}_t"]) for k in _AXES] for row in rows]) / 1e3
-    left = np.array([[float(row[f"{k}_dif"]) for k in _AXES] for row in rows]) / 1e3
+    deviation = (
+        np.array([[float(row[f"{k}_dif"]) for k in _AXES] for row in rows]) / 1e3
+    )
     _check_targets(file, robot, q, target)
     columns = {"id": np.array([f"m{row['step_order']}" for row in rows])}
     columns |= {f"q.joint{k + 1}": angle for k, angle in enumerate(q.T)}
-    # the file says target minus reached; a campaign, reached minus target
-    columns |= {f"meas.t{k}": -left[:, i] for i, k in enumerate(_AXES)}
+    # reached = target + difference: so their sums have the six decimals that the
+    # tracker writes, in every row, and target - difference in none
+    columns |= {f"meas.t{k}": deviation[:, i] for i, k in enumerate(_AXES)}
     return write_campaign(out, robot, columns, (1e-4, SIGMA[name]))
 
 

@@ -14,6 +14,7 @@ import typer
 
 from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
+from forcefit.commands.example import example
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, one_line, quoted
@@ -30,6 +31,7 @@ app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
 app.add_typer(validation.app, name="validation", help="Is it true?")
 app.add_typer(report.app, name="report", help="What changed between two runs?")
 app.command()(convert)
+app.command()(example)
 
 
 def _print_version(asked: bool) -> None:
@@ -130,6 +132,9 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
     # an option misspelt or missing: the parser's own kind of error
     if not hasattr(error, "format_message"):
         raise error
+    if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help
+        print(error.format_message(), file=sys.stderr)
+        return 2
     return _complain(_with_found(error.format_message(), error), 2)
 
 

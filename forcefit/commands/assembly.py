@@ -28,7 +28,7 @@ from forcefit.commands.options import (
 from forcefit.commands.platform_stiffness import stiffness
 from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.commands.statistics import statistics, tolerances
-from forcefit.commands.sweep import plot, sweep
+from forcefit.commands.sweep import plot, sweep, table
 from forcefit.inputs.errors import BadInput, checked, nearest
 from forcefit.inputs.writing import (
     PIXELS,
@@ -268,6 +268,6 @@ def show(
 
 
 for command in (
-    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot
+    stiffness, deflection, frequencies, statistics, tolerances, sweep, plot, table
 ):  # fmt: skip
     app.command()(command)

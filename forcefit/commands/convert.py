@@ -43,7 +43,9 @@ def convert(
     """Convert a robot from or to URDF, MJCF and SDF.
 
     A home pose is found where the file's own leaves loops open.  What is written is
-    read back and compared in 100 random postures; what it cannot hold is listed.
+    read back and compared in 100 random postures; what it cannot hold is listed.  Where
+    MuJoCo is installed, what it reads in the same URDF or MJCF is compared too: exit
+    status 1 if that is another robot.
     """
     from assembly.exchange.convert import convert as convert_robot
 
@@ -55,3 +57,5 @@ def convert(
     write_json(conversion.table(), json)
     if json != "-":
         print(conversion.text())
+    if not conversion.agrees:
+        raise typer.Exit(1)

@@ -40,13 +40,14 @@ def predict(
     ],
     json: JsonOption = None,
 ) -> None:
-    """Foretell the readings of a campaign or a table.
+    """Predict the readings of a campaign or a table.
 
-    With the geometric errors, effects and functions of the robot's file.  Where rows
-    are measured, the error of the foretelling is printed.  Exit status 1 if a row has
-    no answer; its cells are empty.
+    With the geometric errors, effects and functions of the robot's file, and with
+    intervals where the file says how uncertain they are.  Where rows are measured, the
+    error of the prediction is printed.  Exit status 1 if a row has no answer; its cells
+    are empty.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
     from validation.correction.prediction import foretell, reading_table
 
@@ -59,15 +60,39 @@ def predict(
         print(f"{output}: {len(prediction.commands)} readings")
         position, rotation, sigma = prediction.error
         if position == position:
-            print(f"rms of measured minus foretold: {1e6 * position:.4g} um")
+            print(f"rms of measured minus predicted: {1e6 * position:.4g} um")
         if rotation == rotation:
             print(f"  rotation: {1e6 * rotation:.4g} urad")
         if sigma == sigma:
             print(f"  in sigma: {sigma:.4g}")
+        print("\n".join(_about(table)))
         for row in table["without_answer"]:
             print(f"{row['id']}: {row['reason']}")
     if table["without_answer"]:
         raise typer.Exit(1)
+
+
+def _about(table: dict[str, Any]) -> list[str]:
+    """What a prediction rests on, a line each."""
+    lines = []
+    std, noise = table["std"], table["noise"]
+    if std["position"] > 0.0 or std["rotation"] > 0.0:
+        lines.append(
+            f"uncertainty of the model, 1 sigma: {1e6 * std['position']:.4g} um, "
+            f"{1e6 * std['rotation']:.4g} urad; of a reading about it: "
+            f"{1e6 * noise['position']:.4g} um, {1e6 * noise['rotation']:.4g} urad"
+        )
+    if table["registration"] != "known":
+        lines.append(f"registration: {table['registration']}")
+    if table["identified_at"] is not None:
+        lines.append(
+            f"readings of the point {table['reference_point']} [m]; the robot was "
+            f"identified at {table['identified_at']}"
+        )
+    if table["extrapolated"]:
+        count = len(table["extrapolated"])
+        lines.append(f"{count} rows extrapolate (column extrapolated)")
+    return lines
 
 
 def compensate(
@@ -103,7 +128,7 @@ def compensate(
     wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
     row has no answer; its command is unchanged.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
     from validation.correction import compensation_table as tables
     from validation.correction.compensation import compensate as correct
@@ -174,8 +199,8 @@ def carry(
     declared robot's.  Exit status 1, and no robot written, where the set-up rows do not
     suffice or the saved robot is worse than the declared one.
     """
+    from assembly.exchange.robot_files import load_robot
     from assembly.files.robot_file import write_robot
-    from assembly.robots import load_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
     from validation.correction import carrying, carrying_table
     from validation.correction.session_unknowns import OF_A_SESSION
@@ -218,7 +243,7 @@ def explain(
 
     With their bands; one that remembers as its answer to a step of one unit.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.correction import curves
 
     if figure is not None:

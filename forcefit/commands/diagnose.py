@@ -1,7 +1,7 @@
 """The command ``forcefit validation diagnose``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,7 +9,11 @@ from forcefit.commands.inspect import CampaignArgument
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
+from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import ROBOT, check_writable, write_json
+
+if TYPE_CHECKING:
+    from validation.diagnosis.diagnosis import Diagnosis
 
 
 def diagnose(
@@ -30,31 +34,45 @@ def diagnose(
             "--finite-motions", help="Motions of the declared model are finite."
         ),
     ] = False,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(help="Leave out an effect, function (any), geometry or springs."),
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="Look for these alone, named likewise.")
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(help="Multiply the prior odds of an effect: NAME=FACTOR."),
+    ] = None,
     save: Annotated[
         Path | None, typer.Option(help="Also write the robot with the effects found.")
     ] = None,
 ) -> None:
     """Trace measured deviations to the effect the model lacks.
 
-    The verdict is explained, learned, none_needed, ambiguous or outside_library; errors
-    before and after are on rows that played no part in choosing or fitting.
+    The verdict is explained, learned, none_needed, ambiguous, outside_library or
+    not_enough_rows; errors before and after are on rows that played no part in choosing
+    or fitting.  The machine found is saved wherever it predicts these rows better.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
     from validation.diagnosis.diagnose import diagnose as trace
+    from validation.diagnosis.saving import save as save_robot
 
     if save is not None:
         check_writable(save, ROBOT)
+    odds = _odds(without or [], only or [], prior or [])
     data = read_campaign(campaign)
     with progress_bars() as update:
-        diagnosis = trace(data, finite=finite_motions, update=update)
+        diagnosis = trace(data, finite=finite_motions, odds=odds, update=update)
     tally = None
     if calibrate:
-        from validation.diagnosis.verdict import calibrate as simulate
+        from validation.diagnosis.calibration import calibrate as simulate
 
         with progress_bars() as update:
             tally = simulate(
-                diagnosis.screen, diagnosis.best, calibrate,
+                diagnosis, calibrate,
                 lambda done, n: update("simulated campaigns", done, n),
             )  # fmt: skip
     write_json(results.table(diagnosis, tally), json)
@@ -68,11 +86,44 @@ def diagnose(
         folder = campaign if campaign.is_dir() else campaign.parent
         write_report(diagnosis, report, tally, provenance(folder))
     if save is not None:
-        if not diagnosis.foretells:
-            typer.echo(
-                f"{save}: not written, the verdict is {diagnosis.verdict}", err=True
-            )
+        if not diagnosis.better:
+            typer.echo(f"{save}: not written, {_worse(diagnosis)}", err=True)
             raise typer.Exit(1)
-        from assembly.files.robot_file import write_robot
+        save_robot(diagnosis, save)
 
-        write_robot(results.corrected(diagnosis), save)
+
+def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, float]:
+    """Factors on the prior odds of what may act, from the options."""
+    from assembly.effects import LIBRARY
+
+    names = [*LIBRARY, "function", "geometry", "springs"]
+    odds = dict.fromkeys(names, 0.0) if only else {}
+    asked = [("--without", n, 0.0) for n in without] + [
+        ("--only", n, 1.0) for n in only
+    ]
+    for text in prior:
+        name, _, factor = text.partition("=")
+        try:
+            value = float(factor)
+        except ValueError:
+            value = float("nan")
+        if not 0.0 < value < 1e9:
+            expected = "expected NAME=FACTOR, above 0"
+            raise BadInput(f"--prior: found {quoted(text)}, {expected}")
+        asked.append(("--prior", name, value))
+    for option, name, value in asked:
+        if name not in names:
+            raise BadInput(f"{option}: found {quoted(name)}{nearest(name, names)}")
+        odds[name] = value
+    return odds
+
+
+def _worse(diagnosis: "Diagnosis") -> str:
+    """Why the machine found is not saved."""
+    if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
+        return "nothing was found that the declared robot lacks"
+    after, before = diagnosis.after.normalised, diagnosis.before.normalised
+    return (
+        "the machine found predicts the held-out rows no better than the declared "
+        f"robot ({after:.3g} and {before:.3g} sigma)"
+    )

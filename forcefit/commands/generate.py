@@ -100,7 +100,7 @@ def generate(
     """
     import numpy as np
 
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.multibody.simulation import SimulationFailed, without_clearance
     from validation.synthetic.design import CampaignDesign
     from validation.synthetic.draws import NotApplicable

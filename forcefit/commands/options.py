@@ -28,7 +28,7 @@ RobotArgument = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="A robot file, or a built-in name.",
+        help="A robot file, a URDF, MJCF or SDF file, or a built-in name.",
         autocompletion=_built_in_names,
     ),
 ]
@@ -251,11 +251,11 @@ def declared_posture(
     rest: str | None = None, mismatch: str | None = None,
 ) -> Any:  # fmt: skip
     """The posture of the options, of the robot without the effects of its file."""
+    from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import preloaded, rest_in
     from assembly.kinematics.posture import home_posture, place_robot
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.model.robot import Robot
-    from assembly.robots import load_robot
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
     if mismatch is not None and (mismatch != "spring" or pose):

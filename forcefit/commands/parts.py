@@ -11,6 +11,7 @@ from forcefit.inputs.number_arrays import comma_numbers
 from forcefit.inputs.table import BadInput, describe
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
+from stiffness.surface.primitives import Plane
 
 _PART = '"z=0.2..0.4/young=2e11,poisson=0.3" or "x=0..1,z=0..0.1/...,density=7800"'
 _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
@@ -45,7 +46,11 @@ def parse_part(option: str, text: str) -> Material:
     density = checked(option, values.get("density", 0.0), "kg/m^3", least=0)
     try:
         return Material(
-            values["young"], values["poisson"], density, partial(_inside, low, high)
+            values["young"],
+            values["poisson"],
+            density,
+            partial(_inside, low, high),
+            _planes(low, high),
         )
     except BadInput as error:
         raise BadInput(f"{option}: {error}") from None
@@ -69,6 +74,17 @@ def parse_mass(option: str, text: str) -> PointMass:
     if weight.shape != (1,) or point.shape != (3,):
         raise BadInput(f"{option}: found {describe(text)}, expected {_MASS}")
     return PointMass(checked(option, float(weight[0]), "kg", above=0), point)
+
+
+def _planes(low: NDArray, high: NDArray) -> tuple[Plane, ...]:
+    """Of a box's faces, unless they are at infinity."""
+    axes = np.eye(3)
+    return tuple(
+        Plane(end[k] * axes[k], axes[k])
+        for end in (low, high)
+        for k in range(3)
+        if np.isfinite(end[k])
+    )
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:

@@ -47,7 +47,7 @@ def plan(
     Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
     temperatures are those to aim at, to be replaced by those that were.
     """
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from validation.inspection import planning
     from validation.synthetic.design import CampaignDesign
     from validation.synthetic.generator import write_campaign

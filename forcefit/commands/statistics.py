@@ -22,6 +22,7 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
+from forcefit.commands.sweep import CsvOption
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.writing import (
     PICTURE,
@@ -38,7 +39,15 @@ PlayOption = Annotated[
     str,
     typer.Option(
         help="Clearance positions for pose errors: worst (any, the largest error "
-        "counts) | uniform | contact | least (that of the solution)."
+        "counts) | uniform | contact (of a wrench of random direction; loads of "
+        "service say more: --load) | least (that of the solution)."
+    ),
+]
+ContactLengthOption = Annotated[
+    float | None,
+    typer.Option(
+        help="[m] --play contact: a random moment over it is as large as a random "
+        "force. Default: the longest body."
     ),
 ]
 
@@ -55,6 +64,7 @@ def statistics(
     ] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
     play: PlayOption = "worst",
+    contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
@@ -90,6 +100,7 @@ def statistics(
         Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
     ] = None,
     report: ReportOption = None,
+    csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
     """Draw errors many times: yields, pose errors, what matters.
@@ -107,8 +118,9 @@ def statistics(
     from assembly.statistics.quantities import parse_limit
     from assembly.statistics.summary import summarise, summary_text
     from assembly.sweeps.dataset import check_dataset
+    from assembly.sweeps.point_table import write_point_table
 
-    _check_clearance_model(play)
+    _check_clearance_model(play, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
     if stiffness is not None:
         _check_word("--stiffness", stiffness, ("contact", "exact"))
@@ -135,6 +147,7 @@ def statistics(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
         stiffness=stiffness or "", precision=precision_for(limits),
+        contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
     options = None
@@ -148,6 +161,8 @@ def statistics(
         )  # fmt: skip
     if figure is not None:
         save_figure(histogram_figure(data), figure)
+    if csv is not None:
+        write_point_table(data, csv)
     summary = {
         "robot": posture.robot.name, "pose": posture.pose(), "seed": seed,
         "load": wrench, "gravity": g,
@@ -171,10 +186,19 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
-def _check_clearance_model(play: str) -> None:
+def _check_clearance_model(play: str, contact_length: float | None) -> None:
+    """Refuse an unknown model, and a length that it does not need or cannot use."""
     from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
     _check_word("--play", play, tuple(CLEARANCE_MODELS))
+    if contact_length is None:
+        return
+    if play != "contact":
+        raise BadInput(
+            f"--contact-length: found with --play {play}, expected --play contact"
+        )
+    if not 0 < contact_length < float("inf"):
+        raise BadInput(f"--contact-length: found {contact_length}, expected > 0 m")
 
 
 @contextmanager
@@ -200,6 +224,7 @@ def tolerances(
         str, typer.Option(help="Present errors: compliant joints free | rigid.")
     ] = "free",
     play: PlayOption = "worst",
+    contact_length: ContactLengthOption = None,
     fresh: Annotated[
         int,
         typer.Option(help="Fresh draws that verify the tolerances.", min=0, max=10**9),
@@ -211,6 +236,7 @@ def tolerances(
         Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
     ] = None,
     report: ReportOption = None,
+    csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
     """How tight errors must be; with a plan, how loose they may be.
@@ -222,8 +248,8 @@ def tolerances(
     """
     from dataclasses import replace
 
+    from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.verdict import SINGULAR
-    from assembly.robots import load_robot
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
     from assembly.statistics.replay import journalled
@@ -237,10 +263,10 @@ def tolerances(
     )
     from assembly.sweeps.dataset import check_dataset
 
-    _check_clearance_model(play)
+    _check_clearance_model(play, contact_length)
     _check_word("--compliant", compliant, ("free", "rigid"))
-    if plan is None and (output or figure):
-        raise BadInput("tolerances: --output and --figure need a --plan")
+    if plan is None and (output or figure or csv):
+        raise BadInput("tolerances: --output, --figure and --csv need a --plan")
     if output is not None:
         check_dataset(output, "tolerances")
     if figure is not None:
@@ -249,11 +275,16 @@ def tolerances(
     asked_plan = (
         None
         if plan is None
-        else replace(read_plan(plan, machine), clearance_model=play)
+        else replace(
+            read_plan(plan, machine),
+            clearance_model=play,
+            contact_length=contact_length,
+        )
     )
     postures, left_out = grid_postures(machine, grid)
     results: dict = {
-        "robot": machine.name, "postures": len(postures), "left_out": left_out
+        "robot": machine.name, "postures": len(postures), "left_out": left_out,
+        "grid": grid,
     }  # fmt: skip
     texts = [left_out_text(left_out)] if left_out else []
     if not postures:
@@ -281,11 +312,11 @@ def tolerances(
             allocation = allocate(postures, asked_plan, fresh, update, replay)
             results["allocation"] = allocation_of(allocation)
             texts.append(allocation_text(results["allocation"]))
-            _save_allocation(allocation, output, figure)
+            _save_allocation(allocation, output, figure, csv)
     write_json(results, json)
     if report is not None:
-        from assembly.statistics.report import tolerances_page
         from assembly.statistics.scenes import margin_map, tightest_robot
+        from assembly.statistics.tolerances_report import tolerances_page
 
         drawings = (margin_map, tightest_robot) if "present" in results else ()
         pictures = [draw(postures, results["present"]) for draw in drawings]
@@ -300,15 +331,19 @@ def tolerances(
 
 
 def _save_allocation(
-    allocation: "Allocation", output: Path | None, figure: Path | None
-) -> None:
-    """The tolerances as a data set and as a picture, where asked for."""
+    allocation: "Allocation", output: Path | None, figure: Path | None,
+    csv: Path | None,
+) -> None:  # fmt: skip
+    """The tolerances as a data set, a picture and a table, where asked for."""
     from assembly.statistics.allocated_tolerances import tolerance_dataset
     from assembly.statistics.plot import allocation_figure
     from assembly.sweeps.dataset import save_dataset
+    from assembly.sweeps.point_table import write_point_table
 
     data = tolerance_dataset(allocation)
     if output is not None:
         save_dataset(data, output)
     if figure is not None:
         save_figure(allocation_figure(data), figure)
+    if csv is not None:
+        write_point_table(data, csv)

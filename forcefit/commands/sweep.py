@@ -1,4 +1,4 @@
-"""The commands ``forcefit assembly sweep`` and ``plot``."""
+"""The commands ``forcefit assembly sweep``, ``plot`` and ``table``."""
 
 import sys
 from contextlib import ExitStack
@@ -21,10 +21,34 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, nearest
-from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
+from forcefit.inputs.writing import (
+    PICTURE,
+    TABLE,
+    check_writable,
+    save_figure,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from assembly.sweeps.sweep import Solver
+
+
+def _table(path: Path | None) -> Path | None:
+    """Refuse a table that could not be written, before the computation."""
+    if path is not None:
+        check_writable(path, TABLE)
+    return path
+
+
+CsvOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--csv",
+        help="Also write a CSV table: a row for each point, a column for each "
+        "component.",
+        callback=_table,
+    ),
+]
 
 
 def sweep(
@@ -101,6 +125,7 @@ def sweep(
     figure: Annotated[
         Path | None, typer.Option(help="Also plot it, as PNG, SVG or PDF.")
     ] = None,
+    csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
     """Margins, energy, errors over postures, designs and draws.
@@ -111,6 +136,7 @@ def sweep(
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.netcdf import stored_dataset
+    from assembly.sweeps.point_table import write_point_table
     from assembly.sweeps.quantities import UNUSABLE
     from assembly.sweeps.request import (
         SweepOptions,
@@ -165,6 +191,8 @@ def sweep(
     data = stored_dataset(output)
     if figure is not None:
         save_figure(figure_of(open_dataset(output)), figure)
+    if csv is not None:
+        write_point_table(output, csv)
     summary = {"output": str(output)} | summary_of(data)
     write_json(summary, json)
     held.close()
@@ -198,6 +226,13 @@ def plot(
         str | None,
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What to show, such as stiffness.FX, frequency.1, translation, "
+            "wrench.leg1.link_a.FZ; may be repeated. A variable alone: all components."
+        ),
+    ] = None,
 ) -> None:
     """Plot a saved file: maps, lines, histograms, tolerances."""
     from assembly.statistics.plot import KINDS, figure_of_draws
@@ -215,7 +250,28 @@ def plot(
         places[name] = value
     data = open_dataset(file)
     try:
-        figure = figure_of_draws(data, kind)
+        figure = figure_of_draws(data, kind, quantity or ())
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places), output)
+    save_figure(figure or figure_of(data, places, quantity or ()), output)
+
+
+def table(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Of a sweep, draws or tolerances.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="CSV file.")],
+    rows: Annotated[
+        str | None,
+        typer.Option(help="Axes of other rows than points, such as quantity,group."),
+    ] = None,
+) -> None:
+    """Write a saved file as CSV, a row for each point.
+
+    There is a column for each component of every variable.  The first column, id,
+    counts the rows from 0; heads have the units in brackets.
+    """
+    from assembly.sweeps.point_table import write_point_table
+
+    axes = [name.strip() for name in rows.split(",")] if rows is not None else []
+    write_point_table(file, output, axes)

@@ -206,7 +206,7 @@ def _crosscheck_grid(
     robot: str, grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
     """Every pose of a grid, with a progress bar."""
-    from assembly.robots import load_robot
+    from assembly.exchange.robot_files import load_robot
     from assembly.sweeps.targets import parse_grid
     from validation.crosscheck.poses import check_poses, poses_table, poses_text
 

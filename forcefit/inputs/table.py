@@ -32,12 +32,36 @@ __all__ = [
     "describe",
     "nearest",
     "quoted",
+    "read_bytes",
     "read_text",
     "read_toml",
 ]
 
 _LARGEST_FILE = 64 << 20  # [byte] a robot of a million frames would be smaller
 _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
+
+
+def read_bytes(path: Path | str) -> bytes:
+    """Content of a file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its bytes.
+
+    Raises:
+        BadInput: the file is absent, a folder, unreadable or far too large.
+    """
+    try:
+        with Path(path).open("rb") as file:  # which may be a pipe, or have no end
+            content = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise BadInput(f"{path}: cannot be read: {reason}") from None
+    if len(content) > _LARGEST_FILE:
+        raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    return content
 
 
 def read_text(path: Path | str) -> str:
@@ -53,14 +77,7 @@ def read_text(path: Path | str) -> str:
         BadInput: the file is absent, a folder, unreadable, far too large, not UTF-8,
             or holds NUL.
     """
-    try:
-        with Path(path).open("rb") as file:  # which may be a pipe, or have no end
-            content = file.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise BadInput(f"{path}: cannot be read: {reason}") from None
-    if len(content) > _LARGEST_FILE:
-        raise BadInput(f"{path}: larger than {_LARGEST_FILE >> 20} MiB")
+    content = read_bytes(path)
     try:
         text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:

@@ -1,9 +1,9 @@
 """C++ of the packages, compiled where a compiler stands.
 
 Libraries are compiled at the first use of one of them, next to each other, for this
-very processor, and kept beside what numba keeps.  A library's name and what it says of
-itself hold a digest of its source, of the compiler's options and of the processor, so
-that none is used that is out of date.
+very processor or for the one that ``FORCEFIT_MARCH`` names, and kept beside what numba
+keeps.  A library's name and what it says of itself hold a digest of its source, of the
+compiler's options and of the processor, so that none is used that is out of date.
 Where no compiler stands, or it fails, there is no library, and callers use numba.
 """
 
@@ -25,16 +25,18 @@ from pathlib import Path
 
 from numpy.typing import NDArray
 
+from forcefit.inputs.cache_folder import cache_folder, is_writable
 from forcefit.inputs.locking import locked_file
 
 _ROOT = Path(__file__).parents[2]
+_BESIDE = Path(__file__).with_name("__pycache__")
 # lanes must not depend on each other, nor answers on how many lanes there are: nothing
 # that lets sums be reordered, products and sums rounded one by one (which takes no
 # longer); of what -O3 adds only whole loops undone matter to speed, and the rest takes
 # a fifth longer
 _OPTIONS = (
-    "-std=c++17", "-O2", "-fpeel-loops", "-march=native", "-ffp-contract=off",
-    "-fno-math-errno", "-fvisibility=hidden", "-shared", "-fPIC",
+    "-std=c++17", "-O2", "-fpeel-loops", "-ffp-contract=off", "-fno-math-errno",
+    "-fvisibility=hidden", "-shared", "-fPIC",
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
 # what nearly every command that needs one of them needs
@@ -94,13 +96,15 @@ def library_at_hand(source: str) -> ctypes.CDLL | None:
 def _at_hand(source: str) -> ctypes.CDLL | None:
     """The library that is on disk, or None, found out once."""
     digest, path = _kept_at(source)
-    return _loaded(path, digest) if path.exists() else None
+    return _loaded(path, digest) if path is not None and path.exists() else None
 
 
 @cache
 def _library(source: str) -> ctypes.CDLL | None:
     """The library, or None, found out once."""
     digest, path = _kept_at(source)
+    if path is None:
+        return None
     library = _loaded(path, digest)
     if library is not None or path.with_suffix(".failed").exists():
         return library
@@ -114,15 +118,17 @@ def _library(source: str) -> ctypes.CDLL | None:
         return dict(pool.map(partial(_compiled, compiler), sources))[source]
 
 
-def _kept_at(source: str) -> tuple[str, Path]:
-    """Digest and place of a library."""
-    digest = digest_of(source)
-    return digest, folder_of_compiled() / f"{Path(source).stem}.{digest}.so"
+def _kept_at(source: str) -> tuple[str, Path | None]:
+    """Digest and place of a library; None where nothing can be kept."""
+    digest, folder = digest_of(source), folder_of_compiled()
+    return digest, folder and folder / f"{Path(source).stem}.{digest}.so"
 
 
 def _compiled(compiler: str, source: str) -> tuple[str, ctypes.CDLL | None]:
     """The source file, and its library if the compiler can make it."""
     digest, path = _kept_at(source)
+    if path is None:
+        return source, None
     lock = path.with_suffix(".lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,14 +156,21 @@ _addressof: Callable[[ctypes.c_char], int] = ctypes.addressof
 _buffer: Callable[..., ctypes.c_char] = ctypes.c_char.from_buffer
 
 
-def folder_of_compiled() -> Path:
-    """Where compiled code is kept: beside this file, or in the user's cache."""
+def folder_of_compiled() -> Path | None:
+    """Where compiled code is kept: the first of these folders that can be written.
+
+    Returns:
+        ``$NUMBA_CACHE_DIR``, which is not tried; the folder beside this file; that of
+        :func:`forcefit.inputs.cache_folder.cache_folder`; None if none can be.
+    """
     if folder := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(folder)
-    beside = Path(__file__).with_name("__pycache__")
-    if os.access(beside if beside.exists() else beside.parent, os.W_OK):
-        return beside
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "forcefit"
+    return _BESIDE if is_writable(_BESIDE) else cache_folder()
+
+
+def kept_beside_sources() -> bool:
+    """Whether compiled code is kept beside the files that it was made from."""
+    return folder_of_compiled() == _BESIDE
 
 
 @cache
@@ -190,11 +203,16 @@ def digest_of(source: str) -> str:
     Returns:
         16 hexadecimal digits.
     """
-    parts = [" ".join(_OPTIONS), _processor()]
+    parts = [" ".join(_options()), _processor()]
     package = _ROOT / Path(source).parts[0]
     for file in (_ROOT / source, *sorted(package.glob("*/cpp/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _options() -> tuple[str, ...]:
+    """The compiler's options; an older processor's answers are had by naming it."""
+    return *_OPTIONS, f"-march={os.environ.get('FORCEFIT_MARCH', 'native')}"
 
 
 def _loaded(path: Path, digest: str) -> ctypes.CDLL | None:
@@ -212,7 +230,7 @@ def _compile(compiler: str, source: str, digest: str, path: Path) -> None:
     handle, unfinished = tempfile.mkstemp(suffix=".so", dir=path.parent)
     os.close(handle)
     command = [
-        compiler, *_OPTIONS, f'-DSOURCE_DIGEST="{digest}"', str(_ROOT / source),
+        compiler, *_options(), f'-DSOURCE_DIGEST="{digest}"', str(_ROOT / source),
         "-o", unfinished,
     ]  # fmt: skip
     try:

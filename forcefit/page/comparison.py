@@ -1,7 +1,7 @@
 """Two results side by side: every number that changed, the largest change first."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ from forcefit.page.tables import Cell, Value, table
 from forcefit.page.words import in_words, unit_of
 
 SAME = 1e-9  # relative: less is rounding
+_LISTED = 60  # changes on the page at once: some two sheets of paper
 # pure numbers that say how well, not what
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
@@ -243,12 +244,10 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
         if one.place[0] in _HEADLINES
     ][:4]
     a, b = comparison.names
-    rows = [_row(c) for c in comparison.changes]
-    body = [section("Every change", table(["what", a, b, "change"], rows, "changes"))]
+    body = [section("Every change", *_listed(comparison.changes, (a, b), "changes"))]
     if comparison.only:
-        rows = [_row(c) for c in comparison.only]
-        title = "In one of the two alone"
-        body.append(section(title, table(["what", a, b, "change"], rows)))
+        own = _listed(comparison.only, (a, b), "values in one alone")
+        body.append(section("In one of the two alone", *own))
     return page(
         Page(
             title=" and ".join(dict.fromkeys(comparison.titles)) + ": two runs",
@@ -265,6 +264,18 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
             results=comparison.table(),
         )
     )
+
+
+def _listed(
+    changes: Sequence[Change], names: tuple[str, str], what: str
+) -> Iterator[str]:
+    """The first changes as a table; further ones are opened, and not printed."""
+    head = ["what", *names, "change"]
+    yield table(head, [_row(one) for one in changes[:_LISTED]], what)
+    more = [_row(one) for one in changes[_LISTED:]]
+    if more:
+        count = f"{len(more)} more {what}"
+        yield f"<details><summary>{count}</summary>{table(head, more, count)}</details>"
 
 
 def _row(change: Change) -> list[Cell]:

@@ -1,5 +1,6 @@
 "use strict";
-// Draws the figures of a page, sorts and copies its tables, opens points, switches units.
+// Draws the figures of a page, sorts and copies its tables, opens points, switches units,
+// and keeps a picture of each figure for the printer.
 // Data are SI; what is shown is factor times that, or SI itself.
 (() => {
   const all = (query, at = document) => [...at.querySelectorAll(query)];
@@ -20,17 +21,69 @@
     : typeof v === "number" ? v * k : v;
   const title = axis => axis.title + (unit(axis) ? ` [${unit(axis)}]` : "");
   const escaped = text => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+  // where nothing hovers the buttons of a plot would always cover its title
   const SETTINGS = { displaylogo: false, responsive: true,
+    displayModeBar: matchMedia("(hover: none)").matches ? false : "hover",
     plotGlPixelRatio: Math.max(1, window.devicePixelRatio) }; // 2 is four times the work
-  const axisLayout = axis => ({ title: { text: title(axis) }, automargin: true,
-    ...axis.options });
+  const axisLayout = axis => ({ title: { text: title(axis), standoff: 8 },
+    automargin: true, ...axis.options });
 
+  // colours: those of the page on the screen, dark on white on paper
+  const own = name => getComputedStyle(document.documentElement)
+    .getPropertyValue(name).trim();
+  const onScreen = () => ({ ink: own("--ink"), line: own("--line"),
+    back: "rgba(0,0,0,0)" });
+  const ON_PAPER = { ink: "#1d2733", line: "#d9dee3", back: "#fff" };
+  function coloured(layout, { ink, line, back }) {
+    const axis = one => ({ color: ink, gridcolor: line, zerolinecolor: line, ...one });
+    const { xaxis, yaxis, scene: room } = layout;
+    return { font: { family: "system-ui, sans-serif", size: 12, color: ink },
+      paper_bgcolor: back, plot_bgcolor: back, modebar: { bgcolor: "rgba(0,0,0,0)",
+        color: line, activecolor: ink }, ...layout,
+      ...(xaxis && { xaxis: axis(xaxis), yaxis: axis(yaxis) }),
+      ...(room && { scene: { ...room, ...Object.fromEntries(["xaxis", "yaxis", "zaxis"]
+        .map(name => [name, axis({ ...room[name], showbackground: false })])) } }) };
+  }
+
+  const shown = new Map(); // figure: traces and layout, without colours
   function show(figure, traces, layout) {
     const plot = figure.querySelector(".plot");
-    return Plotly.react(plot, traces, { margin: { l: 60, r: 20, t: 20, b: 50 },
-      font: { family: "system-ui, sans-serif", size: 12 }, uirevision: 1,
-      legend: { orientation: "h", y: 1.12 }, ...layout }, SETTINGS);
+    const whole = { margin: { l: 60, r: 20, t: 20, b: 50 }, uirevision: 1,
+      legend: { orientation: "h", y: 1.12 }, ...layout };
+    shown.set(figure, [traces, whole]);
+    pictureSoon(figure);
+    return Plotly.react(plot, traces, coloured(whole, onScreen()), SETTINGS);
   }
+
+  // pictures for the printer: what WebGL drew is gone by then, and plots are as wide as
+  // the window, not as the paper
+  const PAPER = 680; // [px] between the margins of a page
+  const waiting = new Map();
+  function pictureSoon(figure) {
+    clearTimeout(waiting.get(figure));
+    waiting.set(figure, setTimeout(() => picture(figure), 700));
+  }
+  async function picture(figure) {
+    clearTimeout(waiting.get(figure));
+    waiting.delete(figure);
+    const plot = figure.querySelector(".plot"), [traces, layout] = shown.get(figure);
+    const height = layout.height, turned = plot.layout && plot.layout.scene;
+    const room = turned && { scene: { ...layout.scene, camera: turned.camera } };
+    const url = await Plotly.toImage({ data: traces, layout: coloured(
+      { ...layout, ...room, width: PAPER }, ON_PAPER) },
+    { format: turned ? "png" : "svg", width: PAPER, height, scale: turned ? 2 : 1 });
+    const old = figure.querySelector("img.print");
+    const img = old || element("img", "", { className: "print", alt: "" });
+    img.src = url;
+    if (!old) plot.after(img);
+    figure.classList.add("pictured");
+  }
+  async function print() {
+    await Promise.all([...shown.keys()].filter(one => waiting.has(one)).map(picture));
+    window.print();
+  }
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () =>
+    redraw.forEach(draw => draw()));
 
   // charts ----------------------------------------------------------------------------
   function chart(figure, spec) {
@@ -67,7 +120,7 @@
         y: scaled(y.values, factor(y)), colorscale: "Viridis",
         z: y.values.map((_, j) => xs.map((_, i) => values[i][j])),
         text: y.values.map((_, j) => xs.map((_, i) => hover(i, j))),
-        colorbar: { title: { text: unit(layer), side: "right" } } }
+        colorbar: { title: { text: unit(layer), side: "top" } } }
         : { ...common, type: "scatter", mode: "lines+markers", x: xs, y: values,
           text: xs.map((_, i) => hover(i)) };
       return show(figure, [trace], { height: 460, title: { text: escaped(layer.title),
@@ -183,7 +236,7 @@
         hovertext: bodies.map(b => `${escaped(b.name)}: ${
           b.actuated ? "driven " : ""}${b.joint} joint`),
         marker: { size: 4, color: bodies.map(b => b.joint === "fixed" ? "#9aa3ab"
-          : b.actuated ? "#d68910" : "#1d2733") } });
+          : b.actuated ? "#d68910" : "#5b6773") } });
       const gaps = step === null ? [] : spec.closures.map(([a, b]) =>
         [[at[a], at[b]], "still open"]);
       if (gaps.length) drawn.push({ ...paths(gaps), name: "still open",
@@ -224,14 +277,18 @@
         : null;
       const spans = spec.box.map(([low, high]) => (high - low) / size);
       const thin = spans.indexOf(Math.min(...spans));
-      const eye = [0.55, 0.55, 0.4].map((v, c) => c === thin ? 1.5 : v);
+      const eye = [0.65, 0.65, 0.45].map((v, c) => c === thin ? 1.75 : v);
       const axis = c => ({ title: { text: `${"xyz"[c]} [${unit(spec.length)}]` },
         range: spec.box[c].map(v => v * factor(spec.length)) });
       const told3d = { aspectmode: "manual", xaxis: axis(0), yaxis: axis(1),
         zaxis: axis(2), aspectratio: { x: spans[0], y: spans[1], z: spans[2] },
-        camera: { eye: { x: eye[0], y: -eye[1], z: eye[2] } } };
-      await show(figure, traces(k, step), { height: 560, scene: told3d,
+        camera: { eye: { x: eye[0], y: -eye[1], z: eye[2] },
+          center: { x: 0, y: 0, z: -0.06 } } };
+      const plot = await show(figure, traces(k, step), { height: 560, scene: told3d,
         margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: true });
+      if (plot.turns) return;
+      plot.turns = true;
+      plot.on("plotly_relayout", () => pictureSoon(figure));
     }
     redraw.push(paint);
   }
@@ -290,7 +347,13 @@
     if (on("thead th")) sort(on("thead th"));
     if (on(".copy")) copy(on(".copy"));
     if (on("#units")) switchUnits(on("#units"));
-    if (on("#print")) window.print();
+    if (on("#print")) print();
+  });
+  document.addEventListener("keydown", event => {
+    const head = event.target.closest("thead th");
+    if (!head || !["Enter", " "].includes(event.key)) return;
+    event.preventDefault(); // the space bar scrolls
+    sort(head);
   });
 
   // plotly.js is kept compressed ------------------------------------------------------
@@ -310,7 +373,7 @@
     if (figures.length) await load();
     for (const figure of figures) {
       const spec = JSON.parse(figure.querySelector("script.spec").textContent);
-      kinds[figure.className](figure, spec);
+      kinds[figure.classList[0]](figure, spec);
     }
     const left = new Map(figures.map((figure, k) => [figure, redraw[k]]));
     const seen = figure => { // what the reader looks at is drawn first

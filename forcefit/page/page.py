@@ -14,6 +14,7 @@ import hashlib
 import html
 import json
 import platform
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,6 +29,7 @@ from forcefit.page.charts import embedded
 from forcefit.page.tables import Value, inline, table
 
 _PACKAGES = ("numpy", "scipy", "numba", "clarabel", "cvxpy", "exudyn")
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w]))")
 _DIGITS = 300  # of the longest integer that a float holds, nearly
 _BUTTONS = (
     "<div class=bar><button type=button id=units>SI units</button>"
@@ -75,7 +77,7 @@ class Page:
     Attributes:
         title: of the page.
         verdict: the conclusion in a few sentences.
-        good: whether it is what one hopes for.
+        good: whether it is what one hopes for; None for neither.
         tiles: the same for a reader in a hurry.
         about: what was computed, below the title.
         body: pieces of HTML in their order.
@@ -86,7 +88,7 @@ class Page:
 
     title: str
     verdict: str
-    good: bool
+    good: bool | None
     tiles: Sequence[Tile]
     about: str
     body: Sequence[str]
@@ -115,13 +117,13 @@ def page(content: Page) -> str:
     """
     style, script = (_part(name).decode() for name in ("page.css", "page.js"))
     title = html.escape(content.title)
-    kind = "good" if content.good else "bad"
+    kind = {True: "good", None: "mixed", False: "bad"}[content.good]
     parts = [
         "<!doctype html><html lang=en><head><meta charset=utf-8>",
-        "<meta name=viewport content='width=device-width'>",
+        "<meta name=viewport content='width=device-width, initial-scale=1'>",
         f"<title>{title}</title><style>{style}</style></head><body>{_BUTTONS}",
         f"<h1>{title}</h1><p class=note>{html.escape(content.about)}</p>{_NO_SCRIPT}",
-        f"<p class='verdict {kind}'>{html.escape(content.verdict)}</p>",
+        f"<p class='verdict {kind}'>{_unbroken(html.escape(content.verdict))}</p>",
         f"<div class=tiles>{''.join(map(_tile, content.tiles))}</div>",
         *content.body,
         _assumed(content.assumed),
@@ -178,9 +180,10 @@ def paragraph(*texts: str | Value) -> str:
 
 
 def _sentence(texts: Sequence[str | Value]) -> str:
-    """Texts, escaped, and numbers."""
+    """Texts, escaped, and numbers, which styles keep whole."""
     return "".join(
-        inline(one) if isinstance(one, Value) else html.escape(one) for one in texts
+        inline(one) if isinstance(one, Value) else _unbroken(html.escape(one))
+        for one in texts
     )
 
 
@@ -191,6 +194,11 @@ def _tile(tile: Tile) -> str:
         f"<p class=answer>{_sentence(tile.answer)}</p>"
         f"<p class=note>{_sentence(tile.note)}</p></div>"
     )
+
+
+def _unbroken(text: str) -> str:
+    """A text whose lines do not end between a number and its unit."""
+    return _BEFORE_UNIT.sub("&nbsp;", text)
 
 
 def _assumed(sentences: Sequence[str]) -> str:

@@ -7,6 +7,11 @@ from dataclasses import dataclass
 
 from forcefit.page.units import Shown, number_text, shown_in
 
+_SORTS = " scope=col tabindex=0"  # heads take the focus: Enter sorts, as a click does
+_LONG = (
+    48  # characters of a text that may wrap in its cell; shorter ones and numbers not
+)
+
 
 @dataclass(frozen=True)
 class Value:
@@ -88,18 +93,19 @@ def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
 def _head_cell(head: str | Column, shown: Shown) -> str:
     """Title and unit of a column."""
     if isinstance(head, str):
-        return f"<th>{html.escape(head)}</th>"
+        return f"<th{_SORTS}>{html.escape(head)}</th>"
     title = html.escape(head.title)
     if not shown.unit:
-        return f"<th>{title}</th>"
+        return f"<th{_SORTS}>{title}</th>"
     si = html.escape(f"{head.title} [{shown.unit}]")
-    return f'<th data-si="{si}">{title} [{html.escape(shown.shown)}]</th>'
+    return f'<th{_SORTS} data-si="{si}">{title} [{html.escape(shown.shown)}]</th>'
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> str:
     """A text, a number under a unit, or a number with its own."""
     if isinstance(cell, str):
-        return f"<td>{html.escape(cell)}</td>"
+        kind = " class=long" if len(cell) > _LONG else ""
+        return f"<td{kind}>{html.escape(cell)}</td>"
     if isinstance(cell, Value):
         return f"<td{_two_texts(cell)}>{html.escape(_texts(cell)[0])}</td>"
     digits = head.digits if isinstance(head, Column) else 6

@@ -1,4 +1,4 @@
-r"""Largest von Mises stress in a straight beam that a wrench at its tip loads.
+r"""Largest von Mises stress in a straight beam, of a wrench at its tip and its weight.
 
 ========  ==========================================================  ======
 symbol    meaning                                                     unit
@@ -6,14 +6,18 @@ symbol    meaning                                                     unit
 x y z     axes of the beam: x from base to tip, z up                  -
 N V       force on a section along x, and along y and z               N
 M         moment on a section, about x (torsion), y and z             N m
+W         weight of the beam, the same on every part of its length    N
+s         distance of a section from the tip                          m
 sigma     normal stress along x                                       Pa
 tau       shear stress along y and along z                            Pa
 ========  ==========================================================  ======
 
-In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Shear forces and torsion load
-every section alike and M is linear in x, so the von Mises stress of a fibre,
-sqrt(sigma^2 + 3 tau^2), is convex in x: its largest value is at the base or at the tip,
-and only these two sections are evaluated.
+In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight shear forces and
+torsion load every section alike and M is linear in x, so the von Mises stress of a
+fibre, sqrt(sigma^2 + 3 tau^2), is convex in x: its largest value is at the base or at
+the tip, and only these two sections are evaluated.  With weight forces grow with
+s W / L and moments with s^2 / 2 (e_x x W) / L: evaluated are also 31 sections between,
+and those where the moment about y or z has its extremum.
 """
 
 import math
@@ -27,17 +31,21 @@ from stiffness.beam.sections import Section, declared_section
 
 _AROUND = 360  # fibres around a round section; between two the cosine loses 4e-5
 _ACROSS = 33  # fibres along a side; between two a parabola loses 1e-3
-_CHUNK = 2048  # wrenches at a time: 2048 x 1089 x 3 numbers are 54 MB
+_CHUNK = 2048  # sections at a time: 2048 x 1089 x 3 numbers are 54 MB
+_ALONG = 33  # sections of a heavy beam; between two a parabola loses 1e-3
 _SHAPES = "radius (inner_radius), or width and height (wall)"
 
 
 def peak_beam_stress(
-    section: Mapping[str, float], length: float, wrench: ArrayLike
+    section: Mapping[str, float],
+    length: float,
+    wrench: ArrayLike,
+    weight: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[NDArray, NDArray]:
     """Largest von Mises stress in a straight beam, and where it is.
 
     Axial force, bending, torsion and shear act together.  Evaluated are, in the
-    sections at the base and at the tip,
+    sections at the base and at the tip, of a beam with weight also between them,
 
     - round bar and tube: 360 points of the outer circle;
     - solid rectangle: a grid of 33 x 33 points, corners and middles included;
@@ -52,6 +60,7 @@ def peak_beam_stress(
             ``height`` (along z) and perhaps ``wall`` [m].
         length: [m] of the beam, >= 0.
         wrench: (..., 6) [N m, N] at the tip, in the axes of the beam.
+        weight: (3,) or (..., 3) [N] force spread evenly over the length, likewise.
 
     Returns:
         (...) [Pa], and (..., 3) [m] the place, in the axes of the beam from its base.
@@ -82,21 +91,53 @@ def peak_beam_stress(
     if not (math.isfinite(length) and length >= 0):
         raise BadInput(f"peak_beam_stress: length = {length:g} must be >= 0")
     fibres, influence = section_stress(section)
-    to_base = np.eye(6)
-    to_base[1, 5], to_base[2, 4] = -length, length  # arm x force
     flat = w.reshape(-1, 6)
-    stress, fibre, at_tip = (np.zeros(len(flat), dtype=t) for t in (float, int, bool))
-    for first in range(0, len(flat), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        sigma, shear = _stresses(influence, flat[part])
-        tip = np.sqrt(sigma**2 + shear)
-        sigma = flat[part] @ (influence[:, 0] @ to_base).T
-        base = np.sqrt(sigma**2 + shear)
-        at_tip[part] = tip.max(axis=1) > base.max(axis=1)
-        worst = np.where(at_tip[part, None], tip, base)
-        fibre[part], stress[part] = worst.argmax(axis=1), worst.max(axis=1)
-    where = np.column_stack([np.where(at_tip, length, 0.0), fibres[fibre]])
+    W = np.broadcast_to(np.asarray(weight, dtype=float), (*w.shape[:-1], 3))
+    W = W.reshape(-1, 3)
+    from_tip = _sections(flat, W, length)
+    stress, fibre = np.zeros(len(flat)), np.zeros(len(flat), dtype=int)
+    place = np.zeros(len(flat))
+    step = max(1, _CHUNK // from_tip.shape[1])
+    for first in range(0, len(flat), step):
+        part = slice(first, first + step)
+        s = from_tip[part]
+        forces = _on_sections(flat[part], W[part], s, length)
+        sigma, shear = _stresses(influence, forces.reshape(-1, 6))
+        values = np.sqrt(sigma**2 + shear).reshape(len(s), -1)
+        worst = values.argmax(axis=1)
+        at, fibre[part] = np.divmod(worst, len(fibres))
+        rows = np.arange(len(s))
+        stress[part], place[part] = values[rows, worst], length - s[rows, at]
+    where = np.column_stack([place, fibres[fibre]])
     return stress.reshape(w.shape[:-1]), where.reshape(*w.shape[:-1], 3)
+
+
+def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
+    """(n, k) [m] distances of sections from the tip, the base's first."""
+    ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
+    if not weight.any():
+        return ends
+    between = np.linspace(0, length, _ALONG)[1:-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # a moment has its extremum where the force across it is zero
+        share = -wrench[:, 4:] / weight[:, 1:]
+    extrema = length * np.clip(np.nan_to_num(share), 0, 1)
+    between = np.broadcast_to(between, (len(wrench), len(between)))
+    return np.hstack([ends, extrema, between])
+
+
+def _on_sections(
+    wrench: NDArray, weight: NDArray, s: NDArray, length: float
+) -> NDArray:
+    """(n, k, 6) [N m, N] on sections (n, k) at distances s from the tip."""
+    on = np.repeat(wrench[:, None], s.shape[1], axis=1)
+    share = s / length if length else np.zeros_like(s)
+    # force at half of the distance: what the part between tip and section weighs
+    middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
+    on[..., 1] -= s * middle[..., 2]  # arm x force
+    on[..., 2] += s * middle[..., 1]
+    on[..., 3:] += share[..., None] * weight[:, None]
+    return on
 
 
 def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:

@@ -14,7 +14,8 @@ from scipy.sparse import triu
 
 from forcefit.inputs.errors import BadInput, describe
 from forcefit.inputs.table import read_text
-from stiffness.exchange.matrix_file import FileMatrix, bulk_fields
+from stiffness.exchange.matrix_file import FileMatrix
+from stiffness.exchange.nastran_files import bulk_fields
 from stiffness.exchange.real_numbers import real
 from stiffness.surface.interface import Interface, parse_interface
 
@@ -88,10 +89,10 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
-            _, fields = bulk_fields(line)
-            if len(fields) == 4 and number < len(lines):
-                fields += bulk_fields(lines[number])[1]
-            node, system, *place = fields
+            head, fields = bulk_fields(line)
+            if head.endswith("*") and number < len(lines):
+                fields = fields[:4] + bulk_fields(lines[number])[1]
+            node, system, *place = [*fields, "", ""]
             # another system of axes gives no place: refused
             yield number, [node, *([] if system.strip("0") else place)], line
 

@@ -54,13 +54,16 @@ def import_link(
     numbers = None if places is None else list(places)
     matrix = read_matrix(path, nodes=numbers)
     matrix = in_metres(reordered(matrix, order), length)
-    if matrix.matrix.shape[0] == 6 and not matrix.named:
+    node = matrix.freedoms[0][0]
+    if set(matrix.freedoms) == {(node, direction) for direction in range(1, 7)}:
         if mass is not None:
             raise BadInput("--mass: a stiffness of 6 rows has no body with a mass")
-        K = matrix.matrix.toarray()[np.ix_([3, 4, 5, 0, 1, 2], [3, 4, 5, 0, 1, 2])]
+        rows = interface_rows(matrix, str(node), "--tip", None)[0]
+        K = matrix.matrix.toarray()[np.ix_(rows, rows)]
         check_definite(f"{path}: stiffness", K)
+        at = (places or {}).get(node, np.zeros(3))
         return LinkStiffness(
-            f"imported from {Path(path).name}", inverted(K), np.zeros(3), np.zeros(3)
+            f"imported from {Path(path).name}", inverted(K), tip=at, base=at
         )
     ends = _ends(matrix, base, tip, places)
     K12, fields = condensed(matrix, (ends[0][:2], ends[1][:2]))
@@ -73,9 +76,13 @@ def import_link(
     heavy = in_metres(
         reordered(read_matrix(mass, "mass", numbers, path), order), length
     )
-    if heavy.freedoms != matrix.freedoms:
+    row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
+    strange = [freedom for freedom in heavy.freedoms if freedom not in row]
+    if strange or len(heavy.freedoms) < len(row) and not heavy.named:
         raise BadInput(f"{mass}: its freedoms are not those of {path}")
-    M12 = fields.T @ (heavy.matrix @ fields)
+    # a file of named freedoms leaves out those without mass
+    moved = fields[[row[freedom] for freedom in heavy.freedoms]]
+    M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
     return replace(
         link, mass=kilograms, center_of_mass=link.tip + centre, inertia=inertia

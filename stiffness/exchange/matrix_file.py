@@ -11,13 +11,13 @@ user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx`
 five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
 three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
                    ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof`` beside them
-DMIG               Nastran, small, large or free fields: ``.pch``, ``.dmig``
+DMIG               Nastran: ``.pch``, ``.dmig``; see
+                   :mod:`stiffness.exchange.nastran_files`
 NumPy              ``.npy``, SciPy's sparse ``.npz``
 =================  ===============================================================
 
 Sources:
-    CalculiX 2.21 manual, SUBSTRUCTURE MATRIX OUTPUT; Nastran Quick Reference Guide,
-    DMIG (form 6 gives one half).
+    CalculiX 2.21 manual, SUBSTRUCTURE MATRIX OUTPUT.
 """
 
 import re
@@ -33,16 +33,15 @@ from forcefit.inputs.errors import BadInput, describe, one_line
 from forcefit.inputs.table import read_text
 from stiffness.exchange.ansys_files import LARGEST, harwell_boeing, read_mapping
 from stiffness.exchange.matrix_market import matrix_market
-from stiffness.exchange.real_numbers import real
+from stiffness.exchange.nastran_files import DMIG, Freedom, dmig_entries
+from stiffness.exchange.real_numbers import real, whole
 
-Freedom = tuple[int, int]
 _ENDINGS = (
     ".mtx", ".sti", ".mas", ".pch", ".dmig", ".bdf", ".dat", ".txt", ".npy", ".npz",
     ".mmf", ".matrix",
 )  # fmt: skip
 _HARWELL_BOEING = re.compile(r"[^\n]*\n[\d ]+\n[RCP][A-Z]{2}\s", re.I)
 _KINDS = {"STIFFNESS": "stiffness", "MASS": "mass"}
-_INITIALS = {"stiffness": "K", "mass": "M"}  # of a DMIG's name
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +101,9 @@ def read_matrix(
             matrix, freedoms = harwell_boeing(path, text), None
         elif re.search(r"^\s*\*USER ELEMENT", text, re.M | re.I):
             matrix, freedoms = _user_element(path, text, which)
-        elif re.search(r"^DMIG", text, re.M):
-            matrix, freedoms = _dmig(path, text, which)
+        elif DMIG.search(text):
+            entries = dmig_entries(path, text, which)
+            matrix, freedoms = _from_entries(path, entries)
         else:
             matrix, freedoms = _columns(path, text)
     for beside in (path, mapped):
@@ -216,7 +216,7 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
         elif upper.startswith("*"):
             part = "nodes" if part == "nodes" else ""
         elif part == "nodes" and upper:
-            lines.append([_whole(path, word) for word in upper.split(",") if word])
+            lines.append([whole(path, word) for word in upper.split(",") if word])
         elif part in values and upper:
             words = re.split(r"[,\s]+", upper.strip(" ,"))
             values[part] += [real(path, word) for word in words]
@@ -256,7 +256,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
                 f"{'' if named else 'row, column, value'}"
             )
         *places, value = words
-        where = [_whole(path, word) for word in places]
+        where = [whole(path, word) for word in places]
         if len(where) == 4:
             a, b, c, d = where
             named[(a, b), (c, d)] = real(path, value)
@@ -285,68 +285,13 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
         node, point, direction = word.partition(".")
         if not point:
             raise BadInput(f"{path}: found {describe(word)}, expected node.direction")
-        freedoms.append((_whole(path, node), _whole(path, direction)))
+        freedoms.append((whole(path, node), whole(path, direction)))
     if len(set(freedoms)) != n:
         raise BadInput(
             f"{path}: found {len(set(freedoms))} freedoms, expected {n}, as many as "
             "the matrix has rows"
         )
     return freedoms
-
-
-def _dmig(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
-    """``DMIG`` in any of its widths of fields; of many square ones, K.. or M.."""
-    matrices: dict[str, dict[tuple[Freedom, Freedom], float]] = {}
-    forms: dict[str, str] = {}
-    name, column = "", None
-    for line in text.split("\n"):
-        if not line.strip() or line.startswith("$"):
-            continue
-        head, fields = bulk_fields(line)
-        if head.startswith("DMIG"):
-            name = fields[0]
-            entries = matrices.setdefault(name, {})
-            if fields[1] in {"0", ""}:  # the header: form, types
-                forms[name], column = fields[2], None
-                continue
-            column = _whole(path, fields[1]), max(1, _whole(path, fields[2] or "0"))
-            fields = fields[4:]
-        elif column is None or not head.startswith(("*", "+", " ")) and head:
-            column = None
-            continue
-        for start in range(0, len(fields) - 2, 4):
-            node, direction, value = fields[start : start + 3]
-            if node:
-                row = _whole(path, node), max(1, _whole(path, direction or "0"))
-                entries[row, column] = real(path, value)
-    initial = _INITIALS[which]
-    names = [name for name in matrices if forms.get(name, "") in {"1", "6", ""}]
-    names = names or list(matrices)
-    if len(names) > 1:
-        names = [name for name in names if name.startswith(initial)]
-    if len(names) != 1:
-        given = ", ".join(sorted(matrices)) or "none"
-        raise BadInput(
-            f"{path}: found the matrices {given}, expected one, or one whose name "
-            f"begins with {initial}"
-        )
-    form = forms.get(names[0], "")
-    if form not in {"1", "6", ""}:
-        raise BadInput(f"{path}: form {describe(form)}, expected 6 or 1, real")
-    return _from_entries(path, matrices[names[0]])
-
-
-def bulk_fields(line: str) -> tuple[str, list[str]]:
-    """The first field of a bulk data line, and its others, all eight or four."""
-    if "," in line:
-        head, *fields = [word.strip() for word in line.split(",")]
-        count = 4 if head.endswith("*") else 8
-    else:
-        head, rest = line[:8].strip(), line[8:72]
-        count = 4 if "*" in head else 8
-        width = 64 // count
-        fields = [rest[k : k + width].strip() for k in range(0, 64, width)]
-    return head.upper().rstrip("*") or " ", (fields + [""] * count)[:count]
 
 
 def _from_entries(
@@ -369,13 +314,3 @@ def _of_rows(
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]
     shape = (len(row), len(row))
     return csr_array(coo_array((list(whole.values()), (i, j)), shape=shape))
-
-
-def _whole(path: Path, word: str) -> int:
-    """A whole number."""
-    try:
-        return int(word)
-    except ValueError:
-        raise BadInput(
-            f"{path}: found {describe(word.strip())}, expected a whole number"
-        ) from None

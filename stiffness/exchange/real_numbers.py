@@ -26,3 +26,24 @@ def real(path: Path | str, word: str) -> float:
         raise BadInput(f"{path}: found {describe(word.strip())}, expected a number")
     mantissa, exponent = match.groups()
     return float(f"{mantissa}e{exponent or 0}")
+
+
+def whole(path: Path | str, word: str) -> int:
+    """A whole number of a file.
+
+    Args:
+        path: for messages.
+        word: the number, with blanks around it or none.
+
+    Returns:
+        Its value.
+
+    Raises:
+        BadInput: it is no whole number.
+    """
+    try:
+        return int(word)
+    except ValueError:
+        raise BadInput(
+            f"{path}: found {describe(word.strip())}, expected a whole number"
+        ) from None

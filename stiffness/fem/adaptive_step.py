@@ -9,7 +9,7 @@ above it may be, so that K lies between K_h - E and K_h.  The middle of this int
 returned: its error is half as large at most, on the same mesh.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,19 +21,27 @@ from stiffness.fem.elements import ORDER, Elements, isoparametric
 from stiffness.fem.error_indicator import (
     error_matrices,
     geometry_errors,
+    material_errors,
     traction_errors,
 )
-from stiffness.fem.material import Material, material_of_elements
+from stiffness.fem.material import (
+    Material,
+    material_at,
+    material_of_elements,
+    regions_of,
+)
+from stiffness.fem.quality import volume_error
 from stiffness.link import scaled
 from stiffness.mesh.curved_elements import refine_inverted
 from stiffness.mesh.edge_grading import (
     ENDS,
+    graded_edges,
     layered,
-    singular_edges,
     split_joining_edges,
 )
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.improve import fitted
 from stiffness.mesh.refine import refine
+from stiffness.mesh.solid import Solid
 
 # effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
 # benchmarks/stiffness_random_parts.py
@@ -53,6 +61,7 @@ class Level:
         errors: (s, 6, 6) local error indicators: contribution of each of the solid's
             tetrahedra to K_h - K, without an effectivity index.
         geometry_errors: (s, 6, 6) the same for the geometry of curved elements.
+        volume_error: [1] relative, of the elements against the part's.
     """
 
     solid: Solid
@@ -61,6 +70,7 @@ class Level:
     solution: Condensed
     errors: NDArray
     geometry_errors: NDArray
+    volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
         """(6, 6) the stiffness, its indicated error and the geometry's."""
@@ -72,7 +82,11 @@ class Level:
 
 
 def solve_level(
-    solid: Solid, materials: Sequence[Material], centers: NDArray, interface: str
+    solid: Solid,
+    materials: Sequence[Material],
+    centers: NDArray,
+    interface: str,
+    check: Callable[[int], None] | None = None,
 ) -> Level:
     """Stiffness, fields and local error indicators of one mesh.
 
@@ -82,6 +96,7 @@ def solve_level(
         materials: the first fills the link, later ones where they say.
         centers: (2, 3) [m] of base and tip.
         interface: one of ``KINDS``.
+        check: called with the number of unknowns before they are solved for.
 
     Returns:
         The solution on cubic elements with a layer along the singular edges.
@@ -89,14 +104,18 @@ def solve_level(
     Raises:
         BadInput: no material fills the link.
     """
-    solid = split_joining_edges(refine_inverted(solid, ORDER), ENDS)
-    parts = layered(solid, ENDS)
+    regions = regions_of(materials)
+    finer = split_joining_edges(refine_inverted(solid, ORDER), ENDS, regions)
+    solid = fitted(finer)
+    parts = layered(solid, ENDS, regions=regions)
     mesh = isoparametric(solid, ORDER, parts)
+    if check is not None:
+        check(3 * len(mesh.nodes))
     material = material_of_elements(mesh, materials)
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
-    on_edge[singular_edges(solid, ENDS)] = True
+    on_edge[graded_edges(solid, ENDS, regions)] = True
     singular = on_edge[mesh.cells[:, :4]].any(axis=1)
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
@@ -112,9 +131,17 @@ def solve_level(
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
     np.add.at(errors, parts.parent, indicated)
-    by_face = geometry_errors(mesh, solid.shapes, solution.fields, lam, mu)
+    by_face = geometry_errors(
+        mesh, solid.shapes, solution.fields, lam, mu, solid.surface
+    )
     np.add.at(geometry, parts.parent[mesh.owner], by_face)
-    return Level(solid, mesh, material, solution, errors, geometry)
+    if not all(region.planes for region in regions):
+        jagged = material_errors(
+            mesh, solution.fields, lam, mu, lambda p: material_at(p, materials)[:, 1]
+        )
+        np.add.at(geometry, parts.parent, jagged)
+    off = volume_error(solid, mesh)
+    return Level(solid, mesh, material, solution, errors, geometry, off)
 
 
 def estimated_error(

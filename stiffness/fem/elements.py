@@ -33,7 +33,7 @@ from stiffness.mesh.lagrange import (
     quadrature,
     shape_functions,
 )
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid
 
 ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %
 # derivatives of the barycentric coordinates by the reference element's
@@ -201,18 +201,22 @@ def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
 
 
-def node_gradients(mesh: Elements) -> Iterator[tuple[NDArray, NDArray]]:
+def node_gradients(
+    mesh: Elements, members: NDArray | None = None
+) -> Iterator[tuple[NDArray, NDArray]]:
     """Gradients of the shape functions at the nodes of each element.
 
     Args:
         mesh: the tetrahedra.
+        members: (c,) indices of those that count; all if absent.
 
     Yields:
         Indices (c,) of elements and gradients (c, m, m, 3) [1/m]: node, function,
         direction.
     """
     dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
-    for part in _chunks(np.arange(len(mesh.cells)), dN.shape[1]):
+    members = np.arange(len(mesh.cells)) if members is None else members
+    for part in _chunks(members, dN.shape[1]):
         yield part, dN @ np.linalg.inv(_jacobians(dN, mesh.nodes[mesh.cells[part]]))
 
 

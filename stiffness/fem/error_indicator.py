@@ -25,15 +25,17 @@ Sources:
     Friedrichs & Dressler (1961) for the layer at a plate's free edge.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.fem.elements import Elements, gradients_on_faces, integration
 from stiffness.surface.primitives import Plane, Shape
+from stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
+_SAME_MODULUS = 1e-6  # relative difference
 _CHUNK = 1024  # faces at a time
 _SINGULAR_SHARE = 1.2  # e_3 / s_3 at a singular edge, set by the links of meshes/
 # remaining error over s_3 as a function of s_3 / s_2, for rates from p^-0.1 to p^-40
@@ -134,8 +136,9 @@ def geometry_errors(
     fields: NDArray,
     lam: NDArray,
     mu: NDArray,
+    surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Error of the stiffness because curved elements deviate from the exact shapes.
+    """Error of the stiffness because elements deviate from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
@@ -143,6 +146,8 @@ def geometry_errors(
         fields: (n, 3, k) [m] displacements of the unit cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
+        surface: by which patches are judged that meet others smoothly: an element may
+            lie across their border; if absent, each face by its own patch's shape.
 
     Returns:
         (f, k, k) [unit of the stiffness] each boundary triangle's share, the energy
@@ -153,24 +158,68 @@ def geometry_errors(
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.faces), cases, cases))
-    for number in np.unique(mesh.patch[mesh.curved[mesh.owner]]):
-        shape = shapes[number]
-        faces = np.flatnonzero((mesh.patch == number) & mesh.curved[mesh.owner])
-        if shape is None or isinstance(shape, Plane):
+    for number in np.unique(mesh.patch):
+        shape, across = shapes[number], surface is not None and surface.tangent[number]
+        on = mesh.patch == number
+        faces = np.flatnonzero(on if across else on & mesh.curved[mesh.owner])
+        if shape is None or (isinstance(shape, Plane) and not across):
             continue
         for first in range(0, len(faces), _CHUNK):
             some = faces[first : first + _CHUNK]
             places, normal, area, G = gradients_on_faces(mesh, some)
-            away, slope = shape.signed(places.reshape(-1, 3))
-            outward = np.einsum("fqx,fqx->fq", normal, slope.reshape(normal.shape))
-            gap = away.reshape(area.shape) * np.sign(outward)
+            flat = places.reshape(-1, 3), normal.reshape(-1, 3)
+            if across and surface is not None:
+                gap = surface.outside(*flat).reshape(area.shape)
+            else:
+                away, slope = shape.signed(flat[0])
+                facing = np.einsum("nx,nx->n", flat[1], slope)
+                gap = (away * np.sign(facing)).reshape(area.shape)
             cells = mesh.owner[some]
             roots = _energy_roots(G, fields[mesh.cells[cells]], lam[cells], mu[cells])
             weighted = (roots * (area * gap)[..., None, None]).swapaxes(1, 2)
-            flat = (len(some), cases, -1)
-            errors[some] = weighted.reshape(flat) @ roots.swapaxes(1, 2).reshape(
-                flat
+            rows = (len(some), cases, -1)
+            errors[some] = weighted.reshape(rows) @ roots.swapaxes(1, 2).reshape(
+                rows
             ).swapaxes(1, 2)
+    return errors
+
+
+def material_errors(
+    mesh: Elements,
+    fields: NDArray,
+    lam: NDArray,
+    mu: NDArray,
+    shear_at: Callable[[NDArray], NDArray],
+) -> NDArray:
+    """Error of the stiffness because elements lie across a face between materials.
+
+    Args:
+        mesh: the tetrahedra.
+        fields: (n, 3, k) [m] displacements of the unit cases.
+        lam: (t,) [Pa] Lame's first constant.
+        mu: (t,) [Pa] shear modulus.
+        shear_at: shear modulus (n,) [Pa] of the link at points (n, 3) [m].
+
+    Returns:
+        (t, k, k) [unit of the stiffness] positive where an element is too stiff: the
+        energy of what is of another material, times the ratio of the moduli.
+    """
+    cases = fields.shape[2]
+    errors = np.zeros((len(mesh.cells), cases, cases))
+    for part, _, _, N, G, w in integration(mesh):
+        places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
+        own = mu[part][:, None]
+        true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
+        # tractions go on across the face: what is softer has the more energy there
+        ratio = np.maximum(own / true, true / own)
+        sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
+        some = np.flatnonzero(sign.any(axis=1))
+        roots = _energy_roots(
+            G[some], fields[mesh.cells[part[some]]], lam[part[some]], mu[part[some]]
+        )
+        weight = (sign * ratio * w)[some]
+        weighted = roots * weight[:, :, None, None]
+        errors[part[some]] = np.einsum("cqkx,cqlx->ckl", weighted, roots, optimize=True)
     return errors
 
 

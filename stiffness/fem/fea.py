@@ -27,17 +27,24 @@ from stiffness.fem.adaptive_step import (
 )
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.mass_properties import PointMass, mass_properties
-from stiffness.fem.material import Material, check_materials
+from stiffness.fem.material import Material, check_materials, regions_of
 from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
-from stiffness.mesh.mesh import MeshFailed, Solid, mesh_solid
+from stiffness.mesh.fit_to_patches import MeshFailed
+from stiffness.mesh.improve import fitted
+from stiffness.mesh.mesh import mesh_solid
+from stiffness.mesh.regions import cut_by_regions
+from stiffness.mesh.slender_bar import slender_bar
+from stiffness.mesh.solid import Solid
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import Interface
-from stiffness.surface.patches import triangles_on
+from stiffness.surface.patches import refuse_common_edges, triangles_on
 from stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
+_SETUP = 2.0  # [s] of a solution that do not grow with its mesh
+_MESHER = 0.6  # of the budget's seconds are the mesher's, the others the solver's
 
 
 @dataclass(frozen=True)
@@ -160,15 +167,19 @@ def solve_link(
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is not proper, or there is no material.
+        BadInput: an interface is not proper, the two share an edge, or there is no
+            material.
     """
     start = time.monotonic()
     check_materials(materials)
+    if options.interface == "rigid":
+        refuse_common_edges(surface, base, tip)
     centers = np.array([
         interface_center(surface, side, name)
         for side, name in ((base, "base"), (tip, "tip"))
     ])
     first = first_mesh(surface, base, tip, options.budget, options.cache)
+    first = fitted(cut_by_regions(first, regions_of(materials)))
     level, K, error, report = _refined(first, materials, centers, options, start)
     report |= {
         "surface_volume": surface.volume,
@@ -219,19 +230,30 @@ def _refined(
         The finest mesh, the (6, 6) stiffness, the size of its error, what it took.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
-    level = solve_level(first, materials, centers, interface)
+    begun = time.monotonic()
+
+    def affordable(unknowns: int) -> None:
+        _refuse_cost(unknowns, budget, begun - start)
+
+    level = solve_level(first, materials, centers, interface, affordable)
     history, sizes = [level.totals()], [len(level.solid.cells)]
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
+        # a volume that is off by a share may be off in K by as much, in every motion
+        error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
+        if level.volume_error > max(accuracy, 0.7 * worst):
+            break  # the file's facets limit the accuracy, not the mesh
         growth = _wanted_growth(history, sizes, worst / accuracy)
-        solid = _affordable_mesh(level, growth, budget, start)
+        pace = _pace(level.solution.unknowns, time.monotonic() - begun)
+        solid = _affordable_mesh(level, growth, budget, start, pace)
         if solid is None:
             break
+        begun = time.monotonic()
         level = solve_level(solid, materials, centers, interface)
         history.append(level.totals())
         sizes.append(len(level.solid.cells))
@@ -293,31 +315,53 @@ def first_mesh(
         The solid.
 
     Raises:
-        MeshFailed: three tries gave nothing usable.
+        BadInput: an interface has no part of the surface.
+        MeshFailed: three tries gave nothing usable, or the time is up.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
 
+    start = time.monotonic()
+    if (bar := slender_bar(surface, base, tip)) is not None:
+        return bar
+
     def mesh(share: float) -> Solid:
+        left = budget.seconds - (time.monotonic() - start)
         return mesh_solid(
             surface,
             base,
             tip,
             edge=share * edge,
             envelope=share * envelope,
-            time_limit=budget.seconds,
+            time_limit=max(_MESHER * left, 1e-3),
             cache=cache,
         )
 
-    start = time.monotonic()
     for share in (1.0, 0.5):
         try:
             return mesh(share)
         except MeshFailed as error:
-            if time.monotonic() - start > budget.seconds:
+            if time.monotonic() - start > _MESHER * budget.seconds:
                 raise
             _LOG.info("a finer mesh is tried: %s", error)
     return mesh(0.2)
+
+
+def _pace(unknowns: int, seconds: float) -> float:
+    """How much slower than expected a mesh was solved; at least 1."""
+    return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
+
+
+def _refuse_cost(unknowns: int, budget: Budget, spent: float) -> None:
+    """Refuse a first mesh whose solution the budget does not allow."""
+    memory, seconds = expected_cost(unknowns)
+    if unknowns > budget.unknowns or spent + seconds > budget.seconds:
+        raise MeshFailed(
+            f"the coarsest mesh that follows the part has {unknowns} unknowns, about "
+            f"{seconds:.0f} s and {memory / 1e9:.1f} GB after {spent:.0f} s for the "
+            f"mesh; expected at most {budget.unknowns} and {budget.seconds:g} s: "
+            "allow more time, or leave out small details"
+        )
 
 
 def _wanted_growth(
@@ -333,7 +377,7 @@ def _wanted_growth(
 
 
 def _affordable_mesh(
-    level: Level, growth: float, budget: Budget, start: float
+    level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
     """A finer mesh within the budget, its number of elements grown as wanted."""
     part = growth**0.55 - 1  # neighbours add about as many elements again
@@ -347,7 +391,7 @@ def _affordable_mesh(
         each = level.solution.unknowns / len(level.solid.cells)
         unknowns = int(each * len(solid.cells))
         memory, seconds = expected_cost(unknowns)
-        spent = time.monotonic() - start
+        seconds, spent = pace * seconds, time.monotonic() - start
         _LOG.info(
             "next: about %d unknowns, %.1f GB, %.0f s", unknowns, memory / 1e9, seconds
         )

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from stiffness.fem.elements import Elements, integration, triangle_areas
 from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid, element_quality
 from stiffness.surface.surface import directed_edges
+
+_FLAT = 0.01  # quality of a tetrahedron that says little and conditions badly
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
@@ -22,7 +24,9 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         ``nodes``, ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
         elements; ``closed``, whether every edge of the boundary has two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and
-        ``largest_angle`` [rad] between two faces of a tetrahedron.  Quality and angles
+        ``largest_angle`` [rad] between two faces of a tetrahedron; ``flat_elements``,
+        how many have a quality below 0.01; ``drawn_out``, whether a bar's section was
+        drawn out in long elements, of which none counts as flat.  Quality and angles
         are those of the tetrahedra before graded layers are cut off, thin on purpose.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
@@ -36,25 +40,28 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         "closed": bool((count % 2 == 0).all()),
         "worst_quality": float(quality.min()),
         "mean_quality": float(quality.mean()),
+        "flat_elements": int((quality < _FLAT).sum()) if solid.surface else 0,
+        "drawn_out": solid.surface is None,
         "smallest_angle": float(angles.min()),
         "largest_angle": float(angles.max()),
     }
 
 
-def element_quality(solid: Solid) -> NDArray:
-    """How well shaped tetrahedra are.
+def volume_error(solid: Solid, mesh: Elements) -> float:
+    """How far the volume of a mesh may be from that of the part.
 
     Args:
-        solid: straight tetrahedra.
+        solid: the straight tetrahedra.
+        mesh: its elements.
 
     Returns:
-        (t,) [1] 1 for a regular one, 0 for a flat one: 6 sqrt(2) volume over the cube
-        of the root mean square edge.
+        [1] relative to the part's; zero where the surface is not known.
     """
-    corners = solid.points[solid.cells]
-    i, j = EDGES.T
-    mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
-    return 6 * np.sqrt(2) * solid.volumes() / mean_square**1.5
+    if solid.surface is None:
+        return 0.0
+    volume = sum(float(w.sum()) for *_, w in integration(mesh))
+    off = abs(volume - solid.surface.volume) + solid.surface.unsure_volume
+    return off / solid.surface.volume
 
 
 def dihedral_angles(solid: Solid) -> NDArray:

@@ -19,11 +19,39 @@ from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.adaptive_step import Level
-from stiffness.fem.elements import Elements, node_gradients, triangle_areas
-from stiffness.fem.error_indicator import VOIGT
+from stiffness.fem.elements import Elements, triangle_areas
 from stiffness.fem.fea import MeshedLink
+from stiffness.fem.stress_error import (
+    ZONE,
+    element_stresses,
+    estimated_error,
+    off_shapes,
+    on_facets,
+    on_inner_edges,
+    von_mises,
+)
 from stiffness.link import inverted
-from stiffness.mesh.edge_grading import singular_edges
+
+_CHUNK = 4096  # elements at a time: 4096 x 20 x 36 numbers are 24 MB
+
+
+@dataclass(frozen=True, eq=False)
+class StressSource:
+    """The mesh that stresses are of.
+
+    Attributes:
+        level: the solved mesh, of n nodes.
+        far: (n,) nodes whose stresses count.
+        singular: (n,) nodes on re-entrant edges without a fillet.
+        faceted: (n,) nodes on a surface of no recognised shape.
+        left_out: (n,) nodes that would count if the mesh followed the surface there.
+    """
+
+    level: Level
+    far: NDArray
+    singular: NDArray
+    faceted: NDArray
+    left_out: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +65,14 @@ class StressInfluence:
         away: [m] nothing nearer than this to an interface is here.
         reentrant_edges: whether some of the nodes lie on re-entrant edges without a
             fillet, where the elastic stress is singular too.
+        source: the mesh that they are of; without it errors are unknown.
     """
 
     places: NDArray
     influence: NDArray
     away: float
     reentrant_edges: bool = False
+    source: StressSource | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -57,6 +87,11 @@ class StressInfluence:
             words += (
                 "; some of them on inner edges without a fillet, where stress is "
                 "singular too and grows with the mesh's fineness"
+            )
+        if self.source is not None and self.source.left_out.any():
+            words += (
+                f"; {self.source.left_out.sum()} nodes left out, where the mesh does "
+                "not follow the part's surface"
             )
         return words
 
@@ -84,6 +119,32 @@ class StressInfluence:
         worst = int(np.argmax(values))
         return float(values[worst]), self.places[worst]
 
+    def peak_error(self, wrench: ArrayLike) -> float:
+        """Estimated error of the peak of a tip wrench, that of the mesh.
+
+        Args:
+            wrench: (6,) [N m, N] at the tip, in the link's axes.
+
+        Returns:
+            [Pa] infinite where the stress is singular, NaN where the mesh is not known.
+        """
+        if self.source is None:
+            return float("nan")
+        values, far = von_mises(self.stresses(wrench)), self.source.far
+        worst = int(np.argmax(values))
+        node = int(np.flatnonzero(far)[worst])
+        if self.source.singular[node]:
+            return float("inf")
+        zone = np.zeros(len(far), dtype=bool)
+        zone[far] = values >= ZONE * values[worst]
+        level = self.source.level
+        motion = inverted(level.solution.stiffness) @ np.asarray(wrench)
+        return estimated_error(level, motion, node, zone, self.source.left_out)
+
+    def relative_error(self) -> float:
+        """Largest estimated error of the six unit wrenches' peaks, relative to them."""
+        return max(self.peak_error(w) / self.peak(w)[0] for w in np.eye(6))
+
 
 @dataclass(frozen=True, eq=False)
 class PeakStress:
@@ -92,6 +153,7 @@ class PeakStress:
     Attributes:
         wrench: (6,) [N m, N] at the tip, in the link's axes.
         von_mises: [Pa].
+        error: [Pa] estimated, of the mesh; infinite where the stress is singular.
         place: (3,) [m] of it.
         region: where stresses were evaluated, in words.
         away: [m] nothing nearer than this to an interface was evaluated.
@@ -102,6 +164,7 @@ class PeakStress:
 
     wrench: NDArray
     von_mises: float
+    error: float
     place: NDArray
     region: str
     away: float
@@ -138,8 +201,11 @@ def peak_stress(
         peak_beam_stress(section, 0.0, np.zeros(6))  # refused before the work
     field = stress_influence(solved, away)
     value, place = field.peak(w)
+    error, region = field.peak_error(w), field.region
+    if _peaks_on_facets(field, w):
+        region += "; the peak lies on facets of no recognised shape, taken as smooth"
     if section is None:
-        return PeakStress(w, value, place, field.region, field.away)
+        return PeakStress(w, value, error, place, region, field.away)
     base, tip = solved.link.base, solved.link.tip
     R = section_axes(tip - base, up)
     length = float(np.linalg.norm(tip - base))
@@ -153,27 +219,13 @@ def peak_stress(
     return PeakStress(
         wrench=w,
         von_mises=value,
+        error=error,
         place=place,
-        region=field.region,
+        region=region,
         away=field.away,
         beam=beam,
         beam_whole=float(whole),
     )
-
-
-def von_mises(stress: ArrayLike) -> NDArray:
-    """Equivalent stress.
-
-    Args:
-        stress: (..., 6) [Pa] xx yy zz yz xz xy.
-
-    Returns:
-        (...) [Pa].
-    """
-    s = np.asarray(stress, dtype=float)
-    x, y, z, yz, xz, xy = np.moveaxis(s, -1, 0)
-    normal = (x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2
-    return np.sqrt(normal / 2 + 3 * (yz**2 + xz**2 + xy**2))
 
 
 def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
@@ -204,14 +256,26 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
             f"stress: nothing of the link is {distance:.4g} m away from its "
             f"interfaces; the furthest node is {gap.max():.4g} m"
         )
+    off = off_shapes(level)
+    left_out = far & off if (far & ~off).any() else np.zeros_like(far)
+    far &= ~left_out
     per_screw = _nodal_stresses(level)[far]
     # the fields' own: they balance the wrench exactly
     C_h = inverted(level.solution.stiffness)
     influence = np.einsum("pks,kw->pws", per_screw, C_h)
-    reentrant = np.unique(singular_edges(level.solid, ()))
+    source = StressSource(level, far, on_inner_edges(level), on_facets(level), left_out)
+    reentrant = bool(source.singular[far].any())
     return StressInfluence(
-        mesh.nodes[far], influence, float(distance), bool(far[reentrant].any())
+        mesh.nodes[far], influence, float(distance), reentrant, source
     )
+
+
+def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
+    """Whether the peak lies on a surface of no recognised shape."""
+    if field.source is None:
+        return False
+    worst = int(np.argmax(von_mises(field.stresses(wrench))))
+    return bool(field.source.faceted[field.source.far][worst])
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
@@ -225,20 +289,11 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 def _nodal_stresses(level: Level) -> NDArray:
     """(n, 6, 6) stress of each unit screw at each node, averaged over elements."""
-    mesh, fields = level.mesh, level.solution.fields
+    mesh = level.mesh
     total = np.zeros((len(mesh.nodes), 6, 6))
     count = np.bincount(mesh.cells.ravel(), minlength=len(mesh.nodes))
-    for part, G in node_gradients(mesh):
-        nodes = mesh.cells[part]
-        slope = np.einsum("cqax,caik->cqkix", G, fields[nodes], optimize=True)
-        lam, mu, _ = level.material[part].T[:, :, None, None]
-        pressure = lam * np.trace(slope, axis1=-2, axis2=-1)
-        stress = np.stack(
-            [
-                mu * (slope[..., i, j] + slope[..., j, i]) + (i == j) * pressure
-                for i, j in VOIGT
-            ],
-            axis=-1,
-        )
-        np.add.at(total, nodes, stress)
+    for first in range(0, len(mesh.cells), _CHUNK):
+        some = np.arange(first, min(first + _CHUNK, len(mesh.cells)))
+        stress = element_stresses(level, some, np.eye(6))
+        np.add.at(total, mesh.cells[some], stress)
     return total / np.maximum(count, 1)[:, None, None]

@@ -23,8 +23,8 @@ from stiffness.mesh.lagrange import (
     quadrature,
     shape_functions,
 )
-from stiffness.mesh.mesh import Solid, node_patches, on_shapes
 from stiffness.mesh.refine import refine
+from stiffness.mesh.solid import Solid, node_patches, on_shapes
 from stiffness.surface.primitives import Shape
 
 _LARGEST_MOVE = 0.05  # of a node, relative to the part's size
@@ -79,7 +79,8 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
         chosen[some] = True
         kept = [(key, group[chosen[group]]) for key, group in groups]
         kept = [(key, group) for key, group in kept if len(group)]
-        return on_shapes(places, kept, solid.shapes, _LARGEST_MOVE * size)
+        reach = _LARGEST_MOVE * size
+        return on_shapes(places, kept, solid.shapes, reach, solid.walls)
 
     if order == 2:
         nodes = moved_nodes(straight, cells[:, 4:])

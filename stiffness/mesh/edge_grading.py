@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.mesh import Solid, moved_onto_shapes
 from stiffness.mesh.refine import (
     chosen_by_all,
     edge_code,
@@ -26,6 +25,8 @@ from stiffness.mesh.refine import (
     length_ranks,
     split_edges,
 )
+from stiffness.mesh.regions import Region, material_edges
+from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
 LAYER_SHARE = 0.25  # thickness of the layer over the element's; 0.15 to 0.3 do as well
@@ -100,12 +101,32 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     return np.column_stack([chosen // count, chosen % count])
 
 
-def split_joining_edges(solid: Solid, held: tuple[int, ...]) -> Solid:
+def graded_edges(
+    solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...]
+) -> NDArray:
+    """Singular edges, and where regions of different materials meet the boundary.
+
+    Args:
+        solid: any.
+        held: patches that are clamped or loaded.
+        regions: of the link.
+
+    Returns:
+        (e, 2) corners.
+    """
+    both = (singular_edges(solid, held), material_edges(solid, regions))
+    return np.unique(np.concatenate(both), axis=0) if len(both[1]) else both[0]
+
+
+def split_joining_edges(
+    solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...] = ()
+) -> Solid:
     """Split edges that join singular edges.
 
     Args:
         solid: any.
         held: patches that are clamped or loaded.
+        regions: of the link.
 
     Returns:
         A solid whose tetrahedra have at most a corner or an edge on the singular
@@ -114,7 +135,7 @@ def split_joining_edges(solid: Solid, held: tuple[int, ...]) -> Solid:
     settled = False
     for _ in range(_PASSES):
         count = len(solid.points)
-        singular = edge_code(singular_edges(solid, held), count)
+        singular = edge_code(graded_edges(solid, held, regions), count)
         touched = np.zeros(count, dtype=bool)
         touched[singular // count] = touched[singular % count] = True
         ends, of_cell = edges_of(solid.cells, count)
@@ -142,13 +163,19 @@ def split_joining_edges(solid: Solid, held: tuple[int, ...]) -> Solid:
     return moved_onto_shapes(solid)
 
 
-def layered(solid: Solid, held: tuple[int, ...], share: float = LAYER_SHARE) -> Parts:
+def layered(
+    solid: Solid,
+    held: tuple[int, ...],
+    share: float = LAYER_SHARE,
+    regions: tuple[Region, ...] = (),
+) -> Parts:
     """Cut a layer of thin parts along the singular edges.
 
     Args:
         solid: of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
         share: of each edge, from the singular end, that is the layer's.
+        regions: of the link.
 
     Returns:
         The parts; tetrahedra that touch no singular edge stay whole.
@@ -156,7 +183,7 @@ def layered(solid: Solid, held: tuple[int, ...], share: float = LAYER_SHARE) -> 
     parts = whole_elements(solid)
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
-    touched[singular_edges(solid, held)] = True
+    touched[graded_edges(solid, held, regions)] = True
     # should a tetrahedron touch more than an edge after all, its corners get no layer
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False

@@ -6,13 +6,13 @@ triangles are split with their tetrahedra and keep their patch, and new corners 
 moved onto the patch's shape.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiffness.mesh.lagrange import EDGES
-from stiffness.mesh.mesh import Solid, moved_onto_shapes
+from stiffness.mesh.solid import Solid, moved_onto_shapes
 
 _TRIANGLE = np.array([[0, 1], [1, 2], [0, 2]])
 
@@ -51,15 +51,20 @@ def refine(solid: Solid, halvings: NDArray) -> Refined:
 
 
 def split_edges(
-    solid: Solid, ends: NDArray, of_cell: NDArray, split: NDArray
+    solid: Solid,
+    ends: NDArray,
+    of_cell: NDArray,
+    split: NDArray,
+    places: NDArray | None = None,
 ) -> tuple[Solid, NDArray]:
-    """Bisect some edges and the tetrahedra at them, at most one edge of each.
+    """Split some edges and the tetrahedra at them, at most one edge of each.
 
     Args:
         solid: to refine; new corners are not yet moved onto its shapes.
         ends: (e, 2) of :func:`edges_of`.
         of_cell: (t, 6) of :func:`edges_of`.
-        split: (e,) whether an edge is to be halved.
+        split: (e,) whether an edge is to be split.
+        places: (k, 3) [m] of the new corners; the edges' middles if absent.
 
     Returns:
         The solid, and the tetrahedra (r,) that were halved: their first halves keep
@@ -68,13 +73,16 @@ def split_edges(
     count = len(solid.points)
     middle = np.full(len(ends), -1)
     middle[split] = count + np.arange(split.sum())
-    points = np.concatenate([solid.points, solid.points[ends[split]].mean(axis=1)])
+    if places is None:
+        places = solid.points[ends[split]].mean(axis=1)
+    points = np.concatenate([solid.points, places])
     pairs = np.sort(solid.faces[:, _TRIANGLE], axis=2)
     of_face = np.searchsorted(edge_code(ends, count), edge_code(pairs, count))
     faces, face_row = _halved(solid.faces, middle[of_face], _TRIANGLE)
     cells, row = _halved(solid.cells, middle[of_cell], EDGES)
     patch = np.r_[solid.patch, solid.patch[face_row]]
-    return Solid(points, cells, faces, patch, solid.shapes), row
+    finer = replace(solid, points=points, cells=cells, faces=faces, patch=patch)
+    return finer, row
 
 
 def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Cone, Plane, Shape
 
 _AROUND = 8  # elements around a full circle at least
@@ -26,18 +26,19 @@ _LONGEST = 2.0  # of a layer, in widths of the section
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def straight_bar(section: Mapping[str, float]) -> Solid:
+def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Solid:
     """A bar of unit length along z, its section's y and z along x and y.
 
     Args:
         section: lengths of :func:`stiffness.beam.sections.declared_section`, per length
             of the bar.
+        longest: layer, in widths of the section.
 
     Returns:
         A mesh to refine from: patch 0 at z = 0, patch 1 at z = 1.
     """
     flat, triangles = _round(section) if "radius" in section else _angular(section)
-    heights = _heights(_thinnest(section), _LONGEST * float(np.ptp(flat[:, 0])))
+    heights = _heights(_thinnest(section), longest * float(np.ptp(flat[:, 0])))
     points = np.concatenate([np.insert(flat, 2, z, axis=1) for z in heights])
     a, b, c = np.sort(triangles, axis=1).T
     up = len(flat)

@@ -102,6 +102,7 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
     results: dict[str, Any] = {
         "wrench": peak.wrench,
         "von_mises": peak.von_mises,
+        "error": peak.error if math.isfinite(peak.error) else None,
         "place": peak.place,
         "region": peak.region,
         "away": peak.away,
@@ -145,6 +146,16 @@ def link_text(link: LinkStiffness) -> str:
         f"{math.degrees(mesh['largest_angle']):.0f} degrees; boundary "
         f"{mesh['area']:.6g} m^2 (surface {mesh['surface_area']:.6g})",
     ]
+    if mesh.get("flat_elements"):
+        lines.append(
+            f"WARNING: {mesh['flat_elements']} elements are nearly flat, quality below "
+            "0.01: the surface has details much smaller than its walls, or facets that "
+            "are not smooth"
+        )
+    if mesh.get("drawn_out"):
+        lines.append(
+            "the bar's section was drawn out: its elements are long on purpose"
+        )
     lines += [f"repaired: {repair}" for repair in mesh["repairs"]]
     if link.mass > 0:
         center = ", ".join(f"{v:.5g}" for v in link.center_of_mass)
@@ -210,6 +221,7 @@ def stress_text(peak: "PeakStress") -> str:
     """
     lines = [
         f"largest von Mises stress {_megapascals(peak.von_mises, peak.place)}",
+        f"estimated error of the mesh: {_stress_error(peak)}",
         f"looked at: {peak.region}",
     ]
     if peak.beam is not None:
@@ -218,6 +230,14 @@ def stress_text(peak: "PeakStress") -> str:
             f"beam, whole length: {peak.beam_whole / 1e6:.4g} MPa",
         ]
     return "\n".join(lines)
+
+
+def _stress_error(peak: "PeakStress") -> str:
+    """A stress's estimated error, or why there is none."""
+    if not math.isfinite(peak.error):
+        return "none, the peak lies on an inner edge where stress has no finite value"
+    share = peak.error / peak.von_mises if peak.von_mises else 0.0
+    return f"{peak.error / 1e6:.2g} MPa ({100 * share:.2g} %)"
 
 
 def _megapascals(stress: float, place: NDArray) -> str:

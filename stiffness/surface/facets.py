@@ -50,6 +50,21 @@ class Facets:
             np.add.at(total, self.triangles[:, k], angle[:, None] * facing)
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
+    def edge_lifts(self, edges: NDArray) -> NDArray:
+        """(e,) [m] lifts at the middles of edges (e, 2) between two points."""
+        half = (self.points[edges[:, 0]] - self.points[edges[:, 1]]) / 2
+        rises = [
+            np.einsum("ei,ei->e", sign * half, self.normals[edges[:, k]])[:, None]
+            * self.normals[edges[:, k]]
+            for k, sign in ((0, 1), (1, -1))
+        ]
+        return np.asarray(np.linalg.norm(rises[0] + rises[1], axis=1) / 4)
+
+    def lifts(self) -> NDArray:
+        """(m,) [m] the largest lift of each facet at the middles of its edges."""
+        sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
+        return np.asarray(np.max(sides, axis=0))
+
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
         """Signed distances (n,) [m] from the lifted facets, and unit gradients."""
         cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)

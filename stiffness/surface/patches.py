@@ -1,29 +1,17 @@
 """Segmentation of a surface into smooth patches, each with its exact shape."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
-from stiffness.surface.facets import Facets
 from stiffness.surface.interface import Interface
-from stiffness.surface.primitives import (
-    Cone,
-    Plane,
-    Shape,
-    fit_cone,
-    fit_plane,
-    fit_sphere,
-    fit_torus,
-)
+from stiffness.surface.primitives import Cone, Plane, Shape
+from stiffness.surface.recognition import recognise
+from stiffness.surface.smooth_outline import SmoothOutline, smooth_outline
 from stiffness.surface.surface import Surface, directed_edges
-
-_SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
-_ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
-_SEEDS = 12  # tries to recognise a shape in the rest of a part
-_TRIES = 120  # on one surface; the rest then keeps its facets
+from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +21,12 @@ class Patches:
     Attributes:
         patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
         shapes: of each patch; lifted facets where no simpler one is known.
+        outlines: of the interfaces, where the surface goes on smoothly.
     """
 
     patch: NDArray
     shapes: tuple[Shape, ...]
+    outlines: tuple[SmoothOutline, ...] = ()
 
 
 def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
@@ -61,12 +51,32 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
             raise BadInput(f"{surface.name}: base and tip are the same faces")
         patch[members] = number
         shapes.append(interface_shape(interface))
-    graph = _TriangleGraph(surface)
+    graph = TriangleGraph(surface)
     for members in graph.smooth_parts(patch < 0):
-        for part, shape in _recognise(graph, members):
+        for part, shape in recognise(graph, members):
             patch[part] = len(shapes)
-            shapes.append(shape or graph.lifted(part))
-    return Patches(patch, tuple(shapes))
+            shapes.append(shape)
+    return Patches(patch, tuple(shapes), tuple(_outlines(graph, patch, shapes)))
+
+
+def _outlines(
+    graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
+) -> list[SmoothOutline]:
+    """Where an interface meets another patch without a sharp edge."""
+    one, other = patch[graph.left], patch[graph.right]
+    smooth = (graph.cosine > SHARP) & (one != other)
+    found = []
+    for number in (0, 1):
+        touching = smooth & ((one == number) | (other == number))
+        across = np.where(one == number, other, one)
+        for neighbour in np.unique(across[touching]):
+            edges = np.flatnonzero(touching & (across == neighbour))
+            owner = np.where(one == number, graph.left, graph.right)[edges]
+            ends = graph.directed(edges, owner)
+            normals = graph.normals[owner]
+            pair = (number, int(neighbour))
+            found.append(smooth_outline(graph.points, ends, normals, pair))
+    return found
 
 
 def interface_shape(interface: Interface) -> Shape:
@@ -81,6 +91,33 @@ def interface_shape(interface: Interface) -> Shape:
     if interface.kind == "bore":
         return Cone(interface.point, interface.direction, interface.radius)
     return Plane(interface.point, interface.direction)
+
+
+def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
+    """Refuse rigid interfaces that share an edge: their stiffness has no finite value.
+
+    Args:
+        surface: the link's.
+        base: the held interface.
+        tip: the loaded interface.
+
+    Raises:
+        BadInput: they share an edge, or an interface has no part of the surface.
+    """
+    codes: list[NDArray] = []
+    for name, interface in (("base", base), ("tip", tip)):
+        members = surface.triangles[triangles_on(surface, interface, name)]
+        ends = np.sort(directed_edges(members), axis=1)
+        codes.append(np.unique(ends[:, 0] * len(surface.points) + ends[:, 1]))
+    common = np.intersect1d(codes[0], codes[1])
+    if len(common):
+        ends = np.array(divmod(int(common[0]), len(surface.points)))
+        where = ", ".join(f"{v:.4g}" for v in surface.points[ends].mean(axis=0))
+        raise BadInput(
+            f"{surface.name}: base {base} and tip {tip} share an edge near ({where}) "
+            "m; between rigid faces that touch the stiffness has no finite value: "
+            "leave a gap, or choose --interface distributing"
+        )
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
@@ -129,156 +166,3 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
             f"{hint if interface.kind == 'disc' else ''}"
         )
     return np.flatnonzero(on)
-
-
-class _TriangleGraph:
-    """Triangles, their neighbours and the angles between them."""
-
-    def __init__(self, surface: Surface) -> None:
-        self.points, self.triangles = surface.points, surface.triangles
-        normals = surface.normals()
-        self.areas = np.linalg.norm(normals, axis=1)
-        self.normals = normals / np.maximum(self.areas, 1e-300)[:, None]
-        self.tolerance = _ON_SHAPE * surface.diagonal
-        self.tries = _TRIES
-        edges = np.sort(directed_edges(self.triangles), axis=1)
-        owner = np.repeat(np.arange(len(self.triangles)), 3)
-        order = np.lexsort(edges.T)
-        self.left, self.right = owner[order[::2]], owner[order[1::2]]
-        self.cosine = np.einsum(
-            "ij,ij->i", self.normals[self.left], self.normals[self.right]
-        )
-
-    def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Component of each member; cut where the cosine is below ``bend``."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        keep = members[self.left] & members[self.right] & (self.cosine > bend)
-        size = len(self.triangles)
-        graph = coo_array(
-            (np.ones(keep.sum()), (self.left[keep], self.right[keep])), (size, size)
-        )
-        return connected_components(graph, directed=False)[1]
-
-    def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Indices of the triangles of each part between sharp edges."""
-        label = self.connected_parts(members, _SHARP)
-        return [
-            np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
-        ]
-
-    def lifted(self, part: NDArray) -> Facets:
-        """A part of no known shape."""
-        used, index = np.unique(self.triangles[part], return_inverse=True)
-        return Facets(self.points[used], index.reshape(-1, 3))
-
-    def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Which triangles of a part lie on a shape, corners and direction."""
-        corners = self.points[self.triangles[part]].reshape(-1, 3)
-        distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
-        centers = corners.reshape(-1, 3, 3).mean(axis=1)
-        along = np.einsum("ij,ij->i", shape.signed(centers)[1], self.normals[part])
-        return (distances < self.tolerance) & (np.abs(along) > _SHARP)
-
-
-def _recognise(
-    graph: _TriangleGraph, part: NDArray
-) -> list[tuple[NDArray, Shape | None]]:
-    """Shapes of a smooth part: one for all of it, else the largest first."""
-    shape = _fit(graph, part)
-    if shape is not None and graph.fits(shape, part).all():
-        return [(part, shape)]
-    recognised: list[tuple[NDArray, Shape | None]] = []
-    while len(part):
-        members, shape = _largest_shape(graph, part)
-        if shape is None:
-            return recognised + _leftovers(graph, part, separate=bool(recognised))
-        recognised.append((members, shape))
-        part = np.setdiff1d(part, members)
-    return recognised
-
-
-def _leftovers(
-    graph: _TriangleGraph, part: NDArray, separate: bool
-) -> list[tuple[NDArray, Shape | None]]:
-    """Triangles of no recognised shape; pieces between shapes are fitted once more."""
-    if not separate:
-        return [(part, None)]
-    inside = np.zeros(len(graph.triangles), dtype=bool)
-    inside[part] = True
-    pieces = graph.smooth_parts(inside)
-    return [(piece, _fit(graph, piece)) for piece in pieces]
-
-
-def _fit(graph: _TriangleGraph, part: NDArray) -> Shape | None:
-    """The simplest shape all corners of a part lie on."""
-    points = graph.points[np.unique(graph.triangles[part])]
-    normals = graph.normals[part]
-    # a few corners decide whether a shape is fitted to all of them
-    few = points[:: max(1, len(points) // 50)]
-    tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
-        (fit_plane, 3),
-        (fit_cone, 7),
-        (fit_sphere, 7),
-        (fit_torus, 12),
-    ]
-    for fit, least in tries:
-        if len(points) < least:
-            break
-        if len(few) < len(points) and not _lies_on(fit(few, normals), few, graph):
-            continue
-        shape = fit(points, normals)
-        if _lies_on(shape, points, graph):
-            return shape
-    return None
-
-
-def _lies_on(shape: Shape, points: NDArray, graph: _TriangleGraph) -> bool:
-    """Whether points are on a shape, to the tolerance of the surface."""
-    return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
-
-
-def _largest_shape(
-    graph: _TriangleGraph, part: NDArray
-) -> tuple[NDArray, Shape | None]:
-    """The largest connected piece of a part that is one shape; none if none is."""
-    inside = np.zeros(len(graph.triangles), dtype=bool)
-    inside[part] = True
-    flat = graph.connected_parts(inside, 1 - 1e-10)
-    best, largest, area = None, part[:0], 0.0
-    whole = graph.areas[part].sum()
-    tried = ~inside
-    for _ in range(_SEEDS):
-        waiting = part[~tried[part]]
-        if len(waiting) == 0 or area > whole / 2 or graph.tries == 0:
-            break
-        graph.tries -= 1
-        seed = waiting[np.argmax(graph.areas[waiting])]
-        tried[flat == flat[seed]] = True
-        for rings in (0, 2, 4):
-            shape = _fit(graph, _ring(graph, inside, flat, seed, rings))
-            if shape is None:
-                continue
-            on = np.zeros_like(inside)
-            on[part] = graph.fits(shape, part)
-            label = graph.connected_parts(on, _SHARP)
-            piece = np.flatnonzero(on & (label == label[seed]))
-            tried[piece] = True
-            # two coplanar triangles are a facet of a curved shape
-            if len(piece) > 2 and graph.areas[piece].sum() > area:
-                best, largest, area = shape, piece, float(graph.areas[piece].sum())
-    return largest, best
-
-
-def _ring(
-    graph: _TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
-) -> NDArray:
-    """A seed with its coplanar neighbours, grown by some rings of graph."""
-    members = inside & (flat == flat[seed])
-    touch = inside[graph.left] & inside[graph.right] & (graph.cosine > _SHARP)
-    left, right = graph.left[touch], graph.right[touch]
-    for _ in range(rings):
-        grown = np.r_[right[members[left]], left[members[right]]]
-        members = members | (inside & np.isin(flat, flat[grown]))
-    return np.flatnonzero(members)

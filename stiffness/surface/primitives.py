@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
+_CALLS = (25, 100)  # of the residual in a fit, and in one that may still succeed
+_MAY_FIT = 0.02  # of the points' size: the largest residual then
+_FITS = 1e-9  # of it: a shape that has been found
 _TINY = 1e-300  # keeps a division at a shape's own axis finite
 
 
@@ -211,6 +214,8 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 
         start = np.r_[0.0, circle, 0.0, 0.0, radius, tube]
         candidates.append(_refined_fit(shape, start, points, size))
+        if np.abs(candidates[-1].signed(points)[0]).max() < _FITS * size:
+            break
     return min(candidates, key=lambda t: float(np.abs(t.signed(points)[0]).max()))
 
 
@@ -222,13 +227,18 @@ def _refined_fit(
 
     if len(points) < len(start):
         return shape(start)
-    result = least_squares(
-        lambda p: shape(p).signed(points)[0] / size,
-        start,
-        method="lm",
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-        max_nfev=40,
-    )
-    return shape(result.x)
+    p = start
+    for calls in _CALLS:
+        result = least_squares(
+            lambda p: shape(p).signed(points)[0] / size,
+            p,
+            method="lm",
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=calls,
+        )
+        p, off = result.x, float(np.abs(result.fun).max())
+        if not _FITS < off < _MAY_FIT:
+            break
+    return shape(p)

@@ -17,6 +17,8 @@ UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
 _LARGEST_LINK = 20.0  # [m] diagonal; beyond it the unit is taken to be wrong
 _SMALLEST_LINK = 1e-3  # [m]
+_STATED = "stated in the file"
+_CROWD = 100  # vertices within 1e-7 of the size of one, on the mean; memory grows so
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +126,10 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
         raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
     file, solid = named_solid(path)
     points, triangles = _read_triangles(file, solid)
+    scale = UNITS[unit]
     if file.suffix.lower() in STEP:
-        unit = "m"
-    return check_surface(points * UNITS[unit], triangles, str(path), unit)
+        scale, unit = 1.0, _STATED
+    return check_surface(points * scale, triangles, str(path), unit)
 
 
 def _read_triangles(path: Path, solid: str) -> tuple[NDArray, NDArray]:
@@ -166,7 +169,7 @@ def check_surface(
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise BadInput(f"{name}: a triangle has a corner that is not among the points")
     _check_coordinates(points, triangles, name, unit)
-    points, triangles, repairs = _merge(points, triangles)
+    points, triangles, repairs = _merge(points, triangles, name)
     if len(triangles) < 4:
         raise BadInput(f"{name}: {len(triangles)} proper triangles bound no solid")
     _check_closed(points, triangles, name)
@@ -198,14 +201,16 @@ def _check_coordinates(
         raise BadInput(f"{name}: {wrong.sum()} vertices are not finite numbers")
     size = math.hypot(*np.ptp(used, axis=0))
     if not _SMALLEST_LINK <= size <= _LARGEST_LINK:
-        hint = "mm" if size > _LARGEST_LINK and unit == "m" else "m"
+        hint = "mm" if size > _LARGEST_LINK and unit in {"m", _STATED} else "m"
         raise BadInput(
             f'{name}: the part is {size:.4g} m across with unit = "{unit}"; '
             f'is the file in "{hint}"?'
         )
 
 
-def _merge(points: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, list[str]]:
+def _merge(
+    points: NDArray, triangles: NDArray, name: str
+) -> tuple[NDArray, NDArray, list[str]]:
     """Merge coincident vertices; drop triangles without area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
@@ -215,7 +220,13 @@ def _merge(points: NDArray, triangles: NDArray) -> tuple[NDArray, NDArray, list[
     from scipy.spatial import cKDTree
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    pairs = cKDTree(points).query_pairs(1e-7 * size, output_type="ndarray")
+    tree, near = cKDTree(points), 1e-7 * size
+    if tree.count_neighbors(tree, near) > _CROWD * len(points):  # too many to list
+        raise BadInput(
+            f"{name}: most of its {len(points)} vertices are nearer than {near:.2g} m "
+            f"to each other, in a part {size:.4g} m across"
+        )
+    pairs = tree.query_pairs(near, output_type="ndarray")
     if len(pairs):
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components

@@ -1,18 +1,25 @@
-"""Readers of surface files."""
+"""Readers of surface files.
+
+STL is read here.  The other kinds need VTK, meshio or gmsh, which a damaged file can
+end together with their process: they run in a process of their own
+(:mod:`stiffness.surface.surface_worker`).
+"""
 
 import io
-from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
+import os
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.inputs.table import BadInput
+from stiffness.surface.stl_file import read_stl
 
 STEP = (".step", ".stp")
-_FACETS = 48  # of a full circle, in STEP
+_TIME_LIMIT = 300.0  # [s] of one reader; gmsh takes 1 s for 35 000 triangles
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
@@ -45,123 +52,41 @@ def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]
             is not installed.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    read = {".msh": _msh}.get(suffix, _with_vtk)
-    if suffix in STEP:
-        read = partial(_step, solid=solid)
-    try:
-        points, faces = read(path)
-    except BadInput:
-        raise
-    except (Exception, SystemExit) as error:  # any error of a third-party reader
-        raise BadInput(f"{path}: not a readable {suffix[1:].upper()} file") from error
+    if path.suffix.lower() == ".stl":
+        return read_stl(path)
+    points, faces = _in_own_process(path, solid)
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
-        raise BadInput(f"{path}: holds no triangles, or is not {suffix[1:].upper()}")
-    return np.array(points, dtype=float), faces.astype(np.int64)
+        kind = path.suffix[1:].upper()
+        raise BadInput(f"{path}: holds no triangles, or is not {kind}")
+    return points, faces.astype(np.int64)
 
 
-def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
-    """What VTK reads: STL, OBJ, PLY, VTK, VTP."""
-    import pyvista
-    from vtkmodules.vtkCommonCore import vtkObject
-
-    vtkObject.GlobalWarningDisplayOff()
-    return _boundary(path, pyvista.read(path))
-
-
-def _check_points(path: Path, mesh: Any) -> None:
-    """Refuse cells of points that are not there: VTK's filters die of them."""
-    import pyvista
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    cells = []
-    if isinstance(mesh, pyvista.PolyData):
-        cells = [mesh.GetVerts(), mesh.GetLines(), mesh.GetPolys(), mesh.GetStrips()]
-    elif isinstance(mesh, pyvista.UnstructuredGrid):
-        cells = [mesh.GetCells()]
-    for some in cells:
-        used = vtk_to_numpy(some.GetConnectivityArray())
-        wrong = used[(used < 0) | (used >= mesh.n_points)]
-        if len(wrong):
-            raise BadInput(
-                f"{path}: found a cell of point {wrong[0] + 1}, expected 1 to "
-                f"{mesh.n_points}"
+def _in_own_process(path: Path, solid: str) -> tuple[NDArray, NDArray]:
+    """Points and faces by a reader that may crash, hang or want all memory."""
+    kind = path.suffix[1:].upper()
+    with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
+        made = Path(folder, "read.npz")
+        # -P: modules of the folder it runs in are not to be taken for others'
+        module = "stiffness.surface.surface_worker"
+        command = [sys.executable, "-P", "-m", module, str(path), str(made), solid]
+        search = {"PYTHONPATH": os.pathsep.join(sys.path)}
+        try:
+            subprocess.run(
+                command,
+                timeout=_TIME_LIMIT,
+                capture_output=True,
+                stdin=subprocess.DEVNULL,
+                check=False,
+                env=os.environ | search,
             )
-
-
-def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
-    """Points and triangles of a VTK mesh, the boundary of its volume if it has one."""
-    import pyvista
-
-    _check_points(path, mesh)
-    if not isinstance(mesh, pyvista.PolyData):
-        mesh = mesh.extract_surface(algorithm="dataset_surface")
-    mesh = mesh.triangulate()
-    faces = mesh.regular_faces if mesh.n_cells else np.empty((0, 3))
-    return np.asarray(mesh.points), np.asarray(faces)
-
-
-def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Gmsh's MSH 2.2 and 4.1: its surface elements, else the volume's boundary."""
-    import meshio
-    import pyvista
-
-    # meshio prints an empty line, and its errors before it leaves the program
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-        mesh = meshio.read(path, "gmsh")
-    blocks = [b for b in mesh.cells if b.dim == 2] or [
-        b for b in mesh.cells if b.dim == 3
-    ]
-    if not blocks:
-        raise BadInput(f"{path}: holds neither triangles nor tetrahedra")
-    cells = [(b.type, b.data) for b in blocks]
-    return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
-
-
-def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """A solid of a STEP file cut into fine triangles, in metres by its own unit."""
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:
-        reason = "" if isinstance(error, ImportError) else f" ({error})"
-        raise BadInput(
-            f"{path}: STEP needs the package gmsh{reason}; install forcefit[gmsh], or "
-            "export the surface as STL"
-        ) from None
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
-        gmsh.open(str(path))
-        sides = _sides(gmsh.model, path, solid)
-        gmsh.model.mesh.generate(2)
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        corners = np.concatenate([
-            gmsh.model.mesh.getElementsByType(2, side)[1] for side in sides
-        ])
-    finally:
-        gmsh.finalize()
-    used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
-    index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
-    index[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
-
-
-def _sides(model: Any, path: Path, solid: str) -> list[int]:
-    """Faces of the solid that is meant, which must be named if there are several."""
-    solids = dict[str, int]()
-    for _, tag in model.getEntities(3):
-        own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
-        solids[own if own not in solids else f"{own}-{tag}"] = tag
-    if solid and solid not in solids:
-        raise BadInput(f"{path}: no solid {quoted(solid)}{nearest(solid, solids)}")
-    if not solid and len(solids) > 1:
-        names = ", ".join(list(solids)[:20])
-        raise BadInput(
-            f"{path}: found {len(solids)} solids ({names}), expected which one, such "
-            f"as {path.name}#{next(iter(solids))}"
-        )
-    if not solid:  # one, or faces that belong to none
-        return [tag for _, tag in model.getEntities(2)]
-    return [tag for _, tag in model.getBoundary([(3, solids[solid])], oriented=False)]
+        except subprocess.TimeoutExpired:
+            raise BadInput(
+                f"{path}: not read after {_TIME_LIMIT:g} s as {kind}"
+            ) from None
+        try:
+            stored = np.load(io.BytesIO(made.read_bytes()), allow_pickle=False)
+        except (OSError, ValueError):
+            raise BadInput(f"{path}: not a readable {kind} file") from None
+        if "refused" in stored:
+            raise BadInput(str(stored["refused"]))
+        return stored["points"], stored["faces"]

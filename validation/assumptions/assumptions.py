@@ -10,7 +10,7 @@ from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
-from stiffness.mesh.mesh import MeshFailed
+from stiffness.mesh.fit_to_patches import MeshFailed
 from validation.assumptions.platform_cost import (
     NoSolids,
     PlatformCosts,

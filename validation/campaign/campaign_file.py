@@ -7,11 +7,12 @@ import os.path
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.files.robot_file import read_robot
+from assembly.exchange.robot_files import read_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
 from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN
@@ -77,8 +78,8 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
     """What is, or was, commanded to a machine; readings may be missing.
 
     Args:
-        source: a campaign, or a table of the same columns alone (then of the
-            platform's origin, in SI).
+        source: a campaign, or a table of the same columns alone, in SI: then of the
+            point at which the robot was identified, or of the platform's origin.
         robot: that is to answer, instead of the campaign's.
 
     Returns:
@@ -88,7 +89,10 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
         BadInput: as :func:`read_campaign`.
     """
     if Path(source).suffix.lower() == ".csv":
-        root = Table({"measurements": Path(source).name}, str(source), "")
+        content: dict[str, Any] = {"measurements": Path(source).name}
+        if robot.reference_point is not None:
+            content["reference_point"] = list(robot.reference_point)
+        root = Table(content, str(source), "")
         return _campaign(_declared(root), robot, measured=False)
     root = read_toml(_declaration(source))
     root.text("robot", expected="a built-in robot or a robot file")

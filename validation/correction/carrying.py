@@ -32,7 +32,7 @@ from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from validation.campaign.campaign import Campaign
-from validation.correction.prediction import error_of, finite_conditions
+from validation.correction.prediction import error_of
 from validation.correction.session_unknowns import (
     DRIFT,
     SessionUnknowns,
@@ -40,6 +40,7 @@ from validation.correction.session_unknowns import (
     session_unknowns,
     without_session,
 )
+from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import coarse_frame
 
 _STEPS = 8

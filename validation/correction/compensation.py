@@ -36,12 +36,13 @@ from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
-from validation.correction.prediction import finite_conditions
 from validation.correction.spread import deviation_spread
+from validation.diagnosis.prediction import finite_conditions
 
 _STEPS = 25
 _HALVINGS = 8
 _STILL = 1e-10  # [rad or m] a step that is none
+_TURN = np.pi  # [rad] largest correction of a turning drive that is a correction
 _LOW = 1e-4  # of a rotation's weight where not all six can be met
 
 
@@ -124,6 +125,10 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
         going &= moving & ~worse  # what is left is rounding, or as near as limits allow
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q, targets)[0]
+    far, reason = _too_far(robot, driven, q - targets.coordinates[:, driven], reason)
+    if far.any():
+        q = np.where(far[:, None], targets.coordinates[:, driven], q)
+        standing = machine.at(q, targets)[0]
     last = standing.campaign
     spread = deviation_spread(
         robot, lambda other: machine.conditions(replace(last, robot=other))
@@ -166,6 +171,28 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
+
+
+def _too_far(
+    robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Rows whose corrections (R, d) are larger than the robot, and every row's reason.
+
+    Returns:
+        (R,) bool, and (R,) texts.
+    """
+    slides = np.array([robot.frames[i].joint == "prismatic" for i in driven])
+    most = np.where(slides, size_of(robot), _TURN)
+    beyond = ~(np.abs(change) <= most)
+    reason = reason.copy()
+    for row in np.flatnonzero(beyond.any(axis=1) & (reason == "")):
+        k = int(np.argmax(beyond[row]))
+        unit = "m" if slides[k] else "rad"
+        reason[row] = (
+            f"{robot.frames[driven[k]].name}: a correction of {change[row, k]:.3g} "
+            f"{unit}, larger than the robot ({most[k]:.3g} {unit})"
+        )
+    return beyond.any(axis=1), reason
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:

@@ -77,27 +77,30 @@ def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
 def summary(
     compensation: Compensation, diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
-    """The same for machines: errors to be expected, and what stands in the way.
+    """The same for machines: errors to be expected, and what is in the way.
 
     Args:
         compensation: of any targets.
-        diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading that the
-            robot's diagnosis left on rows kept aside, if known.
+        diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading on held-out
+            rows, if not by the robot's file.
 
     Returns:
-        Plain values; ``expected`` is what the diagnosis left, as vectors of three, or
-        else by the spread that the file states, None where neither says anything.
+        Plain values; ``expected`` adds what the commands leave, the spread that the
+        file states and what the diagnosis left unexplained; None where neither the file
+        nor ``diagnosed`` says anything.
     """
     ids = compensation.targets.ids
+    record = compensation.targets.robot.diagnosis
     spread = _sizes(compensation.spread)
+    unexplained = _unexplained(record, diagnosed)
     expected: dict[str, float | None] = {"position": None, "rotation": None}
-    if diagnosed is not None:
+    if compensation.spread.any() or unexplained is not None:
+        left = _sizes(np.hypot(compensation.after, compensation.spread))
+        more = unexplained or {"position": 0.0, "rotation": 0.0}
         expected = {
-            key: float(np.hypot(size or 0.0, np.sqrt(3.0) * diagnosed[key]))
-            for key, size in _sizes(compensation.after).items()
+            key: None if size is None else float(np.hypot(size, more[key]))
+            for key, size in left.items()
         }
-    elif compensation.spread.any():
-        expected = _sizes(np.hypot(compensation.after, compensation.spread))
     return {
         "rows": len(ids),
         "drives": list(compensation.drives),
@@ -109,12 +112,25 @@ def summary(
             "spread": spread,
             "expected": expected,
         },
+        "not_measured": list(record.get("not_measured", [])),
         "limited": [ids[i] for i in np.flatnonzero(compensation.limited)],
         "without_answer": [
             {"id": ids[i], "reason": compensation.reason[i]}
             for i in np.flatnonzero(compensation.reason != "")
         ],
     }
+
+
+def _unexplained(
+    record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
+) -> dict[str, float] | None:
+    """[m, rad] length of what a diagnosis left beyond noise, None if not known."""
+    sizes = {}
+    for key in ("position", "rotation"):
+        after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]
+        noise = record.get(f"noise_{key}", 0.0)
+        sizes[key] = float(np.sqrt(3.0 * max(0.0, after**2 - noise**2)))
+    return sizes if diagnosed is not None or "normalised" in record else None
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
@@ -147,6 +163,12 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
         lines.append(
             "to be expected: what the robot's diagnosis left (--diagnosed says it); "
             "the file states no uncertainty"
+        )
+    if table["not_measured"]:
+        lines.append(
+            f"not measured where the robot was identified: "
+            f"{', '.join(table['not_measured'])}; expected errors there follow from "
+            "the sizes of geometric errors in the other directions"
         )
     if table["limited"]:
         lines.append(f"at a joint's limit: {', '.join(table['limited'][:10])}")

@@ -20,6 +20,7 @@ from assembly.model.function import Function
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import plot_label
+from validation.diagnosis.saved_covariance import FUNCTION, known_covariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,7 +94,7 @@ def _variables(function: Function) -> tuple[str, str]:
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
-    if function.form == "reversal":
+    if function.form in {"reversal", "reversal_waves"}:
         return (rest or [first])[0], ""
     return first, (rest or [""])[0]
 
@@ -102,13 +103,16 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """One curve, and what each number's own standard deviation does to it."""
+    """One curve, and its standard deviation by the covariance of its numbers."""
     values = _values(function, component, x, fixed)
-    variance = np.zeros_like(values)
-    for name, sigma in function.std.items():
-        more = {**function.parameters, name: function.parameters[name] + sigma}
-        changed = _values(replace(function, parameters=more), component, x, fixed)
-        variance += np.nan_to_num(changed - values) ** 2
+    numbers, C = _covariance_of(robot, function)
+    slopes = np.zeros((len(numbers), len(values)))
+    for slope, name, sigma in zip(slopes, numbers, np.sqrt(np.diag(C)), strict=True):
+        if sigma > 0.0:
+            more = {**function.parameters, name: function.parameters[name] + sigma}
+            changed = _values(replace(function, parameters=more), component, x, fixed)
+            slope[:] = np.nan_to_num(changed - values) / sigma
+    variance = np.maximum(np.einsum("kx,kl,lx->x", slopes, C, slopes), 0.0)
     turns = component.startswith("r") and function.where != "load"
     given = unit_text(result_unit(function, component))
     value_unit = f"rad{given.removeprefix('1')}" if turns else given
@@ -125,6 +129,18 @@ def _curve(
     )
 
 
+def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray]:
+    """Names of a function's uncertain numbers, and their covariance (k, k)."""
+    known = known_covariance(robot)
+    place = str(next(k for k, f in enumerate(robot.functions) if f is function))
+    own = [
+        k for k, n in enumerate(known.numbers)
+        if n.kind == FUNCTION and n.owner == place
+    ]  # fmt: skip
+    names = [known.numbers[k].name for k in own]
+    return names, known.covariance[np.ix_(own, own)]
+
+
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
@@ -134,6 +150,10 @@ def _values(
     if function.form in {"lag", "creep"}:
         left = np.exp(-x / own["time_constant"])
         inputs = [1.0 - left, left]
+    elif function.form == "play":
+        inputs = [np.ones_like(x)]
+    elif function.form == "reversal_waves":
+        inputs = [np.ones_like(x), x]
     elif function.form == "reversal":
         sized = function.variables[-1].startswith(("load.", "wrench."))
         inputs = [np.ones_like(x), np.abs(x) if sized else x][: len(function.variables)]

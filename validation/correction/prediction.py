@@ -1,19 +1,25 @@
-"""Readings that a robot foretells for commands, measured or not."""
+"""Readings that a robot predicts for commands, measured or not."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.closure import virtual_joints
+from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import Prediction, predict, with_finite_motions
+from assembly.measurement.predict import Prediction, predict
+from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.errors import BadInput
 from validation.campaign.campaign import READING, Campaign
+from validation.correction.spread import deviation_spread
+from validation.diagnosis.learned_range import beyond_by_row
+from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import register
-from validation.diagnosis.signatures import conditions_of
+
+_MOVED = 3.0  # times as large a residual: the measuring device has been moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,29 +29,45 @@ class Foretold:
     Attributes:
         commands: what was commanded, of R rows.
         prediction: what the robot reads there.
-        error: (3,) rms of measured minus foretold: position [m], rotation [rad] and in
+        error: (3,) rms of measured minus predicted: position [m], rotation [rad] and in
             sigma; NaN where nothing was measured.
+        spread: (R, 6) [rad, m] standard deviation of the prediction, by what the
+            robot's file says of its own uncertainty.
+        noise: (R, 6) [rad, m] standard deviation of a reading about the machine's own
+            deviation; NaN where neither the table nor the robot's file says it.
+        extrapolated: (R,) names of what leaves the range in which the robot was
+            identified, else empty.
+        registration: ``"known"``, ``"of the robot file"``, ``"fitted to these rows"``
+            or ``"none"``.
+        point: where the robot was identified, if readings are of another point.
     """
 
     commands: Campaign
     prediction: Prediction
     error: NDArray
+    spread: NDArray
+    noise: NDArray
+    extrapolated: NDArray
+    registration: str
+    point: tuple[float, float, float] | None
 
     __repr__, _repr_html_ = short_repr, html_table
 
     def table(self) -> dict[str, Any]:
         """For machines."""
         position, rotation, sigma = self.error.tolist()
+        rows = zip(self.commands.ids, self.prediction.reason, strict=True)
+        far = zip(self.commands.ids, self.extrapolated, strict=True)
         return {
             "rows": len(self.commands),
-            "without_answer": [
-                {"id": name, "reason": reason}
-                for name, reason in zip(
-                    self.commands.ids, self.prediction.reason, strict=True
-                )
-                if reason
-            ],
+            "without_answer": [{"id": i, "reason": why} for i, why in rows if why],
             "open": int(self.prediction.undetermined.sum()),
+            "registration": self.registration,
+            "reference_point": self.commands.reference_point.tolist(),
+            "identified_at": None if self.point is None else list(self.point),
+            "extrapolated": [{"id": i, "variables": why} for i, why in far if why],
+            "std": _both(self.spread),
+            "noise": _both(self.noise),
             "error": {
                 "unit": {"position": "m", "rotation": "rad"},
                 "position": position, "rotation": rotation, "normalised": sigma,
@@ -53,49 +75,107 @@ class Foretold:
         }  # fmt: skip
 
 
+def _both(values: NDArray) -> dict[str, float]:
+    """Root mean squares of positions and of rotations."""
+    return {"position": _rms(values[:, 3:]), "rotation": _rms(values[:, :3])}
+
+
 def foretell(commands: Campaign) -> Foretold:
     """What the robot of a campaign reads for its commands.
 
+    Where the registration is unknown, it is that of the robot's file; if the file has
+    none, or rows are measured and it no longer fits them (the device was moved), the
+    device's frame is fitted to the measured rows.
+
     Args:
-        commands: the robot, with its effects, and rows; where the registration is
-            unknown and rows are measured, the device's frame is fitted to those.
+        commands: the robot, with its effects, and rows.
 
     Returns:
-        The readings.
+        The readings with their uncertainty.
 
     Raises:
         BadInput: the registration is unknown, and the rows do not tell it.
     """
-    conditions = finite_conditions(commands)
-    measured = commands.cells.any(axis=1)
-    if commands.registration == "unknown" and measured.any():
-        conditions = register(commands.take(measured), conditions)
+    conditions, registration = _registered(commands, finite_conditions(commands))
     prediction = predict(conditions)
-    return Foretold(commands, prediction, error_of(commands, prediction.deviation))
+    robot = commands.robot
+
+    def placed(other: Robot) -> Conditions:
+        changed = finite_conditions(replace(commands, robot=other))
+        if registration == _FITTED:
+            return replace(changed, base=conditions.base)
+        return changed
+
+    identified = robot.reference_point
+    same = identified is None or np.allclose(identified, commands.reference_point)
+    return Foretold(
+        commands=commands,
+        prediction=prediction,
+        error=error_of(commands, prediction.deviation),
+        spread=deviation_spread(robot, placed),
+        noise=_noise(commands),
+        extrapolated=beyond_by_row(robot, commands),
+        registration=registration,
+        point=None if same else identified,
+    )
 
 
-def finite_conditions(campaign: Campaign) -> Conditions:
-    """What acts in a campaign, motions finite as those of a machine are.
+_FITTED = "fitted to these rows"
 
-    Args:
-        campaign: of R rows.
 
-    Returns:
-        R conditions; of a robot with clearance the linear model's, since where it
-        rests without a load is open.
-    """
-    conditions = conditions_of(campaign)
-    if conditions.exact or virtual_joints(conditions.robot).cones.shape[1]:
-        return conditions
-    return with_finite_motions(conditions)
+def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
+    """Conditions with the measuring frame, and where it comes from."""
+    if commands.registration == "known":
+        return conditions, "known"
+    carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
+    measured = commands.cells.any(axis=1)
+    if not measured.any():
+        return conditions, "of the robot file" if carried else "none"
+    if not carried:
+        return register(commands.take(measured), conditions), _FITTED
+    bare = replace(commands, robot=_unplaced(commands.robot))
+    try:
+        again = register(bare.take(measured), finite_conditions(bare))
+    except BadInput:
+        return conditions, "of the robot file"
+    errors = [
+        error_of(commands, predict(one).deviation)[2] for one in (conditions, again)
+    ]
+    if errors[0] > _MOVED * errors[1]:
+        return again, _FITTED
+    return conditions, "of the robot file"
+
+
+def _unplaced(robot: Robot) -> Robot:
+    """The robot without the place of any measuring frame."""
+
+    def without(effects: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
+        kept = {name: dict(values) for name, values in effects.items()}
+        for name in BASE:
+            kept.get("registration", {}).pop(name, None)
+        return kept
+
+    sessions = {s: without(effects) for s, effects in robot.session_effects.items()}
+    return replace(robot, effects=without(robot.effects), session_effects=sessions)
+
+
+def _noise(commands: Campaign) -> NDArray:
+    """(R, 6) [rad, m] scatter of a reading: sigma, or what hold-out rows showed."""
+    record = commands.robot.diagnosis
+    known = [record.get("noise_rotation"), record.get("noise_position")]
+    sizes = [x if isinstance(x, float) else np.nan for x in known]
+    more = record.get("normalised")
+    factor = max(1.0, more) if isinstance(more, float) else 1.0
+    stated = np.where(np.isfinite(commands.sigma), commands.sigma, np.repeat(sizes, 3))
+    return np.asarray(factor * stated)
 
 
 def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Rms of measured minus foretold.
+    """Rms of measured minus predicted.
 
     Args:
         campaign: R rows.
-        deviation: (R, 6) [rad, m] foretold.
+        deviation: (R, 6) [rad, m] predicted.
 
     Returns:
         (3,) position [m], rotation [rad], and all readings in sigma; NaN where there
@@ -141,22 +221,36 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
 
 
 def reading_table(foretold: Foretold) -> str:
-    """Foretold readings as a table: ``id`` and the readings, under a campaign's names.
+    """Predicted readings as a table: ``id`` and the readings, under a campaign's names.
 
     Args:
         foretold: of any commands.
 
     Returns:
-        CSV; a cell is empty where the robot has no answer.
+        CSV; a cell is empty where the robot has no answer.  Where the robot's file
+        says how uncertain it is, ``std.`` and ``noise.`` of every reading follow, and
+        ``extrapolated``: what leaves the range in which the robot was identified.
     """
     commands, deviations = foretold.commands, foretold.prediction.deviation
     columns = reading_names(commands)
-    values: dict[str, dict[str, float]] = {}
+    more = {"std": foretold.spread, "noise": foretold.noise}
+    more = {k: v for k, v in more.items() if foretold.spread.any()}
+    values: dict[str, dict[str, object]] = {}
     for i, full in enumerate(commands.ids):
         point = "" if commands.point is None else str(commands.point[i])
         row = values.setdefault(full.removesuffix(f":{point}") if point else full, {})
-        row |= {name: deviations[i, k] for name, at, k in columns if at == point}
-    return csv_text(values, [name for name, _, _ in columns])
+        for name, at, k in columns:
+            if at == point:
+                row[name] = float(deviations[i, k])
+                for kind, array in more.items():
+                    row[name.replace("meas", kind, 1)] = float(array[i, k])
+        if commands.robot.learned_range:
+            row["extrapolated"] = foretold.extrapolated[i]
+    names = [name for name, _, _ in columns]
+    names += [name.replace("meas", kind, 1) for kind in more for name in names]
+    if commands.robot.learned_range:
+        names.append("extrapolated")
+    return csv_text(values, names)
 
 
 def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> str:

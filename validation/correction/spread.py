@@ -1,20 +1,28 @@
 """How far a robot may be from what its file says, by what the file says of that.
 
-Standard deviations of geometric errors (``tolerance``) and of functions' parameters
-(``std``), to first order and as if independent: a file holds no correlations.
+The covariance of readings is J C J', C that of the numbers in the file
+(:mod:`validation.diagnosis.saved_covariance`) and J their derivatives.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Robot
+from stiffness.screws import SCREW
+from validation.diagnosis.responses import responses
+from validation.diagnosis.saved_covariance import (
+    COMPLIANCE,
+    ERROR,
+    Number,
+    known_covariance,
+)
+
+_AXES = tuple(axis.lower() for axis in SCREW)
+_STEP = 0.1  # standard deviations of a number, for its derivative
 
 
 def deviation_spread(
@@ -29,35 +37,32 @@ def deviation_spread(
     Returns:
         (R, 6) [rad, m]; zero where the file says nothing.
     """
+    known = known_covariance(robot)
     conditions = conditions_for(robot)
-    variance = _of_errors(conditions, robot)
-    uncertain = [(f, name) for f in robot.functions for name in f.std]
-    if not uncertain:
-        return np.sqrt(variance)
-    middle = predict(conditions).deviation
-    for function, name in uncertain:
-        value = function.parameters[name] + function.std[name]
-        changed = replace(function, parameters={**function.parameters, name: value})
-        others = tuple(changed if f is function else f for f in robot.functions)
-        other = conditions_for(replace(robot, functions=others))
-        variance += np.nan_to_num(predict(other).deviation - middle) ** 2
-    return np.sqrt(variance)
-
-
-def _of_errors(conditions: Conditions, robot: Robot) -> NDArray:
-    """(R, 6) variance by the tolerances of frames."""
-    tight = without_joint_clearances(conditions.robot)
-    sigma = np.zeros((len(tight.frames), 6))
-    for frame in robot.frames:
-        if frame.tolerance is not None:
-            sigma[tight.index(frame.name)] = frame.tolerance
-    chosen = np.flatnonzero(sigma)
-    if not chosen.size:
+    if not known.numbers:
         return np.zeros((len(conditions), 6))
-    distinct, which = replace(conditions.postures, robot=tight).distinct
-    columns = np.eye(sigma.size)[:, chosen] * sigma.ravel()[chosen]
-    moved = flexibility(distinct).platform_of(columns)[which]
-    moved[:, 3:] += np.cross(
-        moved[:, :3], conditions.measured_arms[:, :, None], axisa=1, axisb=1, axisc=1
-    )
-    return np.sum(moved**2, axis=2)
+    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
+    J = _slopes(robot, conditions, known.numbers, std, conditions_for)
+    variance = np.einsum("rik,kl,ril->ri", J, known.covariance, J, optimize=True)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def _slopes(
+    robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
+    conditions_for: Callable[[Robot], Conditions],
+) -> NDArray:  # fmt: skip
+    """(R, 6, k) change of the deviation per number of the file."""
+    J = np.zeros((len(conditions), 6, len(numbers)))
+    response = responses(conditions)
+    middle: NDArray | None = None
+    for k, number in enumerate(numbers):
+        if number.kind in {ERROR, COMPLIANCE}:
+            row, axis = conditions.robot.index(number.owner), _AXES.index(number.name)
+            J[:, :, k] = response.screws[:, :, row, axis]
+            if number.kind == COMPLIANCE:
+                J[:, :, k] *= response.wrenches[:, row, axis, None]
+        elif std[k] > 0.0:
+            middle = predict(conditions).deviation if middle is None else middle
+            other = conditions_for(number.moved(robot, _STEP * std[k]))
+            J[:, :, k] = (predict(other).deviation - middle) / (_STEP * std[k])
+    return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)

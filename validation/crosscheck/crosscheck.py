@@ -8,6 +8,7 @@ unique, and energies and springs are (:mod:`validation.crosscheck.clearance_metr
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -20,8 +21,18 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
 from validation.crosscheck.link_models import link_models
-from validation.crosscheck.pair import Pair, exact_solution, scaled
+from validation.crosscheck.pair import (
+    Pair,
+    exact_solution,
+    hold_free_motions,
+    scaled,
+)
 from validation.crosscheck.pose_metric import PoseMetric
+from validation.crosscheck.resolution import (
+    Resolution,
+    resolution_text,
+    resolutions,
+)
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
     NO_SIGNAL,
@@ -105,6 +116,14 @@ class Crosscheck:
         """What must hold, by name."""
         return self.metric.checks
 
+    @cached_property
+    def resolutions(self) -> list[Resolution]:
+        """The smallest change of each number of the robot that would be noticed."""
+        assert isinstance(self.metric, PoseMetric | ClearanceMetric)
+        return resolutions(
+            self.posture, self.pairs, self.metric, self.load, self.gravity
+        )
+
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
@@ -139,6 +158,17 @@ class Crosscheck:
                 }
                 for name, check in self.checks.items()
             },
+            "smallest_changes_noticed": [
+                {
+                    "name": one.name,
+                    "kind": one.kind,
+                    "value": one.value,
+                    "relative": one.smallest,
+                    "check": one.by,
+                    "unproved": one.unproved,
+                }
+                for one in self.resolutions
+            ],
             "verdict": outcome,
             "passed": outcome == "passed",
         }
@@ -157,6 +187,7 @@ class Crosscheck:
         added = len(self.pairs) - self.asked
         if added:
             lines.append(f"scales added to tell: {added}")
+        lines += resolution_text(self.resolutions)
         return "\n".join([*lines, verdict_text(self)])
 
 
@@ -206,15 +237,22 @@ def crosscheck(
     held: list[float] = []  # motions held at one scale are held at all smaller ones
 
     def solve(s: float) -> Pair:
-        linear = solve_assembly(scaled(compared, s), s * wrench, gravity=s * g)
+        models = [compared] if clearances else [compared, hold_free_motions(compared)]
+        linear, *held_too = (
+            solve_assembly(scaled(p, s), s * wrench, gravity=s * g) for p in models
+        )
+        holding = held_too[0] if held_too else None
         simulated = simulate_assembly(
             compared, s, replace(model, hold=bool(held) and not clearances),
             load=s * force, gravity=s * g, couple=s * wrench[:3], time_limit=time_limit,
         )  # fmt: skip
         if simulated.held:
             held.append(s)
+        # what holds free motions in the simulation holds them in the other models too
+        if simulated.held and holding is not None:
+            linear = holding
         exact = exact_solution(linear, s * g)
-        return Pair(s, linear, simulated, exact, s**2 * between)
+        return Pair(s, linear, simulated, exact, s**2 * between, holding)
 
     def judge(pairs: tuple[Pair, ...], asked: int) -> Crosscheck:
         metric = (

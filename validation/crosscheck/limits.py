@@ -4,7 +4,7 @@
 symbol  code                 meaning
 ======  ===================  ==========================================================
 s       ``scale``            factor on geometric errors, clearances and load
-slope   ``fit_slope``        of log difference over log scale, as s goes to 0
+slope   ``difference_slope`` of log difference over log scale, as s goes to 0
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
@@ -28,6 +28,7 @@ FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
 }  # [rad], [m] resolution of simulations
+_NOISE = 3.0  # times what weak springs of free motions change is noise
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 
@@ -64,7 +65,9 @@ def spring_limits(
             ours = np.array([getattr(p.linear, linear)[rows] for p in pairs]) * mask
             theirs = np.array([getattr(p.simulated, name)[rows] for p in pairs])
             theirs = theirs * mask
+            noise = _NOISE * pairs[0].noise_of(linear)[rows]
             for label, half, least in zip(labels, HALVES.values(), floor, strict=True):
+                least = max(least, noise[..., half].max())
                 limits[f"{kind} {label}"] = limit_difference(
                     scales, ours[..., half], theirs[..., half], 1, least
                 )
@@ -131,55 +134,77 @@ def _stiffest(robot: Robot) -> NDArray:
     return np.max(diagonals, axis=0).reshape(2, 3).max(axis=1)
 
 
-def fit_slope(scales: ArrayLike, values: ArrayLike, floor: float) -> float:
-    """Slope of a log-log line as the scale goes to 0.
+def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
+    """Slope of log difference over log scale, of its first- and second-order terms.
 
-    Of three values and more, a power of the scale times ``exp(k scale)`` is fitted:
-    where a second-order term happens to be small, the third-order one bends the line
-    at large scales, and the power alone would be off by 0.1 and more.
+    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, vectors that may cancel in
+    part: a line through the logarithms of its size then has any slope, at scales from 1
+    to 1/8 as low as 1.3.  So the first-order term ``c1 s`` is extrapolated by itself,
+    from ``difference / s``, and compared with all others at the smallest scale.
 
     Args:
-        scales: (k,) > 0.
-        values: (k,) >= 0.
-        floor: values below it are noise and are left out.
+        scales: (k,) > 0, largest first.
+        differences: (k, ...) components at these scales.
+        floor: differences of a size below it are noise and are left out.
 
     Returns:
-        d log value / d log scale, NaN if fewer than two values are left.
+        2 without a first-order term, 1 with nothing else; NaN if fewer than two
+        differences are left.
     """
-    scales, values = np.asarray(scales), np.asarray(values)
-    clear = values > floor
-    scales, values = scales[clear], values[clear]
-    if len(values) < 2:
+    scales, parts = _clear(scales, differences, floor)
+    if len(scales) < 2:
         return math.nan
-    columns = [np.log(scales), np.ones(len(scales)), scales][: len(scales)]
-    fit = np.linalg.lstsq(np.transpose(columns), np.log(values))
-    return float(fit[0][0])
+    first = scales[-1] * extrapolate(scales, parts / scales[:, None])
+    size = float(np.linalg.norm(first))
+    return 2.0 - size / (size + float(np.linalg.norm(parts[-1] - first)))
 
 
 def slope_check(
-    scales: NDArray, values: NDArray, floor: float, expected: float, bound: float
+    scales: ArrayLike, differences: ArrayLike, floor: float, bound: float
 ) -> Check:
-    """Difference of a slope from the expected one.
+    """Difference of a slope from 2.
 
     Args:
         scales: (k,) largest first.
-        values: (k,) >= 0.
-        floor: values below it are noise and are left out.
-        expected: slope.
-        bound: on the difference.
+        differences: (k, ...) components at these scales.
+        floor: differences of a size below it are noise and are left out.
+        bound: on the difference of the slope.
 
     Returns:
         The difference; its uncertainty is the change when the largest scale is left
-        out, infinite on two scales.  Without two values above the floor there is no
-        slope, and no signal.
+        out, infinite on two scales.  There is no slope, and no signal, without two
+        differences above the floor, or where noise alone can make more of a slope than
+        the bound.
     """
-    slope = fit_slope(scales, values, floor)
-    if math.isnan(slope):
+    value = 2.0 - difference_slope(scales, differences, floor)
+    if math.isnan(value):
         return Check(math.nan, bound, signal=False)
-    fewer = fit_slope(scales[1:], values[1:], floor)
-    change = abs(slope - fewer) if not math.isnan(fewer) else math.inf
-    value = abs(slope - expected)
-    return Check(value, bound, change if value > bound else 0.0)
+    if value <= bound:
+        return Check(value, bound)
+    if _slope_of_noise(scales, differences, floor) > bound:
+        return Check(math.nan, bound, signal=False)
+    left = np.asarray(scales)[1:], np.asarray(differences)[1:]
+    fewer = 2.0 - difference_slope(*left, floor)
+    change = abs(value - fewer) if not math.isnan(fewer) else math.inf
+    return Check(value, bound, change)
+
+
+def _clear(
+    scales: ArrayLike, differences: ArrayLike, floor: float
+) -> tuple[NDArray, NDArray]:
+    """Scales and (k, components) differences that are above the noise."""
+    scales = np.asarray(scales, dtype=float)
+    parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
+    clear = np.linalg.norm(parts, axis=1) > floor
+    return scales[clear], parts[clear]
+
+
+def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
+    """By how much noise of the floor in every difference may change the slope."""
+    scales, parts = _clear(scales, differences, floor)
+    weights = extrapolate(scales, np.diag(1.0 / scales))
+    first = scales[-1] * floor * float(np.abs(weights).sum())
+    return first / float(np.linalg.norm(parts[-1]))
 
 
 def extrapolate(scales: NDArray, values: NDArray) -> NDArray:

@@ -12,6 +12,7 @@ from assembly.linear.energy import Assembly
 from assembly.linear.reduction import FreeMotion
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.solvers.conic import SolverFailed
+from validation.multibody.exudyn_model import HOLDING_STIFFNESS, IDLE_STIFFNESS
 from validation.multibody.simulation import MultibodyAssembly
 
 
@@ -26,6 +27,8 @@ class Pair:
         exact: of the virtual-joint model with finite rotations, None if there is none.
         between: [J] stored by weights in the simulation's beams between their ends,
             which the linear model does not contain.
+        holding: the linear model with the springs of :func:`hold_free_motions`, to know
+            what weaker ones in the simulation do; None if there are none.
     """
 
     scale: float
@@ -33,11 +36,36 @@ class Pair:
     simulated: MultibodyAssembly
     exact: ExactAssembly | None
     between: float = 0.0
+    holding: Assembly | None = None
+
+    def noise_of(self, quantity: str) -> NDArray:
+        """What the springs of free motions in the simulation change, at scale 1.
+
+        They are so weak that their effect is proportional to their stiffness.
+
+        Args:
+            quantity: a screw or wrenches of an ``Assembly``, proportional to the scale.
+
+        Returns:
+            Sizes of the changes, shaped as the quantity; zero where both models have
+            the same springs.
+        """
+        value = np.asarray(getattr(self.linear, quantity))
+        if self.holding is None or self.simulated.held:
+            return np.zeros_like(value)
+        change = np.abs(np.asarray(getattr(self.holding, quantity)) - value)
+        noise: NDArray = change * (IDLE_STIFFNESS / HOLDING_STIFFNESS / self.scale)
+        return noise
 
     @property
     def linear_energy(self) -> float:
-        """[J] of the linear model, and of weights between links' ends."""
-        return self.linear.energy + self.between
+        """[J] of the linear model, and of weights between links' ends.
+
+        Without what holds free motions, as in the simulation.
+        """
+        robot = self.linear.posture.robot
+        held = holding_energy(robot, self.linear.joint_screws)
+        return self.linear.energy - held + self.between
 
     @property
     def screw_difference(self) -> NDArray:
@@ -110,6 +138,46 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
         for frame, row in zip(robot.frames, rows, strict=True)
         if getattr(frame, part) is not None
     }
+
+
+def hold_free_motions(posture: Posture) -> Posture:
+    """The same posture with the springs by which a simulation holds free motions.
+
+    Args:
+        posture: of a robot without clearances.
+
+    Returns:
+        A posture of a robot whose passive joints without a spring of their own have one
+        of :data:`~validation.multibody.exudyn_model.HOLDING_STIFFNESS`.
+    """
+
+    def hold(frame: Frame) -> Frame:
+        if not frame.passive or frame.compliant:
+            return frame
+        rigid = np.diag(np.full(6, np.inf))
+        K = np.array(rigid if frame.springs is None else frame.springs)
+        K[frame.own_axis, frame.own_axis] = HOLDING_STIFFNESS
+        return replace(frame, joint_stiffness=K)
+
+    frames = tuple(hold(frame) for frame in posture.robot.frames)
+    return replace(posture, robot=replace(posture.robot, frames=frames))
+
+
+def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
+    """Energy in the springs that hold free motions, where a robot has them.
+
+    Args:
+        robot: of the virtual-joint model, perhaps with such springs.
+        joint_screws: (n, 6) [rad, m] deformations of its joints.
+
+    Returns:
+        [J].
+    """
+    stored = 0.0
+    for frame, screw in zip(robot.frames, joint_screws, strict=True):
+        if frame.compliant and frame.own_stiffness == HOLDING_STIFFNESS:
+            stored += HOLDING_STIFFNESS * screw[frame.own_axis] ** 2 / 2
+    return stored
 
 
 def exact_solution(

@@ -16,24 +16,27 @@ A component of a candidate adds a times P T to the readings.
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.forms import roughness
+from assembly.effects.forms import FORMS, roughness
 from assembly.effects.functions import AXES, basis
 from assembly.effects.places import beams, drives
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.variables import variable
+from assembly.measurement.predict import predict
+from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
 from assembly.model.robot import BeamLink, Robot, beam_axis
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.responses import Responses
 
 TURN, SHIFT = AXES[:3], AXES[3:]
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
+_STEP = 1e-3  # of the largest load, for a derivative
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 
 
@@ -45,11 +48,18 @@ class CandidatePart:
         where: a frame, ``"base"`` or ``"reading"``.
         components: of the screw there.
         variable: its public name.
+        beside: that of a second variable, if it depends on two.
     """
 
     where: str
     components: tuple[str, ...]
     variable: str
+    beside: str = ""
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """One or two public names."""
+        return (self.variable, self.beside) if self.beside else (self.variable,)
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,7 @@ class Candidate:
             Function(
                 p.where,
                 p.components,
-                (p.variable,),
+                p.variables,
                 self.shape.form,
                 numbers,
                 self.kind,
@@ -115,8 +125,41 @@ class Sensitivities:
         other._response = Responses(r.reading[rows], r.screws[rows], r.wrenches[rows])
         return other
 
+    def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
+        """The same functions where effects have changed the conditions.
+
+        Args:
+            conditions: of the same rows.
+            response: of the readings there.
+
+        Returns:
+            Sensitivities there; forms are normalised as before.
+        """
+        other = copy(self)
+        other.conditions, other._response = conditions, response
+        return other
+
+    @property
+    def wrenches(self) -> NDArray:
+        """(R, n, 6) [N m, N] through every joint as declared, in its axes."""
+        return self._response.wrenches
+
+    @cached_property
+    def under_load(self) -> NDArray:
+        """(R, 6, 6) change of the reading per unit of a component of the load."""
+        change = np.zeros((len(self.conditions), 6, 6))
+        still = predict(self.conditions).deviation
+        size = max(float(np.abs(self.conditions.load).max()), 1.0)
+        for k in range(6):
+            load = self.conditions.load + _STEP * size * np.eye(6)[k]
+            more = predict(replace(self.conditions, load=load)).deviation
+            change[:, :, k] = np.nan_to_num((more - still) / (_STEP * size))
+        return change[self.rows]
+
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
+        if where == "load":
+            return self.under_load[:, :, LOADS.index(component)]
         axis = AXES.index(component)
         if where == "reading":
             return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
@@ -131,11 +174,16 @@ class Sensitivities:
             return sensitivity * self._response.wrenches[:, row, axis, None]
         return sensitivity
 
-    def _basis(self, name: str, shape: CandidateShape) -> tuple[NDArray, NDArray]:
-        """(R, q) columns of a form of a variable, of order one, and T (p, q)."""
-        anywhere = CandidatePart("reading", ("tx",), name)
+    def _basis(
+        self, variables: tuple[str, ...], shape: CandidateShape
+    ) -> tuple[NDArray, NDArray]:
+        """(R, q) columns of a form of variables, of order one, and T (p, q)."""
+        anywhere = CandidatePart("reading", ("tx",), *variables)
         (function,) = Candidate((anywhere,), "screw", shape).functions()
-        raw = np.nan_to_num(basis(self.conditions, function, shape.names))
+        if variables[0].startswith("wrench."):
+            raw = FORMS[shape.form].basis(shape.names, [self._wrench(*variables)], {})
+        else:
+            raw = np.nan_to_num(basis(self.conditions, function, shape.names))
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -149,9 +197,15 @@ class Sensitivities:
             stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
             mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
             mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
-        elif shape.form in {"waves", "slow_wave"}:
+        elif shape.form.endswith(("waves", "slow_wave")) and len(variables) == 1:
             mixed = np.eye(len(shape.names))
         return raw @ mixed, mixed
+
+    def _wrench(self, name: str) -> NDArray:
+        """(R,) [N m or N] what a joint carries as declared."""
+        frame, _, component = name.removeprefix("wrench.").rpartition(".")
+        row = self.conditions.robot.index(frame)
+        return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate) -> NDArray:
         """What a candidate adds to the readings.
@@ -187,12 +241,17 @@ class Sensitivities:
         """(m,) component that each unknown of a candidate acts in."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
-        return np.repeat([AXES.index(c) for c in components], counts)
+        kinds = [0 if is_turn(c) else 3 for c in components]
+        numbers = [
+            AXES.index(c) if c in AXES else k
+            for c, k in zip(components, kinds, strict=True)
+        ]
+        return np.repeat(numbers, counts)
 
     def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:
         """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
         for part in one.parts:
-            columns = self.basis(part.variable, one.shape)[0][self.rows]
+            columns = self.basis(part.variables, one.shape)[0][self.rows]
             for component in part.components:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
@@ -210,7 +269,7 @@ class Sensitivities:
         functions, at = [], 0
         least = _NOTHING * np.abs(x).max(initial=0.0)
         for part, function in zip(one.parts, one.functions(), strict=True):
-            _, mixed = self.basis(part.variable, one.shape)
+            _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(one.shape.given), {}
             shown = []  # components that the readings see
             alone = len(part.components) == 1
@@ -239,6 +298,11 @@ class Sensitivities:
                     )
                 )
         return functions
+
+
+def is_turn(component: str) -> bool:
+    """Whether a component is a rotation, or a moment; otherwise a shift or a force."""
+    return component[0] in "rm"
 
 
 def variables_of(conditions: Conditions) -> list[str]:
@@ -302,3 +366,23 @@ def _along(robot: Robot, name: str) -> tuple[str, ...]:
     assert isinstance(frame.link, BeamLink)
     axis = np.abs(beam_axis(frame)[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
+
+
+def in_cells(
+    sensitivities: Sensitivities, one: Candidate, campaign: Campaign
+) -> NDArray:
+    """What a candidate of m unknowns adds to the readings.
+
+    Args:
+        sensitivities: of the campaign's rows.
+        one: the candidate.
+        campaign: of R rows, N measured cells.
+
+    Returns:
+        (N, m) in the cells, over sigma.
+    """
+    changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
+    columns = changes.reshape(len(changes), -1)
+    if not campaign.cells.all():
+        columns = columns[:, campaign.cells.ravel()]
+    return columns.T

@@ -1,63 +1,67 @@
-"""The diagnosis of a campaign: residual, the effects it shows, and how sure that is.
+"""The diagnosis of a campaign: which effects its model lacks, and how sure that is.
 
-Order of things, each opened once:
+Steps, each opened once:
 
-1. rows of whole configurations are kept aside;
-2. the measuring frame is found, where it is not known;
-3. every hypothesis's signature; all small sets scored; the best refitted in the full
-   model, signatures retaken there, and scored again until the best set stays;
-4. outlying rows are named, left out, and 3 repeated;
-5. is what is left noise?  The verdict;
-6. errors before and after on the rows kept aside.
+1. rows that judge are chosen (:mod:`.holdout`); nothing reads them until step 5;
+   set-up blunders are looked for in the others (:mod:`.setup_blunders`);
+2. effects and functions are searched for in the other rows (:mod:`.trace`);
+3. all unknown numbers of the machine are fitted together, through the function that
+   predicts with the saved file (:mod:`.fit`); effects that the readings do not support
+   are dropped (:mod:`.claims`);
+4. where folds judge, 2 and 3 are done for each fold and for all rows;
+5. the errors of the fitted robots on the held-out rows, and the verdict.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import count
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import apply_effects
-from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict, with_finite_motions, with_second_order
+from assembly.effects import LIBRARY
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.holdout import split
-from validation.diagnosis.judge import BLUNDERS, Settled, judge
-from validation.diagnosis.lack_of_fit import (
-    believed_noise,
-    lack_of_fit,
-    outlying,
-)
-from validation.diagnosis.plausible import impossible_rows
-from validation.diagnosis.registration import register
-from validation.diagnosis.selection import Selection, Update, select
-from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.small_terms import GEOMETRY, screws_of
-from validation.diagnosis.teaching import NOTHING, Taught, cost_of, taught
+from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.holdout import HeldOut, hidden, hold_out
+from validation.diagnosis.judge import Judged, judge
+from validation.diagnosis.setup_blunders import setup_blunders
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.trace import Traced, trace
 
-_PASSES = 8  # of believing repeats, and finite geometric errors
-_TURNS = 6  # of leaving out rows, in each
-_LOOSE = 1.25  # [sigma] what may be left before fits are made less sure
-_BENDS = 3  # times that what finite geometric errors add is found anew
-_SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step towards the errors found
-_BENT = 0.1  # of what is left, or of sigma: change of what finite errors add
+Update = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was searched for and fitted without some rows.
+
+    Attributes:
+        traced: what the search found.
+        fit: the machine that has it.
+    """
+
+    traced: Traced
+    fit: MachineFit
 
 
 def diagnose(
     campaign: Campaign,
     *,
     finite: bool = False,
+    odds: Mapping[str, float] = MappingProxyType({}),
     update: Update = lambda what, done, total: None,
 ) -> Diagnosis:
     """Trace a campaign's residual to the effect that the declared model lacks.
 
     Args:
         campaign: measured deviations.
-        finite: whether motions of the declared model are finite; they are too if the
-            robot's file has the effect ``geometric_stiffening``.
+        finite: whether motions of the declared model are finite in the search; they
+            are too if the robot's file has the effect ``geometric_stiffening``.
+        odds: factors on the prior odds of effects by name, of ``"function"`` (any
+            function), ``"geometry"`` and ``"springs"``; 0 leaves something out.
         update: told what is done, how much of it and of how much.
 
     Returns:
@@ -66,178 +70,37 @@ def diagnose(
     Raises:
         BadInput: the measuring frame is not known and cannot be found.
     """
-    rows = split(campaign)
-    declared = conditions_of(campaign)
-    finite = finite or declared.exact
-    complete = with_finite_motions if finite else with_second_order
-    declared = conditions = complete(declared)
-    if campaign.registration == "unknown":
-        conditions = register(campaign.take(rows.fitted), conditions)
-    impossible = impossible_rows(campaign)
-    outliers = impossible.copy()
-    factor, inflation, bends = np.ones(6), 1.0, 0
-    learned = NOTHING
-    straight: _Straight | None = None
-    earlier: Selection | None = None
-    for _ in range(_PASSES):
-        some = partial(select, update=update, finite=finite)
-        selection, outliers = _without_outliers(
-            campaign, conditions, rows.fitted, (outliers, impossible), some, earlier
-        )
-        earlier = selection
-        used = rows.fitted & ~outliers
-        fitting = campaign.take(used)
-        if bends < _BENDS:
-            bent = _with_errors(campaign, conditions, used, selection, complete)
-            if bent is not conditions:
-                straight = straight or _Straight(conditions, used, selection)
-                conditions, bends = bent, bends + 1
-                continue
-        known = learned if inflation > 1.0 else None
-        selection, learned = taught(
-            campaign, conditions, used, selection, update, known
-        )
-        if straight is not None and np.array_equal(used, straight.used):
-            conditions, selection = _straighter(
-                campaign, straight, conditions, selection, learned, update
-            )
-        left = selection.behind.left(selection.fit.residual)
-        larger = believed_noise(fitting, left)
-        lack = lack_of_fit(
-            fitting, left, selection.unknowns + round(selection.behind.unknowns)
-        )
-        if np.any(larger > 1.0):
-            factor = factor * larger
-        elif inflation == 1.0 and lack.significant and lack.rms > _LOOSE:
-            # what nothing explains must not be fitted as if it were known to a sigma
-            inflation = lack.rms
-            larger = np.full(6, inflation)
-        else:
-            break
-        campaign, straight = replace(campaign, sigma=campaign.sigma * larger), None
-    return judge(
-        Settled(
-            campaign=campaign,
-            unregistered=declared,
-            conditions=conditions,
-            split=rows,
-            outliers=outliers,
-            noise_factor=factor,
-            inflation=inflation,
-            selection=selection,
-            learned=learned.functions,
-            finite=finite,
-        )
+    held = hold_out(campaign)
+    judging = held.rows if held.how == "split" else np.zeros(len(campaign), dtype=bool)
+    seen = hidden(campaign, judging)
+    blunders = setup_blunders(
+        seen.take(seen.cells.any(axis=1)),
+        conditions_of(seen).take(seen.cells.any(axis=1)),
     )
+    if blunders:  # anything else that is found would stand for them
+        odds = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
+
+    def found(rows: NDArray) -> _Found:
+        part = hidden(campaign, ~rows)
+        return _Found(*trace(part, rows, update, finite=finite, odds=odds))
+
+    folds = []
+    for k, rows in enumerate(held.folds):
+        if held.how == "folds":
+            update("folds", k, len(held.folds))
+        folds.append(found(_fitted_rows(held, rows)))
+    best = folds[0]
+    if held.how == "folds":
+        update("folds", len(held.folds), len(held.folds))
+        best = found(np.ones(len(campaign), dtype=bool))
+    judged = [
+        Judged(one.fit, one.traced.used, rows)
+        for one, rows in zip(folds, held.folds, strict=True)
+    ]
+    diagnosis = judge(campaign, best.traced, best.fit, held, judged)
+    return replace(diagnosis, setup=blunders)
 
 
-def _without_outliers(
-    campaign: Campaign, conditions: Conditions, fitted: NDArray,
-    left_out: tuple[NDArray, NDArray], selected: Callable[..., Selection],
-    earlier: Selection | None,
-) -> tuple[Selection, NDArray]:  # fmt: skip
-    """The selection on rows (R,) without those far off, and which these are.
-
-    The farthest are left out first and the others looked at again without them; what is
-    far off after some turns, all at once.
-
-    Returns:
-        The selection, and (R,) bool.
-    """
-    outliers, impossible = left_out
-    for turn in count():
-        used = fitted & ~outliers
-        earlier = selection = selected(
-            campaign.take(used), conditions.take(used), earlier=earlier
-        )
-        if turn == _TURNS:
-            break
-        left = selection.behind.left(selection.fit.residual)
-        called = int((outliers & ~impossible).sum())
-        most = max(0, len(campaign) // BLUNDERS - called)
-        far = outlying(campaign.take(used), left, most, worst=turn < _TURNS - 1)
-        if not far.any():
-            break
-        outliers = outliers.copy()
-        outliers[used] = far
-    return selection, outliers
-
-
-@dataclass(frozen=True, eq=False)
-class _Straight:
-    """What a campaign's rows looked like before finite errors were added.
-
-    Attributes:
-        conditions: of all rows.
-        used: (R,) bool, the rows fitted.
-        selection: on these.
-    """
-
-    conditions: Conditions
-    used: NDArray
-    selection: Selection
-
-
-def _straighter(
-    campaign: Campaign, straight: _Straight, conditions: Conditions,
-    selection: Selection, learned: Taught, update: Update,
-) -> tuple[Conditions, Selection]:  # fmt: skip
-    """The same functions without finite errors, if they cost less there.
-
-    Errors may have stood for what was learned, and finite ones hide it.
-
-    Returns:
-        Conditions and selection with them, or those given.
-    """
-    if not learned.functions:
-        return conditions, selection
-    other, same = taught(
-        campaign, straight.conditions, straight.used, straight.selection, update,
-        learned,
-    )  # fmt: skip
-    if same.functions and cost_of(other) < cost_of(selection):
-        return straight.conditions, other
-    return conditions, selection
-
-
-def _with_errors(
-    campaign: Campaign, conditions: Conditions, used: NDArray, selection: Selection,
-    complete: Callable[[Conditions], Conditions],
-) -> Conditions:  # fmt: skip
-    """Conditions whose finite part is that of the geometric errors found, too."""
-    # the errors change with it, and are followed until it stays; a step so large that
-    # what it adds leads away is halved
-    behind, fitting = selection.behind, campaign.take(used)
-    affected = apply_effects(conditions, selection.fit.effects)
-    own = [affected.robot.index(frame.name) for frame in campaign.robot.frames]
-    raw = behind.raw(selection.fit.residual)
-    was = predict(conditions.take(used)).deviation
-
-    def at(values: Sequence[NDArray]) -> tuple[float, NDArray, Conditions]:
-        errors = affected.errors.copy()
-        errors[:, own] += screws_of(campaign, behind.terms, values)
-        added = complete(replace(affected, errors=errors)).second_order
-        bent = replace(conditions, second_order=added)
-        change = whiten(fitting, predict(bent.take(used)).deviation - was)
-        left = raw - np.nan_to_num(change)
-        return behind.lost(left, values), left, bent
-
-    if not any(term.name == GEOMETRY for term in behind.terms):
-        return conditions
-    stays = behind.left(selection.fit.residual)
-    limit = _BENT * max(1.0, float(np.sqrt(np.mean(stays**2))))
-    known = [np.zeros(len(term)) for term in behind.terms]
-    lost, left = at(known)[0], raw
-    for _ in range(_PASSES):
-        aim = behind.values(behind.whitened(left))
-        for share in _SHARES:
-            values = [k + share * (x - k) for k, x in zip(known, aim, strict=True)]
-            trial, there, bent = at(values)
-            if trial < lost:
-                break
-        else:
-            break
-        if np.abs(there - left).max() < limit:
-            break
-        conditions, known, lost, left = bent, values, trial, there
-    return conditions
+def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
+    """(R,) bool, rows that are fitted where others judge; all where none is spared."""
+    return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

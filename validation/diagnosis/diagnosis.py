@@ -10,17 +10,21 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
+from assembly.model.robot import Robot
 from forcefit.inputs.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.background import Background
-from validation.diagnosis.holdout import Split
-from validation.diagnosis.kept_aside import Errors, FittedModel, Rung
+from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.lack_of_fit import LackOfFit
 from validation.diagnosis.next_measurement import NextMeasurement
 from validation.diagnosis.noise_in_time import NoiseInTime
-from validation.diagnosis.refit import Fit
-from validation.diagnosis.scoring import Scored, Screen
+from validation.diagnosis.sequence import Errors, Step
+from validation.diagnosis.setup_blunders import SetupBlunder
 from validation.diagnosis.structure import Trend
+from validation.diagnosis.trace import Traced
+
+_SURELY = 3.0  # standard deviations by which a scale of noise is surely above 1
+_MORE = 0.1  # and by how much, to be worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,90 +32,94 @@ class Diagnosis:
     """What a campaign says about the machine, and what it cannot say.
 
     Attributes:
-        campaign: what was measured; its sigma as believed, see ``noise_factor``.
-        verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"`` or
-            ``"outside_library"``.
-        model: the best set of effects, fitted in the full model, with the machine's
-            geometric errors and springs.
+        campaign: what was measured, with the sigma stated.
+        verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
+            ``"outside_library"`` or ``"not_enough_rows"``.
+        fit: the machine found, every number fitted together; its robot is saved.
+        traced: what the search found.
         claimed: names of the effects that are claimed.
+        effects: names of the effects of the machine found, claimed or not.
         probability: of every effect of the library that the design can show.
         alternatives: sets of effects by name, with their probabilities, best first.
-        best_by_score: the effects of the single best set, whatever its probability.
-        lack: is what is left noise?
+        lack: is the residual of the fitted rows noise?
         declared: the same for the declared model.
-        before: on all rows kept aside, with the declared model.
-        after: likewise, with the best set, whatever the verdict.
+        before: on the held-out rows without outliers, with the declared model.
+        after: likewise, with machines fitted without these rows; whatever the verdict.
+        saved: errors of the saved robot on all rows without outliers, most of which it
+            was fitted to.
         noise: by sigma.
-        trimmed: before and after without the rows called outliers.
-        noise_factor: (6,) by which repeats scatter more than the sigma stated.
+        with_outliers: before and after with the held-out rows called outliers.
+        uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
+        noise_scale: true over stated sigma, and the standard deviation of that.
         noise_in_time: how noise is correlated in time, None if it is not; intervals of
             the effects are the wider for it.
-        ladder: what each step bought on the rows kept aside.
-        split: which rows were kept aside.
+        sequence: models up to the machine found, with errors on the held-out rows.
+        held: the rows that judge, and how.
         outliers: (R,) bool, rows left out of everything.
         conditions: the campaign's, as declared and registered.
         open: (R,) bool, rows where clearances leave the pose free, in the declared
             model or with the effects found; see
             :class:`assembly.measurement.predict.Prediction`.
         residual_before: (R, 6) [rad, m] reading minus declared model; NaN not measured.
-        residual_after: (R, 6) [rad, m] reading minus the best set's model.
-        screen: the scored hypotheses of the last round.
-        best: the best set there.
-        trends: what the residual left varies with, if more than noise is left.
+        residual_after: (R, 6) [rad, m] reading minus what the saved robot reads.
+        trends: what the residual varies with, if more than noise is left.
         next: the measurement that would decide, if the verdict is ambiguous.
+        needed: rows that would decide, if there are not enough.
         remarks: numbers that no machine has, and readings that no sensor gives.
+        setup: what of the campaign is set up wrongly; nothing else was looked for then.
         wording: the function that puts a diagnosis into words.
     """
 
     campaign: Campaign
     verdict: str
-    model: FittedModel
+    fit: MachineFit
+    traced: Traced
     claimed: tuple[str, ...]
+    effects: tuple[str, ...]
     probability: dict[str, float]
     alternatives: tuple[tuple[tuple[str, ...], float], ...]
-    best_by_score: tuple[str, ...]
     lack: LackOfFit
     declared: LackOfFit
     before: Errors
     after: Errors
+    saved: Errors
     noise: Errors
-    trimmed: tuple[Errors, Errors]
-    noise_factor: NDArray
+    with_outliers: tuple[Errors, Errors]
+    uncertainty: float
+    noise_scale: tuple[float, float]
     noise_in_time: NoiseInTime | None
-    ladder: tuple[Rung, ...]
-    split: Split
+    sequence: tuple[Step, ...]
+    held: HeldOut
     outliers: NDArray
     conditions: Conditions
     open: NDArray
     residual_before: NDArray
     residual_after: NDArray
-    screen: Screen
-    best: Scored
     trends: tuple[Trend, ...]
     next: NextMeasurement | None
+    needed: str
     remarks: tuple[str, ...]
     wording: Callable[["Diagnosis"], str]
+    setup: tuple[SetupBlunder, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 
     @property
-    def fit(self) -> Fit:
-        """The best set of effects, fitted in the full model."""
-        return self.model.fit
+    def robot(self) -> Robot:
+        """The machine found, as fitted."""
+        return self.fit.robot
 
     @property
-    def behind(self) -> Background:
-        """The machine's geometric errors and springs."""
-        return self.model.behind
+    def better(self) -> bool:
+        """Whether the machine found predicts the held-out rows better than declared."""
+        found = bool(len(self.fit.unknowns)) or bool(self.effects)
+        return found and self.after.normalised < self.before.normalised
 
     @property
-    def foretells(self) -> bool:
-        """Whether the model foretells rows kept aside better, with sound numbers.
-
-        So it does where more than noise is left, too, if functions were learned.
-        """
-        claimed = self.verdict in {"explained", "learned"}
-        return claimed or bool(self.model.learned and not self.remarks)
+    def more_scatter(self) -> bool:
+        """Whether readings scatter clearly more than stated."""
+        tau, std = self.noise_scale
+        return self.lack.sigma_too_small or tau > 1.0 + _SURELY * std + _MORE
 
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
@@ -125,7 +133,7 @@ class Diagnosis:
             "verdict": self.verdict,
             "claimed": ", ".join(self.claimed) or "none",
             "likeliest": ", ".join(f"{name} {p:.3f}" for name, p in likely) or "none",
-            "kept aside": f"{self.before.normalised:.3g} sigma before, "
+            "held-out rows": f"{self.before.normalised:.3g} sigma before, "
             f"{self.after.normalised:.3g} after (1 is noise)",
             "outliers": f"{int(self.outliers.sum())} rows",
         }

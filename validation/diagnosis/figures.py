@@ -11,7 +11,7 @@ _SIDES = ((0, 1, "from above"), (0, 2, "from the side"))
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Before, after and noise on the rows kept aside, position and rotation.
+    """Before, after and noise on the held-out rows, position and rotation.
 
     Args:
         diagnosis: the diagnosis.
@@ -29,14 +29,14 @@ def error_chart(diagnosis: Diagnosis) -> str:
         values = {name: getattr(e, kind) for name, e in sizes.items()}
         known = {name: v for name, v in values.items() if np.isfinite(v)}
         if known:
-            axis = Axis(f"{kind}: rms on rows kept aside", unit)
+            axis = Axis(f"{kind}: rms on held-out rows", unit)
             caption = "Rows that chose and fitted nothing."
             charts.append(bars(known, axis, caption, float("nan")))
     return f"<div class=grid>{''.join(charts)}</div>"
 
 
-def ladder_chart(diagnosis: Diagnosis) -> str:
-    """What every step bought, on the rows kept aside, in sigmas.
+def sequence_chart(diagnosis: Diagnosis) -> str:
+    """Error of every model of the sequence on the held-out rows, in sigmas.
 
     Args:
         diagnosis: the diagnosis.
@@ -45,11 +45,11 @@ def ladder_chart(diagnosis: Diagnosis) -> str:
         HTML of bars in the order of the steps.
     """
     values: dict[str, float] = {}
-    for rung in diagnosis.ladder:
-        again = rung.term in values  # a step may be taken twice
-        name = f"{rung.term} ({len(values) + 1})" if again else rung.term
-        values[name] = rung.error.normalised
-    axis = Axis("rms on rows kept aside [sigma]")
+    for step in diagnosis.sequence:
+        again = step.term in values  # several functions may be learned
+        name = f"{step.term} ({len(values) + 1})" if again else step.term
+        values[name] = step.error.normalised
+    axis = Axis("rms on held-out rows [sigma]")
     return bars(values, axis, "Line at 1: noise as stated.")
 
 
@@ -167,12 +167,9 @@ def separability_of(diagnosis: Diagnosis) -> Separability:
         The comparison, each effect in its most general form.
     """
     columns: dict[str, NDArray] = {}
-    for signature in diagnosis.screen.signatures:
-        h = signature.hypothesis
-        scale = np.array([slot.unknown.scale for slot in h.slots])
-        shown = signature.columns * scale
-        if h.effect not in columns and np.any(shown):
-            columns[h.effect] = shown
+    for element in diagnosis.traced.columns.library:
+        if element.name not in columns and np.any(element.columns):
+            columns[element.name] = element.columns
     return compare_signatures(columns)
 
 

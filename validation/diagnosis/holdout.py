@@ -1,51 +1,94 @@
-"""Rows kept aside: whole configurations or spans of time, shared by no two folds."""
+"""Rows held out: whole configurations or spans of time, shared by no two sets.
 
-from dataclasses import dataclass
+A campaign of 60 configurations or more is split once.  A smaller one is judged by
+cross-validation: in each fold the whole diagnosis is made again without its rows
+(nested), since a quarter of few configurations is too small a sample to judge by.
+Nothing reads the readings of a held-out row before the last decision.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-_FEWEST = 8  # configurations from which blocks can be kept aside
-_SHARE = 4  # one block in this many
+_FEWEST = 8  # configurations from which blocks are configurations, else spans of time
+_SPLIT = 60  # configurations from which one split judges
+_SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
+_ENOUGH = 60  # blocks held out that judge well, however many there are
+_FOLDS = 5
 SPANS = "spans of time"
 _TAIL = 4.0  # degrees of freedom of Student's t
 
 
 @dataclass(frozen=True, eq=False)
-class Split:
-    """Which rows choose and fit the effects, and which only judge.
+class HeldOut:
+    """Which rows judge, and how.
 
     Attributes:
-        fitted: (R,) bool.
-        how: in words.
+        how: ``"split"``, ``"folds"`` or ``"none"``.
+        folds: (R,) bool each, rows held out together; one for a split.
+        words: the same for people.
     """
 
-    fitted: NDArray
     how: str
+    folds: tuple[NDArray, ...]
+    words: str
+
+    @property
+    def rows(self) -> NDArray:
+        """(R,) bool, rows that judge."""
+        return np.any(self.folds, axis=0)
 
 
-def split(campaign: Campaign) -> Split:
-    """Keep whole configurations aside; spans of time where there are too few.
+def hold_out(campaign: Campaign) -> HeldOut:
+    """Choose the rows that judge a diagnosis.
 
     Args:
         campaign: of R rows.
 
     Returns:
-        The split; the same for the same campaign.
+        The same for the same campaign; ``"none"`` where there are fewer than two
+        blocks, of which all rows are judged by the fit to themselves.
     """
     blocks, kind = blocks_of(campaign)
-    names = np.unique(blocks)
-    kept = np.random.default_rng(0).permutation(names)[: max(1, len(names) // _SHARE)]
+    names = np.random.default_rng(0).permutation(np.unique(blocks))
     if len(names) < 2:
-        return Split(np.ones(len(campaign), dtype=bool), "no rows: too few to spare")
-    held = np.isin(blocks, kept)
-    how = (
-        f"{int(held.sum())} rows of {len(kept)} of {len(names)} {kind}, drawn once, "
-        "kept aside from choosing and fitting"
+        every = np.ones(len(campaign), dtype=bool)
+        return HeldOut("none", (every,), "no rows held out: too few to spare")
+    if len(names) >= _SPLIT:
+        count = max(
+            min(round(_SHARES[0] * len(names)), _ENOUGH), round(_SHARES[1] * len(names))
+        )
+        held = np.isin(blocks, names[:count])
+        words = (
+            f"{int(held.sum())} rows of {count} of {len(names)} {kind}, drawn once, "
+            "held out from every choice and every fit"
+        )
+        return HeldOut("split", (held,), words)
+    parts = np.array_split(names, min(_FOLDS, len(names)))
+    folds = tuple(np.isin(blocks, part) for part in parts)
+    words = (
+        f"{len(parts)} folds over {len(names)} {kind}: in each the whole diagnosis is "
+        "made without its rows"
     )
-    return Split(~held, how)
+    return HeldOut("folds", folds, words)
+
+
+def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
+    """The campaign without the readings of some rows.
+
+    Args:
+        campaign: of R rows.
+        rows: (R,) bool, rows whose readings become NaN; their commands stay.
+
+    Returns:
+        The campaign; what is computed from it cannot depend on those readings.
+    """
+    return replace(
+        campaign, measured=np.where(rows[:, None], np.nan, campaign.measured)
+    )
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:

@@ -6,7 +6,7 @@ Each of these is a hypothesis of its own, with as many unknowns as it has slots.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,8 +158,7 @@ def _groupings(
     ways.append(tuple(tuple(names) for names in kinds.values()))
     ways.append((places,))
     ways += [(tuple(names),) for names in kinds.values()]
-    if few:
-        ways += [((p,),) for p in places]
+    ways += [((p,),) for p in places]
     yield from dict.fromkeys(ways)
 
 
@@ -182,3 +181,37 @@ def _scanned(
                 for names, u in slots
             ),
         )
+
+
+def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
+    """Hypotheses whose effect and that of a robot's file are one effect again.
+
+    Args:
+        listed: any.
+        robot: with the effects of its file.
+
+    Returns:
+        The same, but for contact laws in joints that have one; a drift has the time
+        constant that the file declares.
+    """
+    contacts = {
+        key.removesuffix(".coefficient")
+        for key in robot.effects.get("contact_stiffening", {})
+    }
+    constant = robot.effects.get("drift", {}).get("time_constant")
+    kept: dict[Hypothesis, None] = {}
+    for h in listed:
+        if h.effect == "contact_stiffening" and contacts & set(h.where):
+            continue
+        if h.effect == "drift" and constant is not None:
+            h = replace(h, slots=tuple(_held(s, constant) for s in h.slots))
+        kept[h] = None
+    return list(kept)
+
+
+def _held(slot: Slot, constant: float) -> Slot:
+    """A slot of a drift, its time constant held."""
+    if slot.names != ("time_constant",):
+        return slot
+    unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
+    return replace(slot, unknown=unknown, start=constant)

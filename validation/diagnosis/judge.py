@@ -1,232 +1,269 @@
-"""The verdict on what a diagnosis settled on, and errors on the rows kept aside."""
+"""The verdict on what a diagnosis found, and the errors on the rows held out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
-from assembly.effects import apply_effects
-from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.holdout import Split
-from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.kept_aside import (
-    FittedModel,
-    RowSets,
-    Rung,
-    errors_of,
-    ladder,
+from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.holdout import HeldOut, blocks_of
+from validation.diagnosis.lack_of_fit import (
+    SIGNIFICANT,
+    LackOfFit,
+    lack_of_fit,
+    outlying,
 )
-from validation.diagnosis.lack_of_fit import LackOfFit, lack_of_fit, outlying
-from validation.diagnosis.learning import Learned
 from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
 from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
 from validation.diagnosis.plausible import implausible, impossible_rows
-from validation.diagnosis.refit import refit
-from validation.diagnosis.responses import responses
-from validation.diagnosis.scoring import FINITE, inclusion, named
-from validation.diagnosis.selection import Selection
+from validation.diagnosis.prediction import predicted, residual_of
+from validation.diagnosis.sequence import errors_of, pooled, stages
 from validation.diagnosis.signatures import whiten
 from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.text import text
-from validation.diagnosis.verdict import by_names, linear_or_finite, verdict
+from validation.diagnosis.trace import FINITE, Traced
+from validation.diagnosis.verdict import NOT_ENOUGH, Kept, by_names, verdict
 
 BLUNDERS = 20  # one row in so many may be called a blunder, in all
+_LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
+_SHARE = 0.5  # of the readings that may be determined unknowns
+_DECISIVE = 8  # blocks of rows; with fewer, held-out rows that fail say "too few"
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
-    """Where the passes of a diagnosis ended, before anything is judged.
+class Judged:
+    """A machine fitted without some rows, and these.
 
     Attributes:
-        campaign: of R rows; its sigma is the stated one times both factors below.
-        unregistered: conditions of all rows, before any registration.
-        conditions: the same, registered.
-        split: rows fitted and rows kept aside.
-        outliers: (R,) bool, rows left out of everything.
-        noise_factor: (6,) by which repeats scatter more than the sigma stated.
-        inflation: [-] by which sigma was made larger for what nothing explains.
-        selection: sets of effects, the best one fitted.
-        learned: functions behind it.
-        finite: whether motions of the declared model are finite.
+        fit: the machine.
+        used: (R,) bool, rows that were fitted.
+        held: (R,) bool, rows that judge it.
     """
 
-    campaign: Campaign
-    unregistered: Conditions
-    conditions: Conditions
-    split: Split
-    outliers: NDArray
-    noise_factor: NDArray
-    inflation: float
-    selection: Selection
-    learned: tuple[Learned, ...]
-    finite: bool
-
-    @property
-    def used(self) -> NDArray:
-        """(R,) bool, rows that chose and fitted the effects."""
-        return self.split.fitted & ~self.outliers
-
-    @property
-    def held_out(self) -> NDArray:
-        """(R,) bool, rows that judge: those kept aside, or all used if none were."""
-        held_out = ~self.split.fitted
-        return held_out if held_out.any() else self.used
-
-    @property
-    def fitting(self) -> Campaign:
-        """The rows used."""
-        return self.campaign.take(self.used)
+    fit: MachineFit
+    used: NDArray
+    held: NDArray
 
 
-@dataclass(frozen=True, eq=False)
-class _Ranking:
-    """Sets of effects by name with their probabilities, best first.
-
-    Attributes:
-        sets: names of the effects and probability of each set.
-        probability: of every effect.
-        best: effects of the single best set.
-        selection: with the fit of that set.
-    """
-
-    sets: tuple[tuple[tuple[str, ...], float], ...]
-    probability: dict[str, float]
-    best: tuple[str, ...]
-    selection: Selection
-
-
-def judge(settled: Settled) -> Diagnosis:
-    """The verdict, then the rows kept aside.
+def judge(
+    campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
+    folds: Sequence[Judged],
+) -> Diagnosis:  # fmt: skip
+    """The errors on the held-out rows, and the verdict.
 
     Args:
-        settled: where the passes over the rows fitted ended.
+        campaign: of R rows, as it was measured.
+        traced: what the search found.
+        fit: the machine that is saved.
+        held: the rows that judge.
+        folds: machines fitted without them.
 
     Returns:
         The diagnosis.
     """
-    campaign, conditions = settled.campaign, settled.conditions
-    linear = conditions if settled.finite else replace(conditions, second_order=0.0)
-    declared_model = predict(linear)
-    before = campaign.measured - declared_model.deviation
-    ranking = _ranked(settled, before)
-    selection, correlated = _with_noise_in_time(settled, ranking.selection)
-    ranking = replace(ranking, selection=selection)
-    inflation = settled.inflation
-    lack = _lack_of_fit(settled, selection)
-    ranking, decision, claimed = _decided(settled, ranking, lack)
-    remarks = implausible(campaign, selection.fit, selection.behind)
+    used = traced.used
+    every = [stages(_believed(campaign, traced), f.fit, f.used, f.held) for f in folds]
+    first = 1 if campaign.registration == "unknown" else 0
+    before, after = (_joined(campaign, every, place) for place in (first, -1))
+    outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
+    rows = held.rows & ~outliers
+    steps = pooled(campaign, every, rows)
+    fit, correlated = _with_noise_in_time(traced, fit)
+    left = residual_of(campaign, fit.robot)
+    lack = _lack_of_fit(campaign, traced, fit, left)
+    names = _names(fit)
+    kept = Kept(names, bool(fit.unknowns.functions), bool(fit.unknowns.small))
+    decision, claimed = verdict(traced.selected, kept, lack.significant)
+    errors = {
+        kind: errors_of(campaign, residual, rows)
+        for kind, residual in (("before", before), ("after", after))
+    }
+    if decision in {"explained", "learned", "ambiguous"}:
+        fails = _fails(campaign, folds, after, rows, lack)
+        if fails or errors["after"].normalised > errors["before"].normalised:
+            decision, claimed = "outside_library", ()
+        if _too_few(campaign, traced, fit, fails):
+            decision, claimed = NOT_ENOUGH, ()
+    remarks = implausible(campaign, fit)
     if remarks and decision in {"explained", "learned"}:
         decision, claimed = "outside_library", ()
-    model = FittedModel(
-        conditions, responses(conditions), selection.fit, selection.behind,
-        settled.learned,
-    )  # fmt: skip
-    explained = predict(apply_effects(conditions, selection.fit.effects))
-    after = model.residual(campaign)
-    used, held_out = settled.used, settled.held_out
-    varies: tuple[Trend, ...] = ()
-    if decision == "outside_library":
-        varies = tuple(trends(settled.fitting, conditions.take(used), after[used]))
-    outliers = settled.outliers | _outlying_held_out(settled, after)
-    shown = before if decision == "none_needed" else after
-    rungs = ladder(
-        campaign, settled.unregistered, model, selection.terms, RowSets(used, held_out),
-        selection.sets[0].rank, after,
-    )  # fmt: skip
-    stated = replace(campaign, sigma=campaign.sigma / inflation)
-    kept = held_out & ~outliers
+    declared = _declared_residual(campaign, traced, FINITE in names)
     return Diagnosis(
-        campaign=stated,
+        campaign=campaign,
         verdict=decision,
-        model=model,
+        fit=fit,
+        traced=traced,
         claimed=claimed,
-        probability=ranking.probability,
-        alternatives=ranking.sets,
-        best_by_score=ranking.best,
+        effects=names,
+        probability=traced.selected.probability,
+        alternatives=by_names(traced.selected),
         lack=lack,
         declared=lack_of_fit(
-            settled.fitting, inflation * selection.tangents.residual, 0
+            campaign.take(used), whiten(campaign.take(used), declared[used]), 0
         ),
-        before=errors_of(stated, before, held_out),
-        after=errors_of(stated, shown, held_out),
-        noise=errors_of(stated, stated.sigma, held_out),
-        trimmed=(errors_of(stated, before, kept), errors_of(stated, shown, kept)),
-        noise_factor=settled.noise_factor,
+        before=errors["before"],
+        after=errors["before"] if decision == "none_needed" else errors["after"],
+        saved=errors_of(campaign, left, ~outliers),
+        noise=errors_of(campaign, campaign.sigma, rows),
+        with_outliers=(
+            errors_of(campaign, before, held.rows),
+            errors_of(campaign, after, held.rows),
+        ),
+        uncertainty=_uncertainty(campaign, after, rows),
+        noise_scale=(traced.selected.noise.tau, traced.selected.noise.tau_std),
         noise_in_time=correlated,
-        ladder=tuple(_in_sigmas(rung, inflation) for rung in rungs),
-        split=settled.split,
+        sequence=tuple(steps),
+        held=held,
         outliers=outliers,
-        conditions=conditions,
-        open=declared_model.undetermined | explained.undetermined,
-        residual_before=before,
-        residual_after=after,
-        screen=selection.screen,
-        best=selection.sets[0],
-        trends=varies,
-        next=_next(settled, selection) if decision == "ambiguous" else None,
+        conditions=traced.conditions,
+        open=_open(campaign, fit),
+        residual_before=declared,
+        residual_after=left,
+        trends=_trends(campaign, traced, left) if decision == "outside_library" else (),
+        next=_next(campaign, traced, fit) if decision == "ambiguous" else None,
+        needed=_needed(campaign, traced, fit) if decision == NOT_ENOUGH else "",
         remarks=remarks + _impossible(campaign),
         wording=text,
-    )
+    )  # fmt: skip
 
 
-def _ranked(settled: Settled, before: NDArray) -> _Ranking:
-    """The sets by name; finite motions alone are the best one where these say more."""
-    selection = settled.selection
-    sets = by_names(selection.screen, selection.sets)
-    probability = inclusion(selection.screen, selection.sets)
-    best = named(selection.screen, selection.sets[0])
-    if settled.finite or selection.sets[0].members or selection.behind:
-        return _Ranking(sets, probability, best, selection)
-    used, fitting = settled.used, settled.fitting
-    gain = np.sum(whiten(fitting, before[used]) ** 2) - selection.fit.rss
-    sets, probability = linear_or_finite(sets, probability, float(gain))
-    if sets[0][0] == (FINITE,):
-        motions = [Hypothesis(FINITE, (), ())]
-        fit = refit(fitting, settled.conditions.take(used), motions, np.zeros(0))
-        selection, best = replace(selection, fit=fit), (FINITE,)
-    return _Ranking(sets, probability, best, selection)
+def _open(campaign: Campaign, fit: MachineFit) -> NDArray:
+    """(R,) bool, rows where clearances leave the pose free, declared or as found."""
+    found = predicted(campaign, fit.robot).undetermined
+    return np.asarray(predicted(campaign).undetermined | found)
+
+
+def _trends(campaign: Campaign, traced: Traced, left: NDArray) -> tuple[Trend, ...]:
+    """What the residual of the fitted rows varies with."""
+    used = traced.used
+    conditions = traced.conditions.take(used)
+    return tuple(trends(campaign.take(used), conditions, left[used]))
+
+
+def _believed(campaign: Campaign, traced: Traced) -> Campaign:
+    """The campaign with its readings and the sigma that the search believed."""
+    return replace(traced.campaign, measured=campaign.measured)
+
+
+def _declared_residual(campaign: Campaign, traced: Traced, linear: bool) -> NDArray:
+    """(R, 6) [rad, m] readings minus the declared model, registered."""
+    conditions = traced.conditions
+    if linear:
+        conditions = replace(conditions, second_order=0.0)
+    return np.asarray(campaign.measured - predict(conditions).deviation)
+
+
+def _names(fit: MachineFit) -> tuple[str, ...]:
+    """Effects of the library that a machine has, the measuring frame's place aside."""
+    own = [e.hypothesis.effect for e in fit.unknowns.effects if not e.device]
+    return tuple(dict.fromkeys(own))
+
+
+def _joined(campaign: Campaign, folds: list, place: int) -> NDArray:
+    """(R, 6) residual of one stage of every fold, each on the rows that it held out."""
+    residual = np.full(campaign.measured.shape, np.nan)
+    for fold in folds:
+        there = fold[place].residual
+        residual = np.where(np.isnan(there), residual, there)
+    return residual
+
+
+def _outlying_held(
+    campaign: Campaign, traced: Traced, held: HeldOut, residual: NDArray
+) -> NDArray:
+    """(R,) bool, outliers among the rows that judge."""
+    outliers = np.zeros(len(campaign), dtype=bool)
+    judged = campaign.take(held.rows)
+    whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
+    most = len(campaign) // BLUNDERS - int(traced.outliers.sum())
+    outliers[held.rows] = outlying(judged, whitened, max(0, most))
+    return outliers
 
 
 def _with_noise_in_time(
-    settled: Settled, selection: Selection
-) -> tuple[Selection, NoiseInTime | None]:
+    traced: Traced, fit: MachineFit
+) -> tuple[MachineFit, NoiseInTime | None]:
     """The fit with the covariance that noise correlated in time leaves, if it is."""
-    fit, behind = selection.fit, selection.behind
-    noise = noise_in_time(settled.fitting, behind.left(fit.residual))
-    if noise is None or not len(fit.values):
-        return selection, noise
-    weights = behind.whitened(fit.slopes)
-    C = widened(fit.covariance, weights, settled.fitting, noise)
-    return replace(selection, fit=replace(fit, covariance=C)), noise
+    fitting = traced.fitting
+    noise = noise_in_time(fitting, fit.residual)
+    if noise is None or not len(fit.x):
+        return fit, noise
+    C = widened(fit.covariance, fit.slopes, fitting, noise)
+    return replace(fit, covariance=C), noise
 
 
-def _lack_of_fit(settled: Settled, selection: Selection) -> LackOfFit:
-    """Is what the best set leaves noise?"""
-    left = selection.behind.left(selection.fit.residual)
-    unknowns = selection.unknowns + round(selection.behind.unknowns)
-    return lack_of_fit(settled.fitting, settled.inflation * left, unknowns)
+def _lack_of_fit(
+    campaign: Campaign, traced: Traced, fit: MachineFit, left: NDArray
+) -> LackOfFit:
+    """Is the residual of the fitted rows noise, by the stated sigma and repeats?"""
+    fitting = campaign.take(traced.used)
+    residual = np.nan_to_num(whiten(fitting, left[traced.used]))
+    return lack_of_fit(fitting, residual, round(float(fit.determined.sum())))
 
 
-def _decided(
-    settled: Settled, ranking: _Ranking, lack: LackOfFit
-) -> tuple[_Ranking, str, tuple[str, ...]]:
-    """The verdict and what is claimed; what was learned makes the ranking certain."""
-    decision, claimed = verdict(
-        ranking.sets, ranking.probability, lack.significant,
-        small=bool(ranking.selection.behind),
-    )  # fmt: skip
-    if not settled.learned:
-        return ranking, decision, claimed
-    # the library's own scores speak of it without what was learned
-    best = ranking.best
-    certain = {name: float(name in best) for name in ranking.probability}
-    ranking = replace(ranking, sets=((best, 1.0),), probability=certain)
-    if decision != "outside_library":
-        decision, claimed = "learned", best
-    return ranking, decision, claimed
+def _fails(
+    campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
+    lack: LackOfFit,
+) -> bool:  # fmt: skip
+    """Whether held-out rows show more than noise and the uncertainty of the fit."""
+    squares, count = 0.0, 0
+    for one in folds:
+        own = campaign.cells & (one.held & rows)[:, None]
+        variance = np.ones(int(own.sum()))
+        if len(one.fit.x):
+            J = one.fit.unknowns.slopes(campaign, one.fit.x)[own]
+            J /= campaign.sigma[own][:, None]
+            variance += np.einsum("nk,kl,nl->n", J, one.fit.covariance, J)
+        z = residual[own] / campaign.sigma[own]
+        known = np.isfinite(z)
+        squares += float(np.sum(z[known] ** 2 / variance[known]))
+        count += int(known.sum())
+    if not count:
+        return True
+    scatter = lack.repeats if lack.sigma_too_small else 1.0
+    squares /= scatter**2
+    loose = squares / count > _LOOSE**2
+    return bool(loose and chi2.sf(squares, count) < SIGNIFICANT)
+
+
+def _too_few(campaign: Campaign, traced: Traced, fit: MachineFit, fails: bool) -> bool:
+    """Whether so few rows decide nothing."""
+    cells = int(campaign.cells[traced.used].sum())
+    blocks = len(np.unique(blocks_of(campaign)[0][traced.used]))
+    many = float(fit.determined.sum()) > _SHARE * cells
+    return many or (fails and blocks <= _DECISIVE)
+
+
+def _needed(campaign: Campaign, traced: Traced, fit: MachineFit) -> str:
+    """Rows that would decide, in words."""
+    components = max(1, int(campaign.cells.any(axis=0).sum()))
+    wanted = float(fit.determined.sum()) / _SHARE / components
+    blocks = len(np.unique(campaign.configuration))
+    count = int(np.ceil(max(wanted, 2.0 * blocks, 2.0 * _DECISIVE)))
+    return (
+        f"about {count} configurations spread over the range of every drive, some of "
+        "them loaded and some repeated; there are "
+        f"{blocks}, read in {components} components"
+    )
+
+
+def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
+    """Standard error of the rms of held-out rows in sigma, by scatter of blocks."""
+    z = np.where(campaign.cells, residual / campaign.sigma, np.nan)
+    squares = np.nansum(z**2, axis=1)
+    blocks = blocks_of(campaign)[0]
+    names = np.unique(blocks[rows])
+    sums = np.array([squares[rows & (blocks == b)].sum() for b in names])
+    count = np.isfinite(z[rows]).sum()
+    if len(names) < 2 or not count or not sums.any():
+        return float("nan")
+    error = sums.std(ddof=1) * np.sqrt(len(sums)) / count
+    return float(error / (2 * np.sqrt(sums.sum() / count)))
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
@@ -237,27 +274,12 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     return (f"a temperature that no sensor has, left out: {', '.join(ids[:10])}",)
 
 
-def _next(settled: Settled, selection: Selection) -> NextMeasurement | None:
-    """The measurement that would tell the best set from its rivals."""
-    best_fit = selection.fit
-    if settled.finite:  # of all rivals alike, so that it tells nothing apart
-        linear = replace(best_fit.conditions, exact=False)
-        best_fit = replace(best_fit, conditions=linear)
-    conditions = settled.conditions.take(settled.used)
-    return next_measurement(settled.fitting, conditions, best_fit, selection.rivals)
-
-
-def _outlying_held_out(settled: Settled, residual: NDArray) -> NDArray:
-    """(R,) bool, outliers among the rows that judge."""
-    held_out, outliers = settled.held_out, np.zeros_like(settled.outliers)
-    judged = settled.campaign.take(held_out)
-    most = len(settled.campaign) // BLUNDERS - int(settled.outliers.sum())
-    whitened = whiten(judged, residual[held_out])
-    outliers[held_out] = outlying(judged, whitened, max(0, most))
-    return outliers
-
-
-def _in_sigmas(rung: Rung, inflation: float) -> Rung:
-    """A rung whose error is in sigmas that were not made larger."""
-    error = replace(rung.error, normalised=inflation * rung.error.normalised)
-    return replace(rung, error=error)
+def _next(
+    campaign: Campaign, traced: Traced, fit: MachineFit
+) -> NextMeasurement | None:
+    """The measurement that would tell the best model from its rivals."""
+    rivals = [
+        fit_machine(traced.campaign, unknowns, traced.used)
+        for unknowns in traced.rivals()
+    ]
+    return next_measurement(campaign, traced.conditions, fit, rivals)

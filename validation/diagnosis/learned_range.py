@@ -3,6 +3,7 @@
 A function of a covariate, and any other effect, is known where that covariate has been.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,17 +82,40 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
         range.
     """
     left = []
+    for name, values, outside in _outside(robot, campaign):
+        known = values[np.isfinite(values)]
+        now, ends = (float(known.min()), float(known.max())), robot.learned_range[name]
+        left.append(Beyond(name, ends, now, int(outside.sum()), len(known)))
+    return tuple(left)
+
+
+def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
+    """(R,) names of what leaves the learned range in each row, empty if nothing does.
+
+    Args:
+        robot: whose file says that range.
+        campaign: of R rows.
+
+    Returns:
+        Texts, names separated by spaces.
+    """
+    names = np.full(len(campaign), "", dtype=object)
+    for name, _, outside in _outside(robot, campaign):
+        names[outside] = [f"{before} {name}".strip() for before in names[outside]]
+    return names
+
+
+def _outside(
+    robot: Robot, campaign: Campaign
+) -> Iterator[tuple[str, NDArray, NDArray]]:
+    """Name, (R,) values and (R,) bool of every variable that leaves its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
-        values = values[np.isfinite(values)]
         margin = _MARGIN * (high - low) + _SAME * max(abs(low), abs(high))
         outside = (values < low - margin) | (values > high + margin)
         if outside.any():
-            now = float(values.min()), float(values.max())
-            rows = int(outside.sum())
-            left.append(Beyond(name, (low, high), now, rows, len(values)))
-    return tuple(left)
+            yield name, values, outside
 
 
 def _variables(campaign: Campaign) -> dict[str, NDArray]:

@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import apply_effects
+from assembly.effects import LIBRARY, apply_effects
 from assembly.kinematics.posture import POSE, place_many_joints, pose_components
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from validation.campaign.campaign import LOAD, Campaign
-from validation.diagnosis.refit import Fit
+from validation.diagnosis.fit import MachineFit
 
 _TRIED = 240  # conditions looked at
 _FURTHER = 1.5  # of the range of loads and covariates used so far
@@ -53,7 +53,10 @@ class NextMeasurement:
 
 
 def next_measurement(
-    campaign: Campaign, conditions: Conditions, fit: Fit, rivals: Sequence[Fit]
+    campaign: Campaign,
+    conditions: Conditions,
+    fit: MachineFit,
+    rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
     """The measurement that would decide between a fit and its likeliest rival.
 
@@ -74,13 +77,10 @@ def next_measurement(
     tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
     size = np.abs(tried.load).sum(axis=1)
-    a, Ja = _model(tried, fit, sigma)
+    a, Ja, Ca = _model(tried, fit, sigma)
     for rival in rivals:
-        b, Jb = _model(tried, rival, sigma)
-        powers = np.minimum(
-            _power(a - b, Jb, rival.covariance), _power(b - a, Ja, fit.covariance)
-        )
-        powers = np.where(np.isfinite(powers), powers, 0.0)
+        b, Jb, Cb = _model(tried, rival, sigma)
+        powers = np.minimum(_power(a - b, Jb, Cb), _power(b - a, Ja, Ca))
         # among conditions as good as the best, the one that asks for the least load
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
@@ -90,10 +90,11 @@ def next_measurement(
 
 
 def _measurement(
-    campaign: Campaign, tried: Conditions, best: int, power: float, fit: Fit, rival: Fit
-) -> NextMeasurement:
+    campaign: Campaign, tried: Conditions, best: int, power: float,
+    fit: MachineFit, rival: MachineFit,
+) -> NextMeasurement:  # fmt: skip
     """One of the conditions tried, in words and numbers."""
-    names = [" + ".join(sorted(one.effects)) for one in (fit, rival)]
+    names = [" + ".join(_names(one)) or "nothing" for one in (fit, rival)]
     covariates = {
         name: float(getattr(tried, name)[best])
         for name in ("temperature", "approach")
@@ -152,31 +153,59 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     )
 
 
-def _model(tried: Conditions, fit: Fit, sigma: NDArray) -> tuple[NDArray, NDArray]:
-    """(S, 6) whitened predictions of a fit, and (S, 6, k) their derivatives."""
+def _names(fit: MachineFit) -> list[str]:
+    """Effects of the library that a machine was found to have."""
+    own = {e.hypothesis.effect for e in fit.unknowns.effects if not e.device}
+    return sorted(own)
 
-    def read(values: NDArray, finite: bool) -> NDArray:
-        conditions = apply_effects(tried, fit.at(values))
-        return predict(replace(conditions, exact=finite)).deviation / sigma
 
-    model = read(fit.values, fit.conditions.exact)
+def _model(
+    tried: Conditions, fit: MachineFit, sigma: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    """(S, 6) whitened predictions with a machine's effects, (S, 6, k) derivatives."""
+    parts = [e for e in fit.unknowns.effects if not e.device]
+    values = [fit.own(one)[0] for one in parts]
+    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
+    which = [np.arange(own.start, own.stop) for one, own in places if one in parts]
+    chosen = np.concatenate([np.zeros(0, int), *which])
+    C = fit.covariance[np.ix_(chosen, chosen)]
+    finite = any(LIBRARY[e.hypothesis.effect].finite for e in parts)
+
+    def read(values: Sequence[NDArray], finite: bool) -> NDArray:
+        effects = {
+            e.hypothesis.effect: e.hypothesis.public(tried.robot, x)
+            for e, x in zip(parts, values, strict=True)
+        }
+        conditions = replace(apply_effects(tried, effects), exact=finite)
+        return predict(conditions).deviation / sigma
+
+    model = read(values, finite)
     # finite motions hardly change the slopes, and take a hundred times longer
-    middle = read(fit.values, False) if fit.conditions.exact else model
-    J = np.zeros((*middle.shape, len(fit.values)))
-    deviation = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    for k, size in enumerate(deviation):
-        moved = fit.values.copy()
-        moved[k] += _STEP * size
-        if size > 0:
-            J[:, :, k] = (read(moved, False) - middle) / (_STEP * size)
+    middle = read(values, False) if finite else model
+    J = np.zeros((*middle.shape, len(chosen)))
+    std = np.sqrt(np.maximum(np.diag(C), 0.0))
+    k = 0
+    for i, x in enumerate(values):
+        for j in range(len(x)):
+            moved = [v.copy() for v in values]
+            moved[i][j] += _STEP * std[k]
+            if std[k] > 0:
+                J[:, :, k] = (read(moved, False) - middle) / (_STEP * std[k])
+            k += 1
     known = np.isfinite(sigma)
-    return model[:, known], J[:, known]
+    return model[:, known], J[:, known], C
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """(S,) non-centrality of missing by d with J C J' still open."""
+    """(S,) non-centrality of missing by d with J C J' still open; 0 if not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
-    return np.einsum("si,si->s", d, np.linalg.solve(S, d[..., None])[..., 0])
+    good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
+    powers = np.zeros(len(d))
+    # S is 1 plus what is semidefinite but for rounding, which may be large
+    values, vectors = np.linalg.eigh(S[good])
+    along = np.einsum("sij,si->sj", vectors, d[good])
+    powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
+    return powers
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:

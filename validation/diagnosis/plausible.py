@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.background import Background
-from validation.diagnosis.refit import Fit
+from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.small_terms import (
     GEOMETRY,
     KINDS,
@@ -54,17 +53,21 @@ def impossible_rows(campaign: Campaign) -> NDArray:
     return wrong
 
 
-def implausible(campaign: Campaign, fit: Fit, behind: Background) -> tuple[str, ...]:
-    """What of a fit no machine has.
+def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
+    """What of a fitted machine no machine has.
 
     Args:
         campaign: that was fitted.
-        fit: effects of the library.
-        behind: geometric errors and springs.
+        fit: the machine.
 
     Returns:
         One sentence each; none where everything may be.
     """
+    return tuple(f"{one}: {_LIKELY}" for one in _implausible(campaign, fit))
+
+
+def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
+    """Statements on numbers that no machine has."""
     robot = campaign.robot
     size = size_of(robot)
     force = float(np.abs(campaign.loads[:, 3:]).max())
@@ -72,35 +75,47 @@ def implausible(campaign: Campaign, fit: Fit, behind: Background) -> tuple[str, 
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
     softest = {"N/m": force / (_GIVES * size), "N m/rad": moment / _GIVES}
     largest = {"rad": LARGEST_TURN, "m": LARGEST_SHIFT * size}
-    known = campaign.registration == "known"
-
-    def wrong() -> Iterator[str]:
-        for effect, values in fit.effects.items():
-            if effect == "registration" and not known:
-                continue
-            for name, value in values.items():
-                unit = LIBRARY[effect].unit(robot, name)
-                statement = f"{effect} {name} = {value:.3g} {unit}"
-                if name.endswith(".phase"):
-                    continue
-                if abs(value) > largest.get(unit, np.inf):
-                    yield f"{statement}, larger than {largest[unit]:.2g}"
-                if value < softest.get(unit, -np.inf):
-                    yield f"{statement}, which the loads would bend out of reach"
-                low, high, why = _RANGES.get(unit, (-np.inf, np.inf, ""))
-                if not low <= value <= high:
-                    yield f"{statement}: {why}"
-                if unit == "1" and effect in _FACTORS:
-                    low, high = _FACTORS[effect]
-                    if not low <= value <= high:
-                        yield f"{statement}, expected {low:g} to {high:g}"
-        scales = behind.scales.get(GEOMETRY, (0.0, 0.0))
-        for kind, size_found, unit in zip(KINDS, scales, ("rad", "m"), strict=True):
+    for effect, name, value in _parameters(campaign, fit):
+        unit = LIBRARY[effect].unit(robot, name)
+        statement = f"{effect} {name} = {value:.3g} {unit}"
+        if name.endswith(".phase"):
+            continue
+        if abs(value) > largest.get(unit, np.inf):
+            yield f"{statement}, larger than {largest[unit]:.2g}"
+        if value < softest.get(unit, -np.inf):
+            yield f"{statement}, under which the loads would move it out of reach"
+        low, high, why = _RANGES.get(unit, (-np.inf, np.inf, ""))
+        if not low <= value <= high:
+            yield f"{statement}: {why}"
+        if unit == "1" and effect in _FACTORS:
+            low, high = _FACTORS[effect]
+            if not low <= value <= high:
+                yield f"{statement}, expected {low:g} to {high:g}"
+    for part in fit.unknowns.small:
+        if part.name != GEOMETRY:
+            continue
+        for k, (kind, unit) in enumerate(zip(KINDS, ("rad", "m"), strict=True)):
+            scale = float(part.std[part.axis // 3 == k].max(initial=0.0))
             most = _MADE[kind] * (size if unit == "m" else 1.0)
-            if size_found > most:
+            if scale > most:
                 yield (
-                    f"geometric errors of {size_found:.2g} {unit} in {kind}, "
+                    f"geometric errors of {scale:.2g} {unit} in {kind}, "
                     f"larger than {most:.2g}"
                 )
 
-    return tuple(f"{one}: {_LIKELY}" for one in wrong())
+
+def _parameters(
+    campaign: Campaign, fit: MachineFit
+) -> Iterator[tuple[str, str, float]]:
+    """Effect, name and value of what was found; a drift as far as it went."""
+    bare = campaign.robot.without_effects()
+    for one in fit.unknowns.effects:
+        if one.device:
+            continue
+        values = one.hypothesis.public(bare, fit.own(one)[0])
+        went = 1.0
+        if "time_constant" in values:
+            span = float(np.ptp(campaign.covariates["time"]))
+            went = 1.0 - float(np.exp(-span / values["time_constant"]))
+        for name, value in values.items():
+            yield one.hypothesis.effect, name, value * (went if "." in name else 1.0)

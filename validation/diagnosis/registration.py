@@ -17,8 +17,10 @@ from assembly.measurement.predict import predict, with_second_order
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.refit import refit
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.unknowns import Acting, Unknowns
 
 _FEWEST_POINTS = 3
 
@@ -51,8 +53,6 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
         BadInput: too few full positions and rotations to find it from, or a session
             without any row.
     """
-    from validation.diagnosis.signatures import conditions_of
-
     own = with_second_order(conditions_of(campaign))
     if campaign.session is None or conditions.session is None:
         for values in _device(campaign, own):
@@ -72,12 +72,12 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
-    """Parameters of the measuring frame, coarse and what is then left."""
-    start = coarse_frame(campaign, own)
-    placed = apply_effects(own, {"registration": start})
-    frame = device_frame(placed)
-    fine = refit(campaign, placed, [frame], frame.start)
-    return [start, dict(fine.effects["registration"])]
+    """Parameters of the measuring frame that fits the declared model best."""
+    start, frame = coarse_frame(campaign, own), device_frame(own)
+    begin = np.array([start[name] for name in BASE])
+    unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
+    fit = fit_machine(campaign, unknowns, np.ones(len(campaign), dtype=bool))
+    return [dict(zip(BASE, fit.x.tolist(), strict=True))]
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:

@@ -13,23 +13,23 @@ from forcefit.page.page import (
 )
 from forcefit.page.tables import Cell, Column, Value, table
 from validation.diagnosis import results
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.figures import (
     confounding_chart,
     covariate_charts,
     error_chart,
-    ladder_chart,
     probability_chart,
+    sequence_chart,
     vector_charts,
 )
 from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.results import LISTED, effects, learned, steps
 from validation.diagnosis.scene import worst_robot
 from validation.diagnosis.sentence import calibration_text, open_text, sentence
-from validation.diagnosis.verdict import Calibration
 
 _ASSUMED = (
-    "Rows kept aside chose and fitted nothing; errors before and after are theirs.",
+    "Held-out rows chose and fitted nothing; errors before and after are theirs.",
     "Readings scatter as their sigma states, unless the noise below says otherwise.",
     "An effect that is none of the library shows as a function learned, or as outside "
     "the library; effects that the design cannot tell apart are named together.",
@@ -75,7 +75,11 @@ def report_page(
     campaign = diagnosis.campaign
     body = [
         section("Before and after", error_chart(diagnosis)),
-        section("What every step bought", ladder_chart(diagnosis), _steps(diagnosis)),
+        section(
+            "Models, and what each reduces",
+            sequence_chart(diagnosis),
+            _steps(diagnosis),
+        ),
         *_robot(diagnosis),
         *_learned(diagnosis),
         *_parameters(diagnosis),
@@ -99,7 +103,7 @@ def report_page(
             good=diagnosis.verdict in {"explained", "learned", "none_needed"},
             tiles=_tiles(diagnosis),
             about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
-            f"{diagnosis.split.how}.",
+            f"{diagnosis.held.words}.",
             body=body,
             assumed=_ASSUMED,
             provenance=provenance,
@@ -117,8 +121,8 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
         if all(v == v for v in values):  # NaN: not measured
             tiles.append(Tile(f"Error of {kind}, rms", [
                 Value(values[0], unit, 3), " to ", Value(values[1], unit, 3),
-            ], ["before and after, on rows kept aside."]))  # fmt: skip
-    names = " + ".join(diagnosis.best_by_score) or "nothing"
+            ], ["before and after, on held-out rows."]))  # fmt: skip
+    names = " + ".join(diagnosis.effects) or "nothing"
     likely = max(diagnosis.probability.values(), default=0.0)
     tiles.append(Tile("Likeliest cause", [names.replace("_", " ")],
                       [f"probability of an effect up to {likely:.3f}."]))  # fmt: skip
@@ -134,14 +138,14 @@ def _robot(diagnosis: Diagnosis) -> list[str]:
 
 
 def _steps(diagnosis: Diagnosis) -> str:
-    """Table of the ladder."""
+    """Table of the model sequence."""
     rows: list[list[Cell]] = [
         [row["term"], f"{row['unknowns']:.0f}",
          Value(row["kept_aside_rms"], row["unit"], 3),
          Value(row["kept_aside_sigma"], "", 3)]
         for row in steps(diagnosis)
     ]  # fmt: skip
-    return table(["step", "unknowns", "rms kept aside", "sigma"], rows, "steps")
+    return table(["model", "unknowns", "rms held out", "sigma"], rows, "steps")
 
 
 def _sets(diagnosis: Diagnosis) -> str:

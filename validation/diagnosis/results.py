@@ -1,22 +1,22 @@
 """A diagnosis for machines, in the public format."""
 
 import math
-from dataclasses import asdict, replace
+from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.effects.registration import BASE
-from assembly.model.robot import Robot
+from assembly.effects import LIBRARY
 from stiffness.screws import SCREW
+from validation.diagnosis.calibration import Calibration
+from validation.diagnosis.claims import parameters_of
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.kept_aside import Errors
-from validation.diagnosis.learned_range import learned_range
+from validation.diagnosis.saving import functions_of, not_measured
 from validation.diagnosis.sentence import formula, sentence
-from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS, with_small
-from validation.diagnosis.teaching import functions_of
-from validation.diagnosis.verdict import Calibration
+from validation.diagnosis.sequence import LEARNED, Errors
+from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS
+from validation.diagnosis.unknowns import Small
 
 LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
@@ -33,35 +33,38 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         Plain values.
     """
     listed = diagnosis.verdict in LISTED
-    held = ~diagnosis.split.fitted
+    ids = np.array(diagnosis.campaign.ids)
     return {
         "campaign": diagnosis.campaign.name,
         "robot": diagnosis.campaign.robot.name,
         "verdict": diagnosis.verdict,
+        "needed": diagnosis.needed,
         "sentence": sentence(diagnosis),
-        "effects": effects(diagnosis) if listed else [],
+        "effects": [*effects(diagnosis), *_unnamed(diagnosis)] if listed else [],
         "alternatives": [
             {"names": list(names), "probability": p}
             for names, p in diagnosis.alternatives
         ],
         "probabilities": diagnosis.probability,
-        "best_by_score": list(diagnosis.best_by_score),
+        "best_by_score": list(diagnosis.effects),
         "error": {
             "unit": {"position": "m", "rotation": "rad"},
             "before": _errors(diagnosis.before),
             "after": _errors(diagnosis.after),
+            "saved": _errors(diagnosis.saved),
             "noise": {
                 "position": diagnosis.noise.position,
                 "rotation": diagnosis.noise.rotation,
             },
-            "without_outliers": {
-                "before": _errors(diagnosis.trimmed[0]),
-                "after": _errors(diagnosis.trimmed[1]),
+            "with_outliers": {
+                "before": _errors(diagnosis.with_outliers[0]),
+                "after": _errors(diagnosis.with_outliers[1]),
             },
         },
-        "noise_factor": dict(
-            zip(KINDS, diagnosis.noise_factor[::3].tolist(), strict=True)
-        ),
+        "noise_scale": {
+            "value": diagnosis.noise_scale[0],
+            "std": diagnosis.noise_scale[1],
+        },
         "noise_in_time": None
         if diagnosis.noise_in_time is None
         else asdict(diagnosis.noise_in_time),
@@ -69,23 +72,23 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "geometry": small(diagnosis, GEOMETRY),
         "springs": small(diagnosis, SPRINGS),
         "learned": learned(diagnosis),
-        "held_out": {"rows": int(held.sum()), "how": diagnosis.split.how},
+        "held_out": {
+            "rows": int(diagnosis.held.rows.sum()),
+            "how": diagnosis.held.how,
+            "words": diagnosis.held.words,
+            "ids": ids[diagnosis.held.rows].tolist(),
+            "uncertainty": diagnosis.uncertainty,
+        },
+        "not_measured": not_measured(diagnosis.campaign),
         "lack_of_fit": {
             "rms": diagnosis.lack.rms,
             "probability": diagnosis.lack.probability,
             "between_repeats": diagnosis.lack.repeats,
         },
         "remarks": list(diagnosis.remarks),
-        "outliers": [
-            i
-            for i, far in zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
-            if far
-        ],
-        "open": [
-            i
-            for i, free in zip(diagnosis.campaign.ids, diagnosis.open, strict=True)
-            if free
-        ],
+        "setup_blunders": [asdict(one) for one in diagnosis.setup],
+        "outliers": ids[diagnosis.outliers].tolist(),
+        "open": ids[diagnosis.open].tolist(),
         "structure": [
             {"against": t.against, "share": t.share, "probability": t.probability}
             for t in diagnosis.trends
@@ -96,14 +99,14 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The ladder in the public format, rms in m or, without positions, in rad."""
+    """The model sequence in the public format, rms in m or, without positions, rad."""
     rows = []
-    for rung in diagnosis.ladder:
-        error = rung.error
+    for step in diagnosis.sequence:
+        error = step.error
         placed = math.isfinite(error.position)
         rows.append({
-            "term": rung.term,
-            "unknowns": rung.unknowns,
+            "term": step.term,
+            "unknowns": step.unknowns,
             "kept_aside_rms": error.position if placed else error.rotation,
             "unit": "m" if placed else "rad",
             "kept_aside_rotation": error.rotation,
@@ -127,118 +130,122 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         unknown its value, standard deviation and the share that the readings say; None
         if the machine is as declared.
     """
-    behind = diagnosis.behind
-    values, stds = behind.values(diagnosis.fit.residual), behind.deviations()
-    unknowns = zip(behind.terms, values, stds, behind.identified(), strict=True)
-    for term, value, std, share in unknowns:
-        if term.name != name:
-            continue
-        frames = diagnosis.campaign.robot.frames
-        known = np.bincount(term.frame, share, minlength=len(frames))
-        scale = dict(zip(KINDS, behind.scales[name], strict=True))
-        return {
-            "scale": {kind: size for kind, size in scale.items() if size},
-            "unit": dict(zip(KINDS, _UNITS[name], strict=True)),
-            "unknowns": len(term),
-            "identifiable": float(share.sum()),
-            "frames": [
-                {"frame": f.name, "identifiable": float(known[i])}
-                for i, f in enumerate(frames) if known[i] > _HARDLY
-            ],
-            "parameters": [
-                {
-                    "frame": frames[i].name, "component": SCREW[axis].lower(),
-                    "value": float(v), "std": float(s), "identified": float(part),
-                    "unit": _UNITS[name][axis // 3],
-                }
-                for i, axis, v, s, part
-                in zip(term.frame, term.axis, value, std, share, strict=True)
-            ],
-        }  # fmt: skip
-    return None
+    fit = diagnosis.fit
+    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
+    found = [(p, own) for p, own in places if isinstance(p, Small) and p.name == name]
+    if not found:
+        return None
+    ((part, own),) = found
+    share, std = fit.determined[own], np.sqrt(np.diag(fit.covariance)[own])
+    frames = diagnosis.campaign.robot.frames
+    known = np.bincount(part.frame, share, minlength=len(frames))
+    sizes = {
+        kind: float(part.std[part.axis // 3 == k].max())
+        for k, kind in enumerate(KINDS) if np.any(part.axis // 3 == k)
+    }  # fmt: skip
+    return {
+        "scale": sizes,
+        "unit": dict(zip(KINDS, _UNITS[name], strict=True)),
+        "unknowns": len(part),
+        "identifiable": float(share.sum()),
+        "where": [f.name for i, f in enumerate(frames) if known[i] > _HARDLY],
+        "frames": [
+            {"frame": f.name, "identifiable": float(known[i])}
+            for i, f in enumerate(frames) if known[i] > _HARDLY
+        ],
+        "parameters": [
+            {
+                "frame": frames[i].name, "component": SCREW[axis].lower(),
+                "value": float(v), "std": float(s), "identified": float(told),
+                "unit": _UNITS[name][axis // 3],
+            }
+            for i, axis, v, s, told
+            in zip(part.frame, part.axis, fit.x[own], std, share, strict=True)
+        ],
+    }  # fmt: skip
 
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The best set's effects with their parameters, as in the public format."""
+    """Effects of the machine found with their parameters, as in the public format.
+
+    Args:
+        diagnosis: a diagnosis.
+
+    Returns:
+        Of an effect that the robot's file declares, the value is what the saved robot
+        has; what was declared and the difference found are given with it.
+    """
     robot = diagnosis.campaign.robot
-    shown = []
-    for k, h in enumerate(diagnosis.fit.hypotheses):
-        if h.effect not in diagnosis.best_by_score:
-            continue  # a device's frame fitted anyway, or finite motions beside others
-        parameters = diagnosis.fit.parameters(k)
-        acting = {n for name, *_ in parameters for n in (name, name.rpartition(".")[0])}
+    bare, shown = robot.without_effects(), []
+
+    def unit(effect: str, name: str) -> str:
+        return LIBRARY[effect].unit(bare, name)
+
+    for one in diagnosis.fit.unknowns.effects:
+        if one.device:
+            continue
+        name, h = one.hypothesis.effect, one.hypothesis
+        x, C, _ = diagnosis.fit.own(one)
+        parameters = parameters_of(bare, one, x, C)
+        acting = {n for p, *_ in parameters for n in (p, p.rpartition(".")[0])}
+        declared = robot.effects.get(name, {})
+        saved = diagnosis.robot.effects.get(name, {})
         shown.append({
-            "name": h.effect,
-            # frames found rigid or tight have no parameter left
+            "name": name,
+            # frames found rigid or tight have no parameter
             "where": [frame for frame in h.where if frame in acting],
-            "probability": diagnosis.probability.get(h.effect, 0.0),
+            "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
-                {
-                    "name": name,
-                    "value": value,
-                    "std": std,
-                    "interval_90": [value - 1.645 * std, value + 1.645 * std],
-                    "unit": LIBRARY[h.effect].unit(robot, name),
-                }
-                for name, value, std in parameters
+                _parameter(p, (value, std), declared, saved, unit(name, p))
+                for p, value, std in parameters
             ],
         })
     return shown
 
 
-def corrected(diagnosis: Diagnosis) -> Robot:
-    """The declared robot with what was found built in, beside any effects it had."""
-    behind = diagnosis.behind
-    unknowns = behind.values(diagnosis.fit.residual)
-    robot = with_small(diagnosis.campaign.robot, behind.terms, unknowns)
-    merged = {name: dict(values) for name, values in robot.effects.items()}
-    for name, values in diagnosis.fit.effects.items():
-        if name in diagnosis.best_by_score:
-            merged[name] = {**merged.get(name, {}), **values}
-    new = functions_of(diagnosis.campaign, diagnosis.model)
-    functions = (*robot.functions, *(f for some in new for f in some))
-    ranges = learned_range(diagnosis.campaign, ~diagnosis.outliers)
-    robot = replace(
-        robot, effects=merged, functions=functions,
-        learned_range={**robot.learned_range, **ranges},
-    )  # fmt: skip
-    unknown = diagnosis.campaign.registration == "unknown"
-    return _registered(diagnosis, robot) if unknown else robot
+_NAMES = {GEOMETRY: "geometric_errors", SPRINGS: "springs"}
 
 
-def _registered(diagnosis: Diagnosis, robot: Robot) -> Robot:
-    """The robot with the measuring frame as it was found, in each session its own."""
-    fitted = {"registration": diagnosis.fit.effects.get("registration", {})}
-    base = apply_effects(diagnosis.model.conditions, fitted).base
-    base = np.broadcast_to(base, (len(diagnosis.campaign), 6))
-    tool = {
-        k: v for k, v in robot.effects.get("registration", {}).items() if k not in BASE
-    }
+def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Geometric errors and springs, where no effect of the library is named."""
+    if diagnosis.effects or diagnosis.fit.unknowns.functions:
+        return []
+    found = [(name, small(diagnosis, name)) for name in (GEOMETRY, SPRINGS)]
+    return [
+        {
+            "name": _NAMES[name], "where": one["where"], "probability": 1.0,
+            "combinations": one["identifiable"], "parameters": [],
+        }
+        for name, one in found if one is not None
+    ]  # fmt: skip
 
-    def placed(row: int) -> dict[str, float]:
-        return dict(zip(BASE, base[row].tolist(), strict=True))
 
-    if diagnosis.campaign.session is None:
-        effects = {**robot.effects, "registration": {**tool, **placed(0)}}
-        return replace(robot, effects=effects)
-    effects = {k: v for k, v in robot.effects.items() if k != "registration"}
-    if tool:
-        effects["registration"] = tool
-    sessions = dict(robot.session_effects)
-    for session in diagnosis.campaign.sessions:
-        row = int(np.flatnonzero(diagnosis.campaign.session == session)[0])
-        own = {**sessions.get(session, {}), "registration": placed(row)}
-        sessions[session] = own
-    return replace(robot, effects=effects, session_effects=sessions)
+def _parameter(
+    name: str, found: tuple[float, float], declared: Mapping[str, float],
+    saved: Mapping[str, float], unit: str,
+) -> dict[str, Any]:  # fmt: skip
+    """A parameter: the machine's value, and what was declared of it."""
+    difference, std = found
+    value = saved.get(name, difference)
+    one = {
+        "name": name, "value": value, "std": std,
+        "interval_90": [value - 1.645 * std, value + 1.645 * std], "unit": unit,
+    }  # fmt: skip
+    if name in declared:
+        one["found"] = {
+            "declared": declared[name], "difference": difference, "corrected": value,
+        }  # fmt: skip
+    return one
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """What was learned, in the public format: a function of a robot file each."""
-    rungs = [r.error for r in diagnosis.ladder if r.term == "learned effects"]
-    first = next(r.error for r in diagnosis.ladder if r.term == "library effects")
+    places = [k for k, s in enumerate(diagnosis.sequence) if s.term == LEARNED]
     shown = []
-    for k, functions in enumerate(functions_of(diagnosis.campaign, diagnosis.model)):
-        same = diagnosis.model.learned[k].equivalent
+    for k, functions in enumerate(functions_of(diagnosis)):
+        # in folds fewer functions may have been found
+        at = places[min(k, len(places) - 1)] if places else len(diagnosis.sequence) - 1
+        before, after = (diagnosis.sequence[max(i, 0)].error for i in (at - 1, at))
         for function in functions:
             shown.append({
                 "where": function.where,
@@ -251,11 +258,11 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "std": dict(function.std),
                 "equivalent_places": [
                     [{"where": p.where, "components": list(p.components),
-                      "variables": [p.variable]} for p in parts]
-                    for parts in same
+                      "variables": list(p.variables)} for p in parts]
+                    for parts in diagnosis.traced.selected.functions[k].equivalent
                 ],
-                "before": _errors([first, *rungs][k]),
-                "after": _errors(rungs[k]),
+                "before": _errors(before),
+                "after": _errors(after),
             })  # fmt: skip
     return shown
 

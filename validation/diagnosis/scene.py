@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from assembly.effects import apply_effects
 from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.measurement.predict import assemble_row
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.signatures import conditions_of
 
 
 def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
@@ -23,7 +23,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
         The row and what of it is largest, ``"position"``, or ``"rotation"`` where no
         position was measured; -1 and an empty text without such a row.
     """
-    aside = ~diagnosis.split.fitted & ~diagnosis.outliers
+    aside = diagnosis.held.rows & ~diagnosis.outliers
     for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
         components = diagnosis.residual_before[:, part]
         known = aside & np.isfinite(components).any(axis=1)
@@ -34,7 +34,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """The robot at a row under its load, with the library's effects of the best set.
+    """The machine found, at a row under its load.
 
     Args:
         diagnosis: the diagnosis.
@@ -43,10 +43,9 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
     Returns:
         The assembly by small screws, None where there is none.
     """
-    model = diagnosis.model
-    conditions = replace(model.conditions, exact=False)
+    campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
-        forced = assemble_row(apply_effects(conditions, model.fit.effects), row)
+        forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
     except (CannotAssemble, FreeMotion, SolverFailed):
         return None
     return forced if isinstance(forced, Assembly) else None
@@ -65,12 +64,11 @@ def worst_robot(diagnosis: Diagnosis) -> str:
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:
         return ""
-    effects = ", ".join(diagnosis.model.fit.effects).replace("_", " ") or "none"
+    effects = ", ".join(diagnosis.effects).replace("_", " ") or "none"
     return robot_scene(
         forced, None, None,
-        f"Row {diagnosis.campaign.ids[row]}, kept aside, where the declared model errs "
-        f"most in {name}. Grey: nominal. Coloured: assembled under the row's load with "
-        f"the library's effects of the best set ({effects}); geometric errors fitted "
-        "beside them and learned functions are not drawn. Red: elastic links; blue: "
-        "rigid bodies; orange: driven joints.",
+        f"Row {diagnosis.campaign.ids[row]}, held out, where the declared model errs "
+        f"most in {name}. Grey: nominal. Coloured: the machine found, assembled under "
+        f"the row's load (effects: {effects}). Red: elastic links; blue: rigid bodies; "
+        "orange: driven joints.",
     )  # fmt: skip

@@ -6,62 +6,68 @@ from numpy.typing import NDArray
 
 from assembly.effects.functions import columns_of, parameters_of
 from assembly.model.function import Function
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.saving import functions_of
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.teaching import functions_of
-from validation.diagnosis.verdict import Calibration
+from validation.diagnosis.verdict import NOT_ENOUGH
 
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 
 def sentence(diagnosis: Diagnosis) -> str:
     """What may be said, and no more."""
-    where = _judged_on(diagnosis)
+    where, after = _judged_on(diagnosis), diagnosis.after
+    unsure = ""
+    if math.isfinite(diagnosis.uncertainty):
+        unsure = f" +- {diagnosis.uncertainty:.2f}"
     kept = f"on {where} the residual is {diagnosis.before.normalised:.2f} sigma before"
+    both = f"{kept}, {after.normalised:.2f}{unsure} after (1 is noise)"
+    if diagnosis.setup:
+        return "The campaign is set up wrongly: " + "; ".join(
+            one.sentence for one in diagnosis.setup
+        )
+    small_ones = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
     if diagnosis.verdict == "none_needed":
         return (
             "The declared model is enough: the residual is noise as far as this design "
             f"can tell ({diagnosis.before.normalised:.2f} sigma on {where})."
         )
     if diagnosis.verdict == "explained":
-        small_ones = [WORDS[term.name] for term in diagnosis.behind.terms]
         names = " and ".join([*diagnosis.claimed, *small_ones])
-        return (
-            f"The declared model lacks {names}; {kept}, "
-            f"{diagnosis.after.normalised:.2f} after (1 is noise)."
-        )
+        return f"The declared model lacks {names}; {both}."
     if diagnosis.verdict == "learned":
         names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
-        return (
-            f"The library lacks what was learned: {names}; {kept}, "
-            f"{diagnosis.after.normalised:.2f} after (1 is noise)."
-        )
+        return f"The library lacks what was learned: {names}; {both}."
     if diagnosis.verdict == "ambiguous":
         sets = " or ".join(
             " + ".join(names) or "nothing" for names, _ in diagnosis.alternatives[:4]
         )
         return f"This design cannot tell which effect it is: {sets}; {kept}."
-    seen = (
-        ", ".join(t.against for t in diagnosis.trends[:3])
-        or "nothing that was recorded"
-    )
+    if diagnosis.verdict == NOT_ENOUGH:
+        return f"These rows are too few to tell a cause from chance; {both}."
+    seen = ", ".join(t.against for t in diagnosis.trends[:3])
+    varies = f", which vary with {seen}" if seen else ""
     return (
-        "No effect of the library explains the residual: at best "
-        f"{diagnosis.lack.rms:.2f} sigma are left, which vary with {seen}; {kept}, "
-        f"{diagnosis.after.normalised:.2f} with what was found."
+        "No effect of the library explains the residual: of the fitted rows "
+        f"{diagnosis.lack.rms:.2f} sigma stay{varies}; {both}."
     )
 
 
 def titles(diagnosis: Diagnosis) -> list[str]:
     """Where every learned function acts, and of what."""
-    every = functions_of(diagnosis.campaign, diagnosis.model)
+    every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
 
 
 def _judged_on(diagnosis: Diagnosis) -> str:
     """Which rows the errors before and after are of."""
-    aside = ~diagnosis.split.fitted
-    return "rows kept aside" if aside.any() else "the rows fitted, too few to spare any"
+    words = {
+        "split": "held-out rows",
+        "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
+        "none": "the rows fitted, too few to hold any out",
+    }
+    return words[diagnosis.held.how]
 
 
 def calibration_text(tally: Calibration) -> str:
@@ -78,11 +84,16 @@ def calibration_text(tally: Calibration) -> str:
     )
 
 
-def noise_text(factor: NDArray) -> str:
-    """That repeats were believed rather than the sigma stated."""
-    parts = {"rotations": factor[0], "positions": factor[3]}
-    words = " and ".join(f"{v:.2g} times ({k})" for k, v in parts.items() if v > 1)
-    return f"repeats scatter more than the sigma stated, which was taken {words}"
+def noise_text(diagnosis: Diagnosis) -> str:
+    """That readings scatter more than stated, and what that may be."""
+    tau, std = diagnosis.noise_scale
+    text = f"readings scatter {tau:.2f} +- {std:.2f} times the sigma stated"
+    if diagnosis.lack.sigma_too_small:
+        text += (
+            f", repeats {diagnosis.lack.repeats:.2f} times: not repeatable; sigma is "
+            "too small, or there is memory, a change in time, or something not recorded"
+        )
+    return text
 
 
 def open_text(open_: NDArray) -> str:

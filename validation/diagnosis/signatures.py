@@ -11,6 +11,7 @@ o       ``offset``     (N,)       change of the model that no unknown scales
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,6 @@ class Tangents:
         campaign: of R rows, N measured cells.
         conditions: as declared, with the registration if that was fitted.
         declared: (N,) what they predict, whitened.
-        residual: (N,) whitened readings minus that.
     """
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
@@ -116,8 +116,12 @@ class Tangents:
         self.campaign, self.conditions = campaign, conditions
         prediction = predict(conditions)
         self.declared = whiten(campaign, prediction.deviation)
-        self.residual = whiten(campaign, campaign.measured) - self.declared
         self._columns: dict[object, NDArray] = {}
+
+    @cached_property
+    def residual(self) -> NDArray:
+        """(N,) whitened readings minus what is declared; nothing else reads them."""
+        return whiten(self.campaign, self.campaign.measured) - self.declared
 
     def model(self, effects: Mapping[str, Values]) -> NDArray:
         """What is read with effects, to first order in clearances.

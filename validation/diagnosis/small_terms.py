@@ -20,7 +20,7 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.responses import Responses
 from validation.diagnosis.signatures import UNSEEN
 
-GEOMETRY, SPRINGS = "geometry", "springs"
+GEOMETRY, SPRINGS = SMALL = ("geometry", "springs")
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
 LARGEST_SHIFT = 0.1  # of the robot's size, likewise
@@ -182,30 +182,38 @@ def screws_of(
     return errors
 
 
-def with_small(
-    robot: Robot, terms: Sequence[SmallTerm], values: Sequence[NDArray]
-) -> Robot:
-    """A robot with the values of small terms built in.
+def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
+    """A robot whose geometric errors are larger by x (k,) [rad, m] at frames and axes.
 
     Args:
-        robot: as declared.
-        terms: of its campaign; others than geometry and springs are passed over.
-        values: (k,) of each term.
+        robot: any.
+        frame: (k,) rows of frames.
+        axis: (k,) components of the screw there, 0 to 5.
+        x: (k,) what is added.
 
     Returns:
-        The robot, its geometric errors larger by the one and its joints softer, in
-        series with what is declared, by the other.
+        The robot.
+    """
+    errors = robot.errors.copy()
+    np.add.at(errors, (frame, axis), x)
+    return robot.with_errors(errors)
+
+
+def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
+    """A robot with compliances x (k,) in series with its joints; 0 changes nothing.
+
+    Args:
+        robot: any.
+        frame: (k,) rows of frames.
+        axis: (k,) components of the screw there, 0 to 5.
+        x: (k,) [rad/(N m), m/N].
+
+    Returns:
+        The robot.
     """
     frames = list(robot.frames)
-    for term, x in zip(terms, values, strict=True):
-        if term.name not in {GEOMETRY, SPRINGS}:
-            continue
-        for i, axis, value in zip(term.frame, term.axis, x, strict=True):
-            frame = frames[i]
-            if term.name == GEOMETRY:
-                error = frame.geometric_error + value * np.eye(6)[axis]
-                frames[i] = replace(frame, geometric_error=error)
-            elif value > 0.0:
-                K = in_series(frame.resistance, int(axis), float(value))
-                frames[i] = replace(frame, joint_stiffness=K)
+    for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):
+        if c > 0.0:
+            K = in_series(frames[i].resistance, a, c)
+            frames[i] = replace(frames[i], joint_stiffness=K)
     return replace(robot, frames=tuple(frames))

@@ -3,11 +3,11 @@
 import math
 from typing import Any
 
-import numpy as np
-
+from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.next_measurement import NextMeasurement, load_text
 from validation.diagnosis.results import LISTED, effects, learned, small, steps
+from validation.diagnosis.saving import not_measured
 from validation.diagnosis.sentence import (
     WORDS,
     calibration_text,
@@ -16,7 +16,6 @@ from validation.diagnosis.sentence import (
     sentence,
 )
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.verdict import Calibration
 
 
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
@@ -30,9 +29,14 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     for names, p in diagnosis.alternatives:
         lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
     lines += ["", *_errors_text(diagnosis)]
-    lines += ["", *_ladder_text(diagnosis), *diagnosis.remarks]
-    if np.any(diagnosis.noise_factor > 1):
-        lines += ["", noise_text(diagnosis.noise_factor)]
+    lines += ["", *_sequence_text(diagnosis), *diagnosis.remarks]
+    if diagnosis.needed:
+        lines += ["", f"what would decide: {diagnosis.needed}"]
+    missing = not_measured(diagnosis.campaign)
+    if missing:
+        lines += ["", f"not measured: {', '.join(missing)}"]
+    if diagnosis.more_scatter:
+        lines += ["", noise_text(diagnosis)]
     if diagnosis.noise_in_time is not None:
         noise = diagnosis.noise_in_time
         lines += [
@@ -61,9 +65,12 @@ def _effects_text(diagnosis: Diagnosis) -> list[str]:
     for effect in effects(diagnosis) if diagnosis.verdict in LISTED else []:
         lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
         for p in effect["parameters"]:
-            lines.append(
-                f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
-            )
+            line = f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
+            if "found" in p:
+                line += " (declared {declared:.6g}, found {difference:+.6g})".format(
+                    **p["found"]
+                )
+            lines.append(line)
     return lines
 
 
@@ -81,10 +88,12 @@ def _learned_text(diagnosis: Diagnosis) -> list[str]:
 
 
 def _errors_text(diagnosis: Diagnosis) -> list[str]:
-    """A table of the errors before and after."""
-    aside = "rows kept aside" if (~diagnosis.split.fitted).any() else "rows fitted"
-    lines = [f"{aside:<20}{'before':>12}{'after':>12}{'noise':>12}"]
-    columns = diagnosis.before, diagnosis.after, diagnosis.noise
+    """A table of the errors before and after, and of the saved robot."""
+    lines = [
+        f"errors on {diagnosis.held.words}; saved: on all rows",
+        f"{'':<20}{'before':>12}{'after':>12}{'noise':>12}{'saved':>12}",
+    ]
+    columns = diagnosis.before, diagnosis.after, diagnosis.noise, diagnosis.saved
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
         row = [getattr(errors, name) for errors in columns]
         if name == "normalised":
@@ -93,9 +102,9 @@ def _errors_text(diagnosis: Diagnosis) -> list[str]:
             f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
         )
         lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    if (diagnosis.outliers & ~diagnosis.split.fitted).any():
-        cut = [f"{errors.normalised:>12.3g}" for errors in diagnosis.trimmed]
-        lines.append(f"{'without outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
+    if (diagnosis.outliers & diagnosis.held.rows).any():
+        cut = [f"{errors.normalised:>12.3g}" for errors in diagnosis.with_outliers]
+        lines.append(f"{'with outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
     return lines
 
 
@@ -124,18 +133,17 @@ def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
     ]
 
 
-def _ladder_text(diagnosis: Diagnosis) -> list[str]:
-    """What every step bought, on the rows kept aside."""
+def _sequence_text(diagnosis: Diagnosis) -> list[str]:
+    """The model sequence, judged on the held-out rows."""
     rows = steps(diagnosis)
     unit = rows[-1]["unit"]
-    head = f"{'step':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'bought':>10}"
-    lines = [head]
+    lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
     last = math.nan
     for row in rows:
         rms, sigma = row["kept_aside_rms"], row["kept_aside_sigma"]
-        bought = f"{last - rms:>10.3g}" if math.isfinite(last) else f"{'':>10}"
+        reduced = f"{last - rms:>11.3g}" if math.isfinite(last) else f"{'':>11}"
         lines.append(
-            f"{row['term']:<20}{row['unknowns']:>10.0f}{rms:>12.3g}{sigma:>10.3g}{bought}"
+            f"{row['term']:<20}{row['unknowns']:>10.0f}{rms:>12.3g}{sigma:>10.3g}{reduced}"
         )
         last = rms
     return lines

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from forcefit.inputs.errors import BadInput, one_line
-from validation.exchange.device_table import LARGEST, Reading
+from validation.exchange.orientation import from_quaternion
+from validation.exchange.reading import LARGEST, Reading
 
 _MESSAGES = {
     "geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped",
@@ -26,14 +27,15 @@ def is_bag(path: Path | str) -> bool:
     return path.suffix.lower() == ".bag" or os.path.isfile(path / "metadata.yaml")
 
 
-def read_bag(path: Path | str) -> list[Reading]:
+def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
     """Readings of all points, poses and transforms in a bag.
 
     Args:
         path: a rosbag2 folder or a ROS 1 bag.
+        oriented: whether orientations are read; otherwise they are passed over.
 
     Returns:
-        The readings in the order recorded; turns are passed over.
+        The readings in the order recorded.
 
     Raises:
         BadInput: ``rosbags`` is not installed, the bag cannot be read, or it has no
@@ -55,9 +57,12 @@ def read_bag(path: Path | str) -> list[Reading]:
             for number, (link, _, raw) in enumerate(bag.messages(wanted), 1):
                 message = bag.deserialize(raw, link.msgtype)
                 topic = [part for part in link.topic.split("/") if part]
-                for frame, header, place in _places(message):
+                for frame, header, place, turn in _places(message):
                     names = tuple(dict.fromkeys([*topic, frame]))
-                    readings.append(_reading(str(path), number, names, header, place))
+                    turn = turn if oriented else None
+                    readings.append(
+                        _reading(str(path), number, names, header, place, turn)
+                    )
     except BadInput:
         raise
     except Exception as error:  # any error of a third-party reader
@@ -69,25 +74,32 @@ def read_bag(path: Path | str) -> list[Reading]:
     return readings
 
 
-def _places(message: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Frame, header and position of a message's points."""
+def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
+    """Frame, header, position and quaternion (or None) of a message's points."""
     for one in getattr(message, "transforms", [message]):
         if hasattr(one, "transform"):
-            yield one.child_frame_id, one.header, one.transform.translation
+            T = one.transform
+            yield one.child_frame_id, one.header, T.translation, T.rotation
+        elif hasattr(one, "pose"):
+            frame, pose = one.header.frame_id, one.pose
+            yield frame, one.header, pose.position, pose.orientation
         else:
-            pose = getattr(one, "pose", None)
-            place = one.point if pose is None else pose.position
-            yield one.header.frame_id, one.header, place
+            yield one.header.frame_id, one.header, one.point, None
 
 
 def _reading(
-    path: str, number: int, names: tuple[str, ...], header: Any, place: Any
+    path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
     """One point of a bag; ``line`` is the message's number."""
     position = np.array([place.x, place.y, place.z], dtype=float)
-    if not (np.abs(position) <= LARGEST).all():
+    if np.isnan(position).any():
+        position[:] = np.nan  # the device saw nothing
+    elif not (np.abs(position) <= LARGEST).all():
         raise BadInput(
             f"{path}: message {number}: found {position.tolist()}, expected a place [m]"
         )
     time = header.stamp.sec + 1e-9 * header.stamp.nanosec
-    return Reading(path, number, names, position, np.full(3, np.nan), time)
+    rotation, where = None, f"{path}: message {number}"
+    if turn is not None and any((turn.w, turn.x, turn.y, turn.z)):
+        rotation = from_quaternion(where, [turn.w, turn.x, turn.y, turn.z])
+    return Reading(path, number, names, position, np.full(3, np.nan), time, rotation)

@@ -1,7 +1,8 @@
 """The commands of an import: what the machine was told, row by row."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,13 @@ from assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput, describe, nearest, quoted
 from validation.campaign.campaign import LOAD
 from validation.campaign.dialect import UNITS, parse_number
-from validation.exchange.device_table import Writing, cells_of, parse_time
+from validation.exchange.cells import read_sheet
+from validation.exchange.clock import parse_time
+from validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-_FACTORS = {unit: f for units in UNITS.values() for unit, f in units.items()}
+_TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}  # of a deviation
+_INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +47,8 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
     Args:
         path: a table with ``id``, ``q.<frame>`` or ``pose.*``, and ``time``,
             ``load.*``, ``cov.*`` where there are any; in SI, or with a unit such as
-            ``[deg]``.
+            ``[deg]``.  Covariates other than time and temperature are taken as they
+            are, whatever their unit.
         robot: that was commanded.
         writing: of numbers and times.
 
@@ -54,9 +59,14 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
         BadInput: an unknown column, a cell that is no number, an id given twice, or a
             configuration that the robot cannot reach.
     """
-    rows = cells_of(path)
+    sheet = read_sheet(path, writing.commands_decimal)
+    writing = replace(writing, decimal=sheet.decimal)
+    rows = sheet.rows
     header = [_UNIT.sub("", cell) for cell in rows[0][1]]
-    factors = [_factor(path, cell) for cell in rows[0][1]]
+    factors = [
+        _factor(path, name, cell, robot)
+        for name, cell in zip(header, rows[0][1], strict=True)
+    ]
     joints = [f"q.{f.name}" for f in robot.frames if f.actuated]
     poses = [f"pose.{name}" for name in POSE]
     known = ["id", "time", *joints, *poses, *(f"load.{name}" for name in LOAD)]
@@ -64,9 +74,12 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
         if name not in known and not (name.startswith("cov.") and len(name) > 4):
             hint = nearest(name, known)
             raise BadInput(f"{path}: line 1: unknown column {quoted(name)}{hint}")
-    if len(set(header)) < len(header) or "id" not in header:
-        raise BadInput(f'{path}: line 1: expected names that differ, "id" among them')
-    ids: list[str] = []
+    twice = [name for name in header if header.count(name) > 1]
+    if twice:
+        raise BadInput(f"{path}: line 1: column {quoted(twice[0])} is there twice")
+    if "id" not in header:
+        raise BadInput(f'{path}: line 1: missing column "id"')
+    ids: dict[str, int] = {}  # the line of each label
     times = np.full(len(rows) - 1, np.nan)
     columns = {n: np.empty(len(rows) - 1) for n in header if n not in {"id", "time"}}
     for i, (line, cells) in enumerate(rows[1:]):
@@ -77,29 +90,70 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
         for name, factor, cell in zip(header, factors, cells, strict=True):
             place = f"{path}: line {line}, {name}"
             if name == "id":
-                if not cell or cell in ids:
-                    raise BadInput(f"{place}: found {describe(cell)}, expected a label")
-                ids.append(cell)
+                _check_label(place, cell, ids)
+                ids[cell] = line
             elif name == "time":
-                times[i] = parse_time(place, cell, writing)
+                times[i] = factor * parse_time(place, cell, writing)
             else:
-                columns[name][i] = parse_number(cell, writing.decimal) * factor
+                columns[name][i] = parse_number(cell, sheet.decimal) * factor
                 if not np.isfinite(columns[name][i]):
-                    given = describe(cell)
-                    raise BadInput(f"{place}: found {given}, expected a number")
+                    given, hint = describe(cell), _decimal_hint(cell, sheet.decimal)
+                    raise BadInput(f"{place}: found {given}, expected a number{hint}")
     if not ids:
         raise BadInput(f"{path}: no rows; expected one a command")
-    postures = _placed(path, robot, ids, columns, joints)
+    postures = _placed(path, robot, [*ids], columns, joints)
     return Commands(str(path), tuple(ids), times, columns, postures)
 
 
-def _factor(path: Path | str, column: str) -> float:
+def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
+    """Refuse a label that is missing or another row's."""
+    if not label:
+        raise BadInput(f"{place}: empty; expected a label")
+    if label in seen:
+        raise BadInput(
+            f"{place}: found {quoted(label)}, already the label of line "
+            f"{seen[label]}; expected another"
+        )
+
+
+def _decimal_hint(cell: str, decimal: str) -> str:
+    """What declares the decimal mark of a cell that is a number with the other."""
+    other = "," if decimal == "." else "."
+    if not np.isfinite(parse_number(cell, other)):
+        return ""
+    return f'; decimal = {{ commands = "{other}" }} in the targets file declares it'
+
+
+def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
     """What a number of a column is times in SI."""
     stated = _UNIT.search(column)
-    if stated and stated[1] not in _FACTORS:
-        hint = nearest(stated[1], _FACTORS)
-        raise BadInput(f"{path}: line 1: found the unit {quoted(stated[1])}{hint}")
-    return _FACTORS[stated[1]] if stated else 1.0
+    if not stated:
+        return 1.0
+    units = _units(name, robot)
+    if units is None:
+        return 1.0
+    if stated[1] not in units:
+        hint = nearest(stated[1], units) or f"; expected {', '.join(units)}"
+        found = f"{quoted(name)}: found the unit {quoted(stated[1])}"
+        raise BadInput(f"{path}: line 1, {found}{hint}")
+    return units[stated[1]]
+
+
+def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
+    """Units that a column may have, with their factors; None where any."""
+    lengths = UNITS["command_position"] | _INCHES
+    if name in {"time", "cov.time"}:
+        return UNITS["time"]
+    if name == "cov.temperature":
+        return _TEMPERATURES
+    if name.startswith("load."):
+        return UNITS["moment" if name[5] == "m" else "force"]
+    if name.startswith("pose."):
+        return UNITS["command_rotation"] if name[5] == "r" else lengths
+    if name.startswith("q.") and name[2:] in {f.name for f in robot.frames}:
+        turns = robot.frame(name[2:]).joint == "revolute"
+        return UNITS["command_rotation"] if turns else lengths
+    return None
 
 
 def _placed(

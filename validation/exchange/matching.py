@@ -8,7 +8,7 @@ import numpy as np
 
 from forcefit.inputs.errors import BadInput, describe, quoted
 from validation.exchange.commands_table import Commands
-from validation.exchange.device_table import Reading
+from validation.exchange.reading import Reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +21,19 @@ class Match:
             a target read again at a command makes a further row.
         strangers: readings of no target, as of points on the ground.
         unmatched: readings of targets that belong to no command.
+        missing: readings at which the device saw nothing.
+        duplicates: readings that a file has twice, to the last digit; left out.
+        copies: readings that another file has too, to the last digit; kept, as a
+            device of few digits repeats them.
     """
 
     how: str
     rows: list[tuple[int, dict[str, Reading]]]
     strangers: list[Reading]
     unmatched: list[Reading]
+    missing: list[Reading]
+    duplicates: list[Reading]
+    copies: list[Reading]
 
 
 def match(
@@ -65,11 +72,22 @@ def match(
     else:
         how, at = "order", _in_order(ours, commands)
     table: dict[tuple[int, int], dict[str, Reading]] = {}
-    again: Counter[tuple[int, str]] = Counter()
+    seen: dict[tuple[int, str], list[Reading]] = {}
+    missing, duplicates, copies = [], [], []
     for (reading, target), command in zip(ours, at, strict=True):
-        if command >= 0:
-            table.setdefault((command, again[command, target]), {})[target] = reading
-            again[command, target] += 1
+        if command < 0:
+            continue
+        before = seen.setdefault((command, target), [])
+        if np.isnan(reading.position).any():
+            missing.append(reading)
+        elif any(_same(reading, o) and reading.file == o.file for o in before):
+            duplicates.append(reading)
+        else:
+            copies += [reading] if any(_same(reading, o) for o in before) else []
+            table.setdefault((command, len(before)), {})[target] = reading
+            before.append(reading)
+    if not table and missing:
+        raise BadInput(f"{missing[0].place}: found no coordinates, nor in any reading")
     if not table:
         raise BadInput(
             f"{ours[0][0].place}: found no command within {window:g} s of any reading; "
@@ -77,7 +95,24 @@ def match(
         )
     rows = [(command, table[command, k]) for command, k in sorted(table)]
     unmatched = [r for (r, _), command in zip(ours, at, strict=True) if command < 0]
-    return Match(how, rows, strangers, unmatched)
+    return Match(how, rows, strangers, unmatched, missing, duplicates, copies)
+
+
+def _repeated(readings: Sequence[Reading]) -> str:
+    """Which reading is there twice, if that is why they are too many."""
+    seen: dict[object, Reading] = {}
+    for reading in readings:
+        digits = (reading.names, reading.position.tobytes(), str(reading.time))
+        other = seen.setdefault(digits, reading)
+        if other is not reading:
+            return f"; line {reading.line} repeats line {other.line}"
+    return ""
+
+
+def _same(a: Reading, b: Reading) -> bool:
+    """Whether two readings are equal to the last digit, of one name and time."""
+    timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
+    return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
 
 def _of_targets(
@@ -122,6 +157,7 @@ def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
                 f"{len(commands.ids)} commands; expected the id of the command in "
                 "their names, times in both tables, or as many readings as commands "
                 f"(names such as {describe('::'.join(first.names))})"
+                f"{_repeated([r for r, t in ours if t == target])}"
             )
     at, seen = [], Counter[str]()
     for target in named:

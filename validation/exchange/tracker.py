@@ -1,6 +1,5 @@
 """``forcefit validation import``: a tracker's files and the commands, as a campaign."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,24 +8,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.errors import BadInput, quoted
+from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
 from validation.exchange.bag import is_bag, read_bag
-from validation.exchange.commands_table import Commands, read_commands
-from validation.exchange.device_frame import (
-    DeviceFrame,
-    exchanged_here,
-    exchanged_throughout,
-    is_gross,
-    robust_frame,
-    spans_a_plane,
+from validation.exchange.campaign_text import (
+    cell,
+    columns_of,
+    declaration,
+    labels_of,
+    spreads,
 )
-from validation.exchange.device_table import Reading, read_device_table
+from validation.exchange.commands_table import Commands, read_commands
+from validation.exchange.device_frame import DeviceFrame
+from validation.exchange.device_table import read_device_table
 from validation.exchange.matching import Match, match
+from validation.exchange.placing import Placed, place
+from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile, read_targets
 
 _MOST_LEFT_OUT = 0.2  # of all readings; more means that something else is wrong
-_HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +43,9 @@ class Import:
         scatter: [m] of one component about the declared robot.
         readings: taken over.
         left_out: readings that were not, with the reason, in words.
+        mounts: (3,) [rad] rotation vector from the platform's axes to those of each
+            target whose orientation was read.
+        remarks: what else does not fit, in words.
     """
 
     robot: str
@@ -54,6 +57,8 @@ class Import:
     scatter: float
     readings: int
     left_out: tuple[str, ...]
+    mounts: Mapping[str, NDArray]
+    remarks: tuple[str, ...]
 
     def table(self) -> dict[str, Any]:
         """Plain values for ``--json``."""
@@ -68,6 +73,8 @@ class Import:
             },
             "scatter": self.scatter,
             "left_out": list(self.left_out),
+            "mounts": {name: turn.tolist() for name, turn in self.mounts.items()},
+            "remarks": list(self.remarks),
         }
 
     def text(self) -> str:
@@ -77,7 +84,12 @@ class Import:
             f"to commands by {self.how}",
             f"scatter about the declared robot {1e6 * self.scatter:.4g} um",
         ]
-        return "\n".join(lines + [f"left out: {line}" for line in self.left_out])
+        lines += [
+            f"axes of {name} on the platform: {np.round(turn, 7).tolist()} rad"
+            for name, turn in self.mounts.items()
+        ]
+        lines += [f"left out: {line}" for line in self.left_out]
+        return "\n".join(lines + [f"remark: {line}" for line in self.remarks])
 
 
 def import_readings(
@@ -96,17 +108,15 @@ def import_readings(
         What was written.
 
     Raises:
-        BadInput: a file breaks a rule, targets are exchanged throughout, or too many
-            readings would be left out; nothing is written then.
+        BadInput: a file breaks a rule, the readings fit far better in another unit,
+            mirrored or with targets exchanged, or too many would be left out; nothing
+            is written then.
     """
     folder = Path(folder)
     check_new_folder(folder)
     declared = read_targets(targets)
     commands_read = read_commands(commands, declared.robot, declared.writing)
-    readings: list[Reading] = []
-    for file in files:
-        writing = declared.writing
-        readings += read_bag(file) if is_bag(file) else read_device_table(file, writing)
+    readings = [reading for file in files for reading in _read(file, declared)]
     if not readings:
         raise BadInput(f"{files[0]}: found no readings, expected at least one")
     joined = match(readings, commands_read, declared.places, declared.window)
@@ -118,183 +128,77 @@ def import_readings(
     return imported
 
 
-def _nominal(declared: TargetsFile, commands: Commands, command: int, target: str
-             ) -> NDArray:  # fmt: skip
-    """(3,) [m] where a target should stand, base axes."""
-    T = commands.postures[command].platform
-    return np.asarray(T[:3, :3] @ declared.places[target] + T[:3, 3])
+def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
+    """Readings of a table or a bag."""
+    if is_bag(file):
+        return read_bag(file, declared.writing.oriented)
+    return read_device_table(file, declared.writing, declared.places)
 
 
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """Frame, suspects, and the campaign's two texts."""
+    """The campaign's two texts, and what was left out."""
     names = list(declared.places)
-    measured = np.full((len(joined.rows), len(names), 3), np.nan)
-    nominal = np.empty(measured.shape)
-    for i, (command, readings) in enumerate(joined.rows):
-        for k, name in enumerate(names):
-            nominal[i, k] = _nominal(declared, commands, command, name)
-            if name in readings:
-                measured[i, k] = readings[name].position
-    read = np.isfinite(measured).all(axis=2)
-    frame, scatter = _frame(declared, measured, nominal, names)
-    base = frame.to_base(measured)
+    placed = place(declared, commands, joined.rows)
+    left_out = _left_out(joined, placed, total)
+    kept = np.flatnonzero(placed.read.any(axis=1))
+    rows = [joined.rows[i] for i in kept]
+    turns = placed.turns[kept]
+    columns = columns_of(commands, rows, placed.gaps[kept], turns, placed.frame, names)
+    values = zip(*columns.values(), strict=True)
+    labels = labels_of(commands, rows)
+    spread = spreads(rows, placed.frame, names)[placed.read[kept]]
+    turned = bool(np.isfinite(turns).any())
+    return Import(
+        robot=declared.robot.name,
+        how=joined.how,
+        header=("id", *columns),
+        cells=tuple(
+            (a, *map(cell, row)) for a, row in zip(labels, values, strict=True)
+        ),
+        declaration=declaration(declared, folder, spread, turned),
+        frame=placed.frame,
+        scatter=placed.scatter,
+        readings=int(placed.read.sum()),
+        left_out=tuple(left_out),
+        mounts=placed.mounts,
+        remarks=(*placed.remarks, *_remarks(declared, joined, placed)),
+    )
+
+
+def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
+    """Readings that are not in the campaign, in words; too many are refused."""
     why = {"time": "no command near it in time"}.get(
         joined.how, "no command's id in its name"
     )
     left_out = [f"{reading.place}: {why}" for reading in joined.unmatched]
-    for i, (command, readings) in enumerate(joined.rows):
-        for k, reason in _suspects(base[i], nominal[i], read[i], scatter, names):
-            label, place = commands.ids[command], readings[names[k]].place
-            left_out.append(f"{place}: command {quoted(label)}: {reason}")
-            read[i, k] = False
-    total -= len(joined.strangers)
+    left_out += [f"{r.place}: the same reading twice" for r in joined.duplicates]
+    left_out += placed.left_out
+    total -= len(joined.strangers) + len(joined.missing)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
             f"{left_out[0]}; and {len(left_out) - 1} more of {total} readings, "
             f"expected at most {_MOST_LEFT_OUT:.0%}; are targets, commands, units "
             "right?"
         )
-    if joined.strangers:
-        first, count = joined.strangers[0].place, len(joined.strangers)
-        left_out.append(f"{count} readings of no target, the first: {first}")
-    kept = np.flatnonzero(read.any(axis=1))
-    rows = [joined.rows[i] for i in kept]
-    gaps = np.where(read[..., None], base - nominal, np.nan)[kept]
-    spread = [[_sigma(r.get(n), frame) for n in names] for _, r in rows]
-    columns = _columns(commands, rows, gaps, np.array(spread), names, declared)
-    header = ("id", *columns)
-    values = zip(*columns.values(), strict=True)
-    labels = _labels(commands, rows)
-    cells = tuple((a, *map(_cell, row)) for a, row in zip(labels, values, strict=True))
-    text = _declaration(declared, folder, np.array(spread)[read[kept]])
-    return Import(
-        robot=declared.robot.name,
-        how=joined.how,
-        header=header,
-        cells=cells,
-        declaration=text,
-        frame=frame,
-        scatter=scatter,
-        readings=int(read.sum()),
-        left_out=tuple(left_out),
-    )
+    for readings, what in (
+        (joined.missing, "without coordinates"), (joined.strangers, "of no target"),
+    ):  # fmt: skip
+        if readings:
+            first = readings[0].place
+            left_out.append(f"{len(readings)} readings {what}, the first: {first}")
+    return left_out
 
 
-def _suspects(
-    base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
-) -> list[tuple[int, str]]:
-    """Targets of one command, read where they cannot stand, and why."""
-    suspects = []
-    ks = np.flatnonzero(read)
-    order = exchanged_here(base[ks], nominal[ks], scatter)
-    for place, k in enumerate(ks.tolist()):
-        gap = float(np.linalg.norm(base[k] - nominal[k]))
-        if order is not None and order[place] != place:
-            other = quoted(names[ks[order[place]]])
-            suspects.append((k, f"it is {other}, exchanged"))
-        elif is_gross(gap, scatter):
-            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
-            suspects.append((k, reason))
-    return suspects
-
-
-def _frame(
-    declared: TargetsFile, measured: NDArray, nominal: NDArray, names: list[str]
-) -> tuple[DeviceFrame, float]:
-    """Where the device stood, and the scatter about the declared robot."""
-    read = np.isfinite(measured).all(axis=2)
-    if declared.registration == "known":
-        gaps = np.linalg.norm(measured[read] - nominal[read], axis=1)
-        return _HERE, float(np.median(gaps)) / 1.538 + 1e-12
-    if not spans_a_plane(nominal[read]):
-        raise BadInput(
-            f"{declared.file}: all readings are of points on one line, which cannot "
-            'say where the device stood; expected more, or registration = "known"'
+def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
+    """What a user should know of readings that are in the campaign."""
+    remarks = []
+    if joined.copies:
+        remarks.append(
+            f"{len(joined.copies)} readings are in two files to the last digit, the "
+            f"first: {joined.copies[0].place}"
         )
-    order = exchanged_throughout(
-        [measured[:, k] for k in range(len(names))],
-        [nominal[:, k] for k in range(len(names))],
-    )
-    if order is not None:
-        wrong = [k for k in range(len(names)) if order[k] != k]
-        order_text = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
-        raise BadInput(
-            f"{declared.file}: targets: they fit far better exchanged, in every row: "
-            f"{order_text}"
-        )
-    return robust_frame(measured[read], nominal[read])
-
-
-def _sigma(reading: Reading | None, frame: DeviceFrame) -> NDArray:
-    """(3,) [m] one standard deviation of a reading along the base's axes."""
-    if reading is None:
-        return np.full(3, np.nan)
-    return np.asarray(np.sqrt(frame.rotation**2 @ reading.sigma**2))
-
-
-def _columns(
-    commands: Commands, rows: list[tuple[int, dict[str, Reading]]], gaps: NDArray,
-    sigma: NDArray, names: list[str], declared: TargetsFile,
-) -> dict[str, NDArray]:  # fmt: skip
-    """Columns of the campaign's table, SI."""
-    at = [command for command, _ in rows]
-    columns = {name: values[at] for name, values in commands.columns.items()}
-    times = np.array([
-        np.nanmin([r.time for r in readings.values()] + [np.inf])
-        for _, readings in rows
-    ])
-    if np.isfinite(times).all() and "cov.time" not in columns:
-        columns["cov.time"] = times - times.min()
-    for k, name in enumerate(names):
-        point = f".{name}" if len(names) > 1 else ""
-        for i, axis in enumerate("xyz"):
-            columns[f"meas{point}.t{axis}"] = gaps[:, k, i]
-        if np.isfinite(sigma[:, k]).any():
-            for i, axis in enumerate("xyz"):
-                columns[f"sigma{point}.t{axis}"] = sigma[:, k, i]
-    return columns
-
-
-def _labels(
-    commands: Commands, rows: list[tuple[int, dict[str, Reading]]]
-) -> list[str]:
-    """Ids of the rows: the command's, numbered where it is there again."""
-    seen: dict[int, int] = {}
-    labels = []
-    for command, _ in rows:
-        seen[command] = seen.get(command, 0) + 1
-        again = f".{seen[command]}" if seen[command] > 1 else ""
-        labels.append(commands.ids[command] + again)
-    return labels
-
-
-def _cell(value: float) -> str:
-    """A number with all its digits, nothing where there is none."""
-    return repr(float(value)) if np.isfinite(value) else ""
-
-
-def _declaration(declared: TargetsFile, folder: Path, spread: NDArray) -> str:
-    """Text of ``campaign.toml``."""
-    name = declared.robot_name
-    path = declared.file.parent / name
-    if path.is_file():
-        name = os.path.relpath(path.resolve(), folder.resolve())
-    places: Mapping[str, list[float]] = {
-        k: [float(x) for x in v] for k, v in declared.places.items()
-    }
-    lines = [f'robot = "{name}"', 'measurements = "measurements.csv"',
-             f'registration = "{declared.registration}"']  # fmt: skip
-    if len(places) == 1:
-        lines.append(f"reference_point = {next(iter(places.values()))}")
-    if not np.isfinite(spread).all() and declared.noise is None:
-        raise BadInput(
-            f"{declared.file}: noise: missing; expected one standard deviation [m]: "
-            "not every reading states its own"
-        )
-    if declared.noise is not None:
-        lines += ["[noise]", f"position = {declared.noise!r}"]
-    if len(places) > 1:
-        lines += ["[points]", *(f'"{k}" = {v}' for k, v in places.items())]
-    return "\n".join(lines) + "\n"
+    if declared.writing.oriented and not placed.mounts:
+        remarks.append("noise_rotation is given, but no orientation was found")
+    return remarks

@@ -15,7 +15,7 @@ the pin's axis there, (TX + h RY, TY - h RX), and the cone for (RX, RY) is gone.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from assembly.model.robot import Clearance, Frame
 
@@ -63,6 +63,11 @@ class JointClearance:
 
     cones: tuple[ClearanceCone, ...]
     free: tuple[int, ...]
+
+    def softened(self, factor: float) -> "JointClearance":
+        """The same with the stiffness of its contacts times a factor."""
+        cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
+        return replace(self, cones=tuple(cones))
 
     @property
     def unlocked(self) -> tuple[int, ...]:

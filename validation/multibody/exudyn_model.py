@@ -23,6 +23,7 @@ from validation.multibody.exudyn_parts import Closure, Contact, Elastic, Place
 from validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
+IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] that remains on motions that nothing resists
 HOLDING_STIFFNESS = 1e-2  # [N m/rad, N/m] on free motions while closures are closed
 _CENTRING = 1e3  # [N/m] of clearances; 1e-3 of it in N m/rad, 1e-6 about own axes
 
@@ -36,6 +37,7 @@ class Regularisation:
         idle: [N m/rad, N/m] that remains on motions that nothing resists.
         narrow: [-] last width of the smoothing of contacts, which centres clearances.
         tolerance: [m, rad, -] of Newton's last increment; convergence is quadratic.
+        contact: factor on the stiffness of contacts.
         conservative: springs act by the gradient of their energy, not half-way.
     """
 
@@ -43,6 +45,7 @@ class Regularisation:
     idle: float
     narrow: float = NARROW
     tolerance: float = 1e-10
+    contact: float = 1.0
     conservative: bool = False
 
 
@@ -141,6 +144,7 @@ class Model:
 
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
         """A new body at the place within a clearance; a weak spring centres it."""
+        clearance = clearance.softened(self.regularisation.contact)
         rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
         centring[rows] = _CENTRING * np.where(rows < 3, 1e-3, 1.0)

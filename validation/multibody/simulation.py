@@ -30,7 +30,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
-from validation.multibody.exudyn_model import HOLDING_STIFFNESS, Model, Regularisation
+from validation.multibody.exudyn_model import (
+    HOLDING_STIFFNESS,
+    IDLE_STIFFNESS,
+    Model,
+    Regularisation,
+)
 from validation.multibody.exudyn_parts import Contact, Elastic, MeshBody, OutOfTime
 from validation.multibody.exudyn_parts import SimulationFailed as SimulationFailed
 from validation.multibody.exudyn_reading import (
@@ -56,13 +61,18 @@ LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
 # tried in turn; with contacts closures must not be much softer than these, and a rod
 # between two spherical joints may roll by radians under its weight unless it is held
-_TIGHT = (Regularisation(1e10, 1e-6), Regularisation(1e10, HOLDING_STIFFNESS))
+_TIGHT = (
+    Regularisation(1e10, IDLE_STIFFNESS),
+    Regularisation(1e10, HOLDING_STIFFNESS),
+)
 # a joint without contact is undetermined within its clearance: rounding of forces moves
-# it by 1e-3 m in the first, by 1e-7 m in the second, which is a little smoother
+# it by 1e-3 m in the first, by 1e-7 m in the second, which is a little smoother.  At
+# small scales clearances are of that size too, and softer contacts round forces less
 WITH_CLEARANCES = (
-    Regularisation(1e12, 1e-6),
-    Regularisation(1e9, 1e-6, narrow=5e-4, tolerance=1e-6),
-    Regularisation(1e11, 1e-6),
+    Regularisation(1e12, IDLE_STIFFNESS),
+    Regularisation(1e9, IDLE_STIFFNESS, narrow=5e-4, tolerance=1e-6),
+    Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
+    Regularisation(1e11, IDLE_STIFFNESS),
     Regularisation(1e11, HOLDING_STIFFNESS),
 )
 

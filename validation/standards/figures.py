@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any
 
 import numpy as np
@@ -69,12 +69,17 @@ class StandardFigures:
 
     Attributes:
         campaign: its name.
+        registration: ``"known"`` or ``"unknown"``; AP counts from where the device was
+            taken to stand.
         poses: repeated at least once.
-        distances: between them.
-        axes: ISO 230-2 of each reading approached from both sides, by its name.
+        distances: between two of them that were measured under one load, in one
+            session, at one point, and were approached from one side.
+        axes: ISO 230-2 of each reading approached from both sides, by its name; where
+            loads, sessions or points differ, each apart, with the id of its first row.
     """
 
     campaign: str
+    registration: str
     poses: tuple[PoseFigures, ...]
     distances: tuple[DistanceFigures, ...]
     axes: dict[str, AxisFigures]
@@ -83,6 +88,7 @@ class StandardFigures:
         """Plain values for ``--json``."""
         return {
             "campaign": self.campaign,
+            "registration": self.registration,
             "iso_9283": {
                 "poses": [asdict(pose) for pose in self.poses],
                 "distances": [asdict(pair) for pair in self.distances],
@@ -98,6 +104,8 @@ class StandardFigures:
             values = (pose.accuracy, pose.repeatability, pose.drift)
             shown = "  ".join(_micro(value) for value in values)
             lines.append(f"{pose.label[:16]:16}  {pose.cycles:6}  {shown}")
+        if self.registration == "unknown":
+            lines.append("registration unknown: AP includes where the device stood")
         if self.distances:
             worst = max(self.distances, key=lambda pair: abs(pair.accuracy))
             a, b = worst.labels
@@ -144,6 +152,7 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
         )
     return StandardFigures(
         campaign.name,
+        campaign.registration,
         tuple(_pose(campaign, rows) for rows in sets),
         tuple(_distances(campaign, sets)),
         dict(_axes(campaign)),
@@ -174,13 +183,32 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
     )
 
 
+def _circumstances(campaign: Campaign) -> NDArray:
+    """(R,) number of the load, session and point of each row, from 0 by first use."""
+    names = [
+        np.unique(column, return_inverse=True)[1]
+        for column in (campaign.session, campaign.point)
+        if column is not None
+    ]
+    return number_rows(campaign.loads, *names)
+
+
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
-    """ISO 9283 of distances, cycle by cycle, between poses that differ."""
-    robot, point = campaign.robot, campaign.reference_point
-    T = campaign.transforms[:, robot.index(robot.platform)]
-    nominal = T[:, :3, 3] + T[:, :3, :3] @ point
+    """ISO 9283 of distances, cycle by cycle, between poses that differ.
+
+    The standard's cycles go from one pose to the other under one load: poses of two
+    loads differ by a deflection, poses of two sessions by where the device stood.
+
+    Yields:
+        Figures of each pair.
+    """
+    T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
+    nominal = T[:, :3, 3] + np.einsum("rij,rj->ri", T[:, :3, :3], campaign.targets)
     attained = nominal + campaign.measured[:, 3:]
-    for a, b in list(combinations(sets, 2))[:_MOST_PAIRS]:
+    side = campaign.covariates.get("approach", np.ones(len(campaign)))
+    alike = number_rows(_circumstances(campaign), side)
+    pairs = ((a, b) for a, b in combinations(sets, 2) if alike[a[0]] == alike[b[0]])
+    for a, b in islice(pairs, _MOST_PAIRS):
         commanded = float(np.linalg.norm(nominal[a[0]] - nominal[b[0]]))
         count = min(len(a), len(b))
         first, second = attained[a[:count]], attained[b[:count]]
@@ -192,18 +220,27 @@ def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigu
 
 
 def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
-    """ISO 230-2 of each reading taken at least twice from both sides."""
-    side = campaign.covariates.get("approach")
-    if side is None:
-        return
+    """ISO 230-2 of each reading, load, session and point."""
+    apart = _circumstances(campaign)
     for k, name in enumerate(READING):
-        values = campaign.measured[:, k]
-        forward, backward = [], []
-        for number in range(int(campaign.repeat.max()) + 1):
-            rows = (campaign.repeat == number) & np.isfinite(values)
-            up, down = values[rows & (side > 0)], values[rows & (side < 0)]
-            if len(up) > 1 and len(down) > 1:
-                forward.append(up)
-                backward.append(down)
-        if forward:
-            yield name, axis_figures(forward, backward)
+        for number in range(int(apart.max()) + 1):
+            rows = np.flatnonzero(apart == number)
+            figures = _axis(campaign.take(rows), k)
+            if figures is not None:
+                alone = "" if apart.max() == 0 else f" from {campaign.ids[rows[0]]}"
+                yield name + alone, figures
+
+
+def _axis(campaign: Campaign, k: int) -> AxisFigures | None:
+    """Figures of a reading taken at least twice from both sides; None without."""
+    side, values = campaign.covariates.get("approach"), campaign.measured[:, k]
+    if side is None:
+        return None
+    forward, backward = [], []
+    for number in range(int(campaign.repeat.max()) + 1):
+        rows = (campaign.repeat == number) & np.isfinite(values)
+        up, down = values[rows & (side > 0)], values[rows & (side < 0)]
+        if len(up) > 1 and len(down) > 1:
+            forward.append(up)
+            backward.append(down)
+    return axis_figures(forward, backward) if forward else None

@@ -12,6 +12,10 @@ from assembly.kinematics.verdict import BEYOND_LIMITS, SINGULAR
 from validation.study.study import StudyResults
 
 WORST = "frozen"  # reading of (27): all clearance motions without spring deformation
+_CHECKED = {
+    "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
+}  # fmt: skip
+_OUTCOMES = ("passed", "failed", "not decided")  # of a check that ran
 _NO_CLEARANCE = 1e-6  # [-] of the clearances: less is rounding
 
 
@@ -67,13 +71,29 @@ def verdict(results: StudyResults) -> str:
     return " ".join((*parts, _checks_text(results)))
 
 
+def by_force(results: StudyResults) -> bool:
+    """Whether it goes together, and only by force, whatever its clearances do.
+
+    Args:
+        results: of :func:`validation.study.study.run_study`.
+
+    Returns:
+        False too where it does not go together at all.
+    """
+    if results.solution["status"] != "ok":
+        return False
+    zone = results.solution["zone"]
+    needless = zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE
+    return not (needless or zone["assemblable"] or zone["assemblable_free"])
+
+
 def _assembly_text(results: StudyResults) -> str:
     """Whether clearances suffice, or the energy that is needed."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
-    if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-        return "It goes together without force, and needs no clearance for it"
-    if zone["assemblable"] or zone["assemblable_free"]:
+    if not by_force(results):
+        if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
+            return "It goes together without force, and needs no clearance for it"
         text = "It goes together by its clearances alone"
         return text + (
             "" if zone["assemblable"] else " if its compliant joints turn freely"
@@ -134,15 +154,43 @@ def _pose_text(rotation: float, translation: float) -> str:
     return f"{1e3 * translation:.3g} mm and {1e3 * rotation:.3g} mrad"
 
 
+def covered(results: StudyResults) -> list[str]:
+    """What each independent check that ran says something about, and its outcome.
+
+    Args:
+        results: of :func:`validation.study.study.run_study`.
+
+    Returns:
+        A phrase for each check; checks without a signal are left out.
+    """
+    phrases = []
+    verdicts = results.verdicts
+    if verdicts.get("reference") in _OUTCOMES and results.reference is not None:
+        names = [
+            _CHECKED[name] for name, said in results.reference["checks"].items()
+            if said != "no signal"
+        ]  # fmt: skip
+        phrases.append(
+            f"{', '.join(names)} by the printed problems in cvxpy: "
+            f"{verdicts['reference']}"
+        )
+    if verdicts.get("crosscheck") in _OUTCOMES:
+        phrases.append(
+            "pose without clearances by a multibody simulation: "
+            f"{verdicts['crosscheck']}"
+        )
+    return phrases
+
+
 def _checks_text(results: StudyResults) -> str:
-    """Number and outcome of the independent checks, and those that did not run."""
-    verdicts, missing = results.verdicts, results.unchecked
-    ran = [v for v in verdicts.values() if v in {"passed", "failed", "not decided"}]
+    """What was checked independently, with the outcome, and what was not."""
+    phrases, missing = covered(results), results.unchecked
     text = "No independent check was asked for."
-    if ran:
-        how = "passed" if set(ran) == {"passed"} else "did not all pass"
-        text = f"Independent checks of these numbers: {len(ran)}; they {how}."
-    elif verdicts:
+    if phrases:
+        text = f"Checked independently: {'; '.join(phrases)}."
+        if worst_clearance(results)["pose"] is not None:
+            text += " No independent check covers the certified bounds."
+    elif results.verdicts:
         text = "No independent check of these numbers could be made."
     if missing:
         names = ", ".join(missing)

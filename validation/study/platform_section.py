@@ -4,12 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from assembly.report.platform_stiffness import DIRECTIONS, share_rows
+from assembly.report.platform_stiffness import DIRECTIONS, largest_rows, share_rows
 from forcefit.page.charts import Axis, chart, label
 from forcefit.page.tables import table
 from stiffness.screws import SCREW
-
-_SHOWN = 8  # parts in the table
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
@@ -30,7 +28,7 @@ def platform_section(stiffness: dict[str, Any]) -> str:
     ]
     eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])
     free = len(stiffness["free_motions"])
-    shares = list(share_rows(stiffness["shares"]).items())[:_SHOWN]
+    shares = list(largest_rows(share_rows(stiffness["shares"])).items())
     blame = [
         [name, *(f"{100 * v:.3g}" if np.isfinite(v) else "-" for v in row)]
         for name, row in shares

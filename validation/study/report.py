@@ -13,18 +13,19 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
 from forcefit.page.tables import Value
-from validation.study.headline import verdict, worst_clearance
+from validation.study.headline import by_force, covered, verdict, worst_clearance
+from validation.study.map_section import finite, mapped, maps_section
 from validation.study.platform_section import platform_section
 from validation.study.sections import (
     crosscheck_section,
     governing_section,
-    maps_section,
     reference_section,
     robot_section,
     solution_section,
     stiffness_section,
     unchecked_section,
 )
+from validation.study.service_section import service_section, service_tile
 from validation.study.study import StudyResults, points_solved
 
 _ASSUMED = (
@@ -80,6 +81,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "stiffness": results.stiffness,
         "platform_stiffness": results.platform_stiffness,
         "governing": results.governing,
+        "service": results.service,
     }
     if results.crosscheck is not None:
         table["crosscheck"] = results.crosscheck.table()
@@ -94,15 +96,10 @@ def map_summary(maps: Any) -> dict[str, Any]:
     """Least, median and largest value of each map, and the counts of the statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
-    arrays = {key: maps[key].values for key in ("margin", "margin_free", "energy")}
-    for key in ("rotation_error", "translation_error"):
-        arrays[key] = maps[key].sel(bound="upper").values
-    for key, values in arrays.items():
-        values = values[~np.isnan(values)] if "error" in key else (
-            values[np.isfinite(values)]
-        )  # fmt: skip
+    for one in mapped(maps):
+        values = finite(one)
         if len(values):
-            summary[key] = [values.min(), float(np.median(values)), values.max()]
+            summary[one.key] = [values.min(), float(np.median(values)), values.max()]
     solved = points_solved(maps)
     share = int((maps["margin_free"] <= ASSEMBLABLE).sum()) / solved if solved else None
     return summary | {"share_assemblable_free": share}
@@ -115,10 +112,11 @@ def report_page(results: StudyResults) -> str:
         unchecked_section(results),
         robot_section(results),
         governing_section(results),
-        maps_section(results, map_summary(results.maps))
+        maps_section(results.maps, map_summary(results.maps))
         if results.maps is not None
         else "",
         solution_section(results),
+        service_section(results.service),
         platform_section(results.platform_stiffness),
         reference_section(results),
         stiffness_section(results),
@@ -134,7 +132,7 @@ def report_page(results: StudyResults) -> str:
         Page(
             title=study.title,
             verdict=verdict(results),
-            good=results.passed,
+            good=_good(results),
             tiles=_tiles(results),
             about=about,
             body=body,
@@ -143,6 +141,13 @@ def report_page(results: StudyResults) -> str:
             results=results_table(results),
         )
     )
+
+
+def _good(results: StudyResults) -> bool | None:
+    """Whether it is what one hopes for; neither where force must close it."""
+    if not results.passed:
+        return False
+    return None if by_force(results) else True
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
@@ -159,17 +164,18 @@ def _tiles(results: StudyResults) -> list[Tile]:
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
     tiles.append(_force_tile(results.assembly))
+    tiles += service_tile(results.service)
     passed = sum(v == "passed" for v in results.verdicts.values())
-    note = (
-        [f"Not checked: {', '.join(results.unchecked)}."] if results.unchecked else []
-    )
+    note = [f"{'; '.join(covered(results))}. " if covered(results) else ""]
+    if results.unchecked:
+        note.append(f"Not checked: {', '.join(results.unchecked)}.")
     answer = f"{passed} of {len(results.verdicts)} passed"
     return [*tiles, Tile("Independent checks", [answer], note)]
 
 
 def _force_tile(assembly: Assembly) -> Tile:
     """The largest force through a body, and the couple where it is a couple."""
-    wrenches = without_rounding(assembly.wrenches)
+    wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
     for part, unit in ((slice(3, 6), "N"), (slice(0, 3), "N m")):

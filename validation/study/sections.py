@@ -10,7 +10,7 @@ from assembly.linear.error_body import ErrorBody, error_body
 from assembly.linear.reach import reachable_screws
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
-from forcefit.page.charts import GREY, Axis, Layer, chart, matrix, value_map
+from forcefit.page.charts import GREY, Axis, chart, matrix
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 from forcefit.page.words import in_words, unit_of
@@ -24,14 +24,6 @@ _CLEARANCE_OF = {
     "frozen": "anywhere while no deformation changes",
     "free": "anywhere, and compliant joints turn about their own axis",
     "budget": "anywhere, and springs too, with 5 % more than the least energy",
-}
-# of the maps: key, words
-MAPPED = {
-    "translation_error": "largest shift, eq. (27), clearances anywhere",
-    "rotation_error": "largest turn, eq. (27), clearances anywhere",
-    "energy": "energy, eq. (22)",
-    "margin_free": "zone margin, compliant joints free",
-    "margin": "zone margin, eq. (21)",
 }
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
 _PARTS = ("translation", "rotation")
@@ -274,46 +266,6 @@ def _significant(K: NDArray) -> NDArray:
     """(6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
-
-
-def maps_section(results: StudyResults, summary: dict[str, Any]) -> str:
-    """Maps over the grid, their values under the pointer."""
-    maps, title = results.maps, "Over the workspace"
-    counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
-    share = summary["share_assemblable_free"]
-    if share is None:
-        return section(title, paragraph(f"{counts}. No point has an answer."))
-    rows: list[list[Cell]] = [
-        [name, *(Value(v, unit_of(key)) for v in summary[key])]
-        for key, name in MAPPED.items()
-        if key in summary
-    ]
-    names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
-    drawn = ""
-    if len(names) in {1, 2}:
-        view = maps.squeeze(drop=True).transpose(*names, ...)
-        layers = [
-            Layer(key, text, unit_of(key), _of_map(view, key))
-            for key, text in MAPPED.items()
-        ]
-        axes = [(Axis(n, _UNITS.get(n, "")), view[n].values) for n in names]
-        states = view["status"].values.astype(str)
-        drawn = value_map(axes, layers, states, "Over the grid.")
-    return section(
-        title,
-        paragraph(
-            f"{counts}. Assembles rigidly with compliant joints free at "
-            f"{100 * share:.1f} % of the points with an answer."
-        ),
-        table(["", "least", "median", "largest"], rows, "maps"),
-        drawn,
-    )
-
-
-def _of_map(view: Any, key: str) -> NDArray:
-    """A quantity over the grid; of pose errors the certified upper bound."""
-    one = view[key].sel(bound="upper") if "bound" in view[key].dims else view[key]
-    return np.asarray(one.values, dtype=float)
 
 
 def crosscheck_section(results: StudyResults) -> str:

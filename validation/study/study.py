@@ -33,6 +33,7 @@ from validation.multibody.simulation import (
 )
 from validation.study.governing import governing
 from validation.study.printed_problems import compare_printed
+from validation.study.service import at_pose, over_grid
 from validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
@@ -57,6 +58,7 @@ class StudyResults:
         platform_stiffness: K_C there, as ``assembly stiffness`` gives it.
         governing: bounds of (27) with one part made perfect, as
             :func:`validation.study.governing.governing` gives them.
+        service: the robot at work, of :func:`validation.study.service.at_pose`.
         closing: (k, n, 4, 4) frames while the simulation closes the closures, None
             where it cannot.
     """
@@ -74,6 +76,7 @@ class StudyResults:
     closing: NDArray | None
     platform_stiffness: dict[str, Any]
     governing: list[dict[str, Any]]
+    service: dict[str, Any] | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -106,6 +109,8 @@ class StudyResults:
             reasons["reference"] = self.reference["reason"]
         if self.crosscheck_failure:
             reasons["crosscheck"] = self.crosscheck_failure
+        if self.service is not None and self.service["status"] != "ok":
+            reasons["service"] = str(self.service.get("reason", "no equilibrium"))
         if self.maps is not None and not points_solved(self.maps):
             reasons["maps"] = "none of the grid's points has an answer"
         return reasons
@@ -162,6 +167,14 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         maps = sweep_poses(
             robot, study.grid, lambda d, n: progress("maps", d, n), "frozen"
         )
+    if maps is not None and study.service is not None:
+        maps = over_grid(
+            maps, robot, study.service, study.grid,
+            lambda d, n: progress("maps at work", d, n),
+        )  # fmt: skip
+    service = None
+    if study.service is not None:
+        service = at_pose(posture, study.service, solution)
     check, failure, closing = None, {"reason": ""}, None
     if "crosscheck" in wanted and solved:
         progress("cross-check", 0, 1)
@@ -182,6 +195,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         closing=closing,
         platform_stiffness=stiffness_of(posture),
         governing=governing(posture) if solved else [],
+        service=service,
     )
 
 

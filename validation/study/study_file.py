@@ -11,17 +11,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.posture import POSE
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.model.robot import BeamLink, MeshLink, Robot
-from assembly.robots import BUILT_IN, load_robot
+from assembly.robots import BUILT_IN
 from assembly.sweeps.targets import parse_grid
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from stiffness.surface.surface import UNITS
 from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales
+from validation.study.service import Service, read_service
 
 _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
 
@@ -44,6 +46,7 @@ class Study:
         asked: those of them that the file asks for by name, by a grid or by scales.
         folder: to write.
         files: that were read: the study's own, a robot's, a surface's.
+        service: what is asked of the robot at work; None for nothing.
     """
 
     title: str
@@ -59,6 +62,7 @@ class Study:
     asked: tuple[str, ...]
     folder: Path
     files: tuple[Path, ...] = ()
+    service: Service | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -86,8 +90,10 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     by_key = {"maps": "grid", "crosscheck": "scales"}
     asked_by_key = {check for check, key in by_key.items() if root.has(key)}
     scales = _scales(root)
+    service = read_service(root, robot)
     checks, named = _checks(root, bool(meshes), bool(grid), bool(scales))
     wanted = tuple(c for c in checks if c in named | asked_by_key)
+    wanted += ("service",) if service is not None else ()
     asked = root.text("output", f"{path.stem}_study")
     title = root.text("title", f"{robot.name}: forced assembly")
     root.finish()
@@ -112,6 +118,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
         asked=wanted,
         folder=folder,
         files=_files(path, root, meshes),
+        service=service,
     )
 
 

@@ -54,7 +54,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
         last = key.rpartition(".")[2]
-        if last in ("phase", "exponent", "time_constant"):
+        if last in ("phase", "exponent", "time_constant", "order", "at"):
             continue
         if name in ("drive_compliance", "base_compliance", "_pose_stiffness"):
             given[key] = value / factor
@@ -204,6 +204,34 @@ def _mesh(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters
     return {f.name: 1e5 for f in _turning(robot)} or _nothing()
 
 
+def _geared(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    given = {}
+    for name in _some(_turning(robot), rng):
+        given[f"{name}.order"] = float(rng.integers(3, 10))
+        given[f"{name}.amplitude"] = 1e-4 * rng.uniform(0.5, 1.0)
+        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+    return given
+
+
+def _growing(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return dict.fromkeys(_some(_beams(robot), rng), 1e-4 / duration)
+
+
+def _pressed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {n: 1e-4 * rng.uniform(0.5, 1.0) for n in _some(_drives(robot), rng)}
+
+
+def _pulling(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    drives = _drives(robot)
+    return {drives[rng.integers(len(drives))].name: 5.0}
+
+
+def _slipping(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    drives = _drives(robot)
+    name = drives[rng.integers(len(drives))].name
+    return {f"{name}.jump": 1e-4, f"{name}.at": duration * rng.uniform(0.3, 0.7)}
+
+
 def _nothing() -> Parameters:
     raise NotApplicable("no turning drive")
 
@@ -237,6 +265,12 @@ _DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
     "_humidity": _swelling,
     "_quadratic_temperature": _swelling,
     "_second_harmonic": _eccentric,
+    "_growth": _growing,
+    "_gear": _geared,
+    "_uneven_backlash": _eccentric,
+    "_load_friction": _pressed,
+    "_cable": _pulling,
+    "_slipped": _slipping,
     "_stand": _stand,
     "_sag": _sagging,
 }

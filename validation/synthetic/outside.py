@@ -61,6 +61,52 @@ def _second_harmonic(machine: Machine, row: Row, given: Parameters) -> Machine:
     return machine
 
 
+def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A beam grows by a strain per second: wear, or a creep far from its end."""
+    return _swollen(machine, given, row.covariates["time"])
+
+
+def _gear(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A drive's angle has waves of a gear: so many a turn."""
+    for name in (key[: -len(".order")] for key in given if key.endswith(".order")):
+        angle = given[f"{name}.order"] * row.coordinates[name] + given[f"{name}.phase"]
+        change = given[f"{name}.amplitude"] * math.sin(angle)
+        machine = misread(machine, name, "gear", change)
+    return machine
+
+
+def _uneven_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """Backlash that is wider on one side of a gear than on the other."""
+    for name in (key[: -len(".phase")] for key in given if key.endswith(".phase")):
+        share = 1.0 + 0.8 * math.sin(row.coordinates[name] + given[f"{name}.phase"])
+        change = given[f"{name}.amplitude"] * row.covariates["approach"] * share
+        machine = misread(machine, name, "backlash", change)
+    return machine
+
+
+def _load_friction(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A drive stops short by what grows with the size of the load: c f/100 N."""
+    pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
+    for name, short in given.items():
+        machine = misread(machine, name, "friction", -short * pressed)
+    return machine
+
+
+def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A cable pulls down by what grows with the coordinate of a drive."""
+    load = machine.load.copy()
+    load[5] -= sum(rate * row.coordinates[name] for name, rate in given.items())
+    return replace(machine, load=load)
+
+
+def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A drive's zero jumps at a time."""
+    for name in (key[: -len(".at")] for key in given if key.endswith(".at")):
+        late = row.covariates["time"] >= given[f"{name}.at"]
+        machine = misread(machine, name, "slip", given[f"{name}.jump"] * late)
+    return machine
+
+
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
     """The device's stand yields with the square of the load: c (f/100 N)^2."""
     squared = float(row.load[3:] @ row.load[3:]) / 1e4
@@ -79,17 +125,33 @@ OUTSIDE_CHANGES: dict[str, Change] = {
     "_humidity": _humidity,
     "_quadratic_temperature": _quadratic_temperature,
     "_second_harmonic": _second_harmonic,
+    "_growth": _growth,
+    "_gear": _gear,
+    "_uneven_backlash": _uneven_backlash,
+    "_load_friction": _load_friction,
+    "_cable": _cable,
+    "_slipped": _slipped,
 }
 OUTSIDE_READINGS: dict[str, Moved] = {"_stand": _stand, "_sag": _sag}
 OUTSIDE_COVARIATES: dict[str, tuple[str, ...]] = {
     "_humidity": ("humidity",),
     "_quadratic_temperature": ("temperature",),
+    "_growth": ("time",),
+    "_uneven_backlash": ("approach",),
+    "_load_friction": ("approach",),
+    "_slipped": ("time",),
 }
 OUTSIDE = {
     "_pose_stiffness": "a drive is softer in some poses than in others",
     "_humidity": "links swell with the humidity",
     "_quadratic_temperature": "links grow with the square of the temperature",
     "_second_harmonic": "an encoder's error repeats twice a turn",
+    "_growth": "links grow with time",
+    "_gear": "a drive's angle has waves of its gear",
+    "_uneven_backlash": "backlash that varies around a turn of a gear",
+    "_load_friction": "friction that grows with the size of the load",
+    "_cable": "a cable pulls by what grows with a coordinate",
+    "_slipped": "a drive's zero jumps at a time",
     "_stand": "the measuring device's stand yields with the square of the load",
     "_sag": "the measured target sags with the size of the load",
 }

@@ -101,5 +101,18 @@ def test_variables_that_forms_may_have():
     """As docs/robot_files.md says: what remembers by itself has one, a reversal two."""
     assert {name: form.most for name, form in FORMS.items()} == {
         "powers": 2, "waves": 2, "spline": 2, "lag": 1, "creep": 1, "step": 1,
-        "slow_wave": 1, "reversal": 2,
+        "slow_wave": 1, "reversal": 2, "play": 1, "scaled_waves": 2,
+        "reversal_waves": 2,
     }  # fmt: skip
+
+
+def test_scaled_waves_are_waves_times_the_second_variable():
+    force = np.linspace(-3.0, 5.0, len(X))
+    found = FORMS["scaled_waves"].basis(["0.cosine", "2.sine"], [X, force], {})
+    assert found == pytest.approx(np.column_stack([force, force * np.sin(2 * X)]))
+
+
+def test_waves_of_a_reversal_turn_with_the_direction():
+    side = np.where(X > 0.3, 1.0, -1.0)
+    found = FORMS["reversal_waves"].basis(["1.cosine"], [side, X], {})
+    assert found[:, 0] == pytest.approx(side * np.cos(X))

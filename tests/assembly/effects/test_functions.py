@@ -203,6 +203,26 @@ def test_a_reversal_follows_the_row_before():
     assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
+def test_what_slips_follows_its_drive_by_a_depth():
+    q = [0.0, 0.5, 0.5, 0.2, 0.9]
+    rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
+    slack = at_drive({"size": 1e-5, "depth": 0.5}, "play", ("q.drive",))
+    expected = 1e-5 * np.array([-1.0, 0.0, 0.0, -0.6, 0.8])  # by hand
+    assert seen(rows, slack)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
+
+
+def test_backlash_may_vary_around_a_turn():
+    q = [0.0, 0.5, 0.5, 0.2, 0.9]
+    rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
+    side = np.array([-1, 1, 1, -1, 1])
+    uneven = at_drive({"1.sine": 1e-5}, "reversal_waves", ("q.drive",))
+    expected = 1e-5 * side * np.sin(q)
+    assert seen(rows, uneven)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    scaled = at_drive({"1.cosine": 1e-5}, "scaled_waves", ("q.drive", "approach"))
+    expected = -1e-5 * np.cos(q)
+    assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
+
+
 def test_rows_are_taken_in_the_order_of_time_session_by_session():
     q, t = [0.3, 0.0, 0.9, 0.1], [5.0, 0.0, 9.0, 0.0]
     rows = campaign_of(np.array(t), q=q, session=np.array(["a", "a", "a", "b"]))

@@ -51,6 +51,18 @@ def test_a_reversals_powers_are_of_what_its_size_depends_on():
     assert units("drive", ("tx",), ("q.drive",), "reversal", ["0"]) == ["m"]
 
 
+def test_waves_that_are_scaled_divide_by_their_second_variable_alone():
+    variables = ("q.drive", "load.fz")
+    assert units("drive", ("tx",), variables, "scaled_waves", ["1.sine"]) == ["m/N"]
+    turned = ("q.drive", "position.x")
+    assert units("drive", ("tx",), turned, "reversal_waves", ["1.sine"]) == ["m"]
+
+
+def test_a_depth_has_the_unit_of_what_slips():
+    found = units("drive", ("tx",), ("load.fz",), "play", ["size", "depth"])
+    assert found == ["m", "N"]
+
+
 def test_shapes_have_the_units_of_their_own_variable():
     ends = ["first.1", "last.1", "first.2", "last.2"]
     found = units("tip", ("rz",), ("position.x", "cov.temperature"), "spline", ends)

@@ -373,3 +373,21 @@ def test_the_command_says_what_it_did(run, tmp_path):
     assert status == 0
     assert "read back in 100 random postures" in out
     assert f"written: {target}" in out
+
+
+@pytest.mark.parametrize("given", ["rocker", "tip"])
+def test_a_platform_that_an_overlay_names_is_not_said_to_be_missing(given, tmp_path):
+    """A body with a frame of its own, and one that gets it because it is named."""
+    text = (
+        '<robot name="r"><link name="a"/><link name="rocker"/><link name="tip"/>'
+        '<joint name="j" type="revolute"><parent link="a"/><child link="rocker"/>'
+        '</joint><joint name="k" type="revolute"><parent link="rocker"/>'
+        '<child link="tip"/><origin xyz="1 0 0"/></joint></robot>'
+    )
+    source, overlay = tmp_path / "robot.urdf", tmp_path / "overlay.toml"
+    source.write_text(text)
+    overlay.write_text(f'platform = "{given}"\n')
+    answer = convert(source, tmp_path / "robot.toml", overlay=overlay)
+    assert answer.robot.platform == given
+    assert "no platform is named" not in answer.text()
+    assert "no platform is named" in convert(source, tmp_path / "robot.toml").text()

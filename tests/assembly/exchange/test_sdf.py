@@ -80,7 +80,11 @@ def test_a_four_bar_closes_by_its_own_joints(tmp_path):
         ("<child>coupler</child>", "<child>couple</child>", 'found "couple", expected'),
         ('attached_to="coupler"', 'attached_to="tool"', "ring of relative_to"),
         ("<mass>0.5</mass>", "<mass>x</mass>", "expected 1 finite number [kg]"),
-        ('<model name="four_bar">', '<model name="four_bar"><include/>', "found it"),
+        (
+            '<model name="four_bar">',
+            '<model name="four_bar"><include/>',
+            "uri: missing",
+        ),
         ('name="rocker"', 'name="crank"', "found it twice"),
         ("</model>", '</model><model name="b"/>', "found 2 models"),
         ("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>", "not a direction"),

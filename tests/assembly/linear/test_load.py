@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames
@@ -147,3 +148,92 @@ def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
     expected = r"it moves hinge rz; the platform along \[0 0 1 -0.25 0.5 0\] \[rad, m\]"
     with pytest.raises(FreeMotion, match=expected):
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
+
+
+@pytest.mark.parametrize("cuts", [1, 3])
+def test_a_cantilever_carries_its_weight_at_its_start_and_nothing_at_its_tip(cuts):
+    """q L and q L^2 / 2 at the wall; between pieces of L / 3 what lies beyond."""
+    answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
+    step = L / cuts
+    for k in range(cuts):
+        row = answer.posture.robot.index(f"p{k}")
+        for wrench, beyond in (
+            (answer.tip_wrenches[row], L - step * (k + 1)),
+            (answer.start_wrenches[row], L - step * k),
+        ):
+            expected = [0, Q * beyond**2 / 2, 0, 0, 0, -Q * beyond]
+            scale = [Q * L**2] * 3 + [Q * L] * 3
+            np.testing.assert_allclose(wrench / scale, expected / np.array(scale),
+                                       atol=1e-9)  # fmt: skip
+    assert np.isnan(answer.start_wrenches[0]).all()
+
+
+def test_a_bent_chains_links_hand_on_what_lies_beyond(rng):
+    """Three beams in any directions: at each start the weights and moments of all that
+    lies beyond, the tip's load among them; at each tip the next one's start."""
+    link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
+    frames = tuple(
+        Frame(f"p{k}", f"p{k - 1}" if k else "base", rng.normal(size=3),
+              rng.normal(size=3), link=link)
+        for k in range(3)
+    )  # fmt: skip
+    robot = Robot("bent", "p2", frames)
+    posture, load = home_posture(robot), rng.normal(size=6) * [1, 1, 1, 9, 9, 9]
+    gravity = rng.normal(size=3)
+    answer = solve_assembly(posture, load, gravity=gravity)
+    T = posture.transforms
+    origins = np.concatenate([np.zeros((1, 3)), T[:, :3, 3]])
+    for k in range(3):
+        R, arm = T[k, :3, :3], origins[3] - origins[k]
+        force, moment = load[3:].copy(), load[:3] + np.cross(arm, load[3:])
+        for i in range(k, 3):
+            span = origins[i + 1] - origins[i]
+            W = RHO * 6e-4 * np.linalg.norm(span) * gravity
+            force += W
+            moment += np.cross((origins[i] + origins[i + 1]) / 2 - origins[k], W)
+        start = answer.start_wrenches[k]
+        np.testing.assert_allclose(R @ start[3:], force, rtol=1e-9)
+        np.testing.assert_allclose(R @ start[:3], moment, rtol=1e-9, atol=1e-9)
+        if k:
+            before, tip = T[k - 1, :3, :3], answer.tip_wrenches[k - 1]
+            np.testing.assert_allclose(before @ tip[3:], force, rtol=1e-9)
+            np.testing.assert_allclose(before @ tip[:3], moment, rtol=1e-9, atol=1e-9)
+
+
+def beam_on_two_pins():
+    """A beam of 0.8 m along x, free to turn about y at both ends."""
+    turn = [np.pi / 2, 0, 0]
+    link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO)
+    frames = (
+        Frame("a", rotation=turn, joint="revolute"),
+        Frame("b", "a", [L, 0, 0], joint="revolute", link=link),
+        Frame("end", "b"),
+        Frame("ground", translation=[L, 0, 0], rotation=turn),
+    )
+    return Robot("pinned", "end", frames, (("end", "ground"),))
+
+
+def test_a_pin_carries_no_moment_of_a_beams_own_weight():
+    """q L / 2 and no moment at both ends; K_E's own deformation knows q L^2 / 12."""
+    posture = home_posture(beam_on_two_pins())
+    answer = solve_assembly(posture, gravity=[0, 0, -G])
+    row = posture.robot.index("b")
+    half, scale = Q * L / 2, np.array([Q * L**2] * 3 + [Q * L] * 3)
+    up = [0, 0, 0, 0, half, 0]  # the beam's y points up
+    np.testing.assert_allclose(answer.tip_wrenches[row] / scale, up / scale, atol=1e-9)
+    down = [0, 0, 0, 0, -half, 0]
+    start = answer.start_wrenches[row]
+    np.testing.assert_allclose(start / scale, down / scale, atol=1e-9)
+    assert abs(answer.wrenches[row, 2]) == pytest.approx(Q * L**2 / 12, rel=1e-9)
+    np.testing.assert_allclose(
+        answer.tip_wrenches[row], answer.joint_wrenches[row], atol=1e-9 * Q * L
+    )
+
+
+def test_finite_motions_carry_the_same_weight_at_a_pin():
+    """The moment at the tip is zero exactly, the force q L / 2."""
+    posture = home_posture(beam_on_two_pins())
+    exact = solve_exact(posture, gravity=[0, 0, -G])
+    row = posture.robot.index("b")
+    assert np.abs(exact.tip_wrenches[row, :3]).max() < 1e-9 * Q * L**2
+    assert exact.tip_wrenches[row, 4] == pytest.approx(Q * L / 2, rel=1e-3)

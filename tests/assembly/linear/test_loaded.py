@@ -169,7 +169,8 @@ def test_wrenches_prove_the_bound_on_the_problem_as_it_is_written(grid, method):
         rounding = 1e-12 * (many.energy[i] + abs(many.work[i]) + abs(on_errors))
         proved = one.bound + many.work[i] + on_errors
         assert many.bound[i] == pytest.approx(proved, abs=rounding)
-        assert reference.potential >= one.bound - rounding
+        # the reference's closures are closed but for rounding, whose work that counts
+        assert reference.potential + reference.uncertainty >= one.bound - rounding
 
 
 def cases_at_random():

@@ -9,6 +9,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import ReachableSet
 from assembly.linear.screw_bound import _extents, _room, bound_screw
 from assembly.model.robot import Clearance, Frame, MatrixLink
@@ -205,13 +206,29 @@ def test_a_set_extends_to_its_farther_side():
 
 
 def test_play_outside_the_loop_is_open_and_no_error():
-    """A hand with radial and axial play on two bent beams: sqrt(2 r^2 + a^2)."""
+    """A hand with radial and axial play on two bent beams: a disc r and a length a."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
     hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))
     robot = replace(beams, frames=(*beams.frames, hand), platform="hand")
     found = bound_screw(solve_assembly(home_posture(robot)))
-    assert found.translation_open == pytest.approx(np.sqrt(2 * r**2 + a**2), rel=1e-4)
+    assert found.translation_open == pytest.approx(np.hypot(r, a), rel=1e-4)
+    assert found.translation_open >= np.hypot(r, a)
     assert found.rotation_open == pytest.approx(0.0, abs=1e-10)
     assert found.translation_error < 1e-7
     assert found.rotation_error < 1e-7
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta"])
+def test_without_errors_the_open_distance_is_the_largest_pose_error(name):
+    """The computed screw is zero: `solve` and `error` then speak of one quantity."""
+    assembly = solve_assembly(home_posture(load_robot(name)))
+    assert not assembly.platform_screw.any()
+    found = bound_screw(assembly)
+    error = bound_pose_error(assembly, "frozen", tolerance_rotation=1e-7,
+                             tolerance_translation=1e-8)  # fmt: skip
+    for open_, (low, high) in (
+        (found.rotation_open, error.rotation_error),
+        (found.translation_open, error.translation_error),
+    ):
+        assert low * (1 - 1e-9) <= open_ <= high * (1 + 1e-4)

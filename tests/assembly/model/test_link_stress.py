@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
+from assembly.model.error_distributions import tolerance_sources
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import sweep_in_memory
@@ -82,6 +84,56 @@ def test_finite_elements_agree_with_the_beam_away_from_the_ends():
     beam = replace(frame, link=BeamLink({"radius": r}, 6e10, 0.3))
     whole = peak_stresses(Robot("one", "distal", (beam,)), w)[:, 0]
     assert whole[1] == pytest.approx(4000 * 0.452 / (np.pi * r**3), rel=1e-9)
+
+
+def heavy(pinned):
+    """A square bar of 20 mm, 1 m long, fixed at one end or pinned at both."""
+    link = BeamLink({"width": 0.02, "height": 0.02}, 2e11, 0.3, density=7850.0)
+    if not pinned:
+        return Robot("sag", "tip", (Frame("tip", translation=[1, 0, 0], link=link),))
+    turn = [np.pi / 2, 0, 0]
+    frames = (
+        Frame("a", rotation=turn, joint="revolute"),
+        Frame("tip", "a", [1, 0, 0], joint="revolute", link=link),
+        Frame("end", "tip"),
+        Frame("ground", translation=[1, 0, 0], rotation=turn),
+    )
+    return Robot("pinned", "end", frames, (("end", "ground"),))
+
+
+@pytest.mark.parametrize(("pinned", "share"), [(False, 2), (True, 8)])
+def test_a_bars_own_weight_bends_it_between_its_ends(pinned, share):
+    """sigma = 6 M / h^3, M = W L / 2 at the wall or W L / 8 in the middle."""
+    robot, gravity = heavy(pinned), [0, 0, -9.81]
+    weight = 7850 * 0.02**2 * 9.81
+    expected = 6 * weight / share / 0.02**3
+    answer = solve_assembly(home_posture(robot), gravity=gravity)
+    found = peak_stresses(robot, answer.wrenches, answer.frame_loads.at_tips)
+    assert found[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_sweeps_and_draws_know_the_stress_of_a_links_own_weight():
+    """W L / 2 again, and a wrench at the tip of zero."""
+    turned = Frame("drive", joint="revolute", actuated=True)  # about z
+    bar = replace(heavy(pinned=False).frames[0], parent="drive")
+    robot = Robot("sag", "tip", (turned, bar))
+    expected = 6 * 7850 * 0.02**2 * 9.81 / 2 / 0.02**3
+    gravity = (0, 0, -9.81)
+    targets = grid_targets(parse_grid("q.drive=0:1:0.5", robot))
+    question = Question(
+        robot, components=targets.names, strength=2e8, gravity=gravity,
+        wrenches=("tip",),
+    )  # fmt: skip
+    data = sweep_in_memory(Sweep(question, targets))
+    np.testing.assert_allclose(data["stress"].squeeze(), expected, rtol=1e-9)
+    assert np.abs(data["wrench"]).max() < 1e-9
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0])
+    experiment = Experiment(home_posture(robot), sources, gravity=gravity)
+    rows = experiment.solve(0, 2)
+    np.testing.assert_allclose(rows["stress"][:, 0], expected, rtol=1e-9)
+    weight = 7850 * 0.02**2 * 9.81  # through the drive
+    np.testing.assert_allclose(rows["force"], weight, rtol=1e-9)
+    np.testing.assert_allclose(rows["moment"], weight / 2, rtol=1e-9)
 
 
 def test_a_sweep_finds_stress_and_safety_of_every_posture():

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.report.plot import displaced_bodies, robot_plotter
+from assembly.robots import load_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
@@ -38,6 +39,34 @@ def test_the_picture_shows_links_bodies_and_the_exaggeration():
     blue = (pixels[..., 2] > 110) & (pixels[..., 0] < 80)
     assert red.sum() > 500
     assert blue.sum() > 500
+
+
+@pytest.mark.parametrize("name", ["delta", "hexapod", "orthoglide", "arm6"])
+def test_the_picture_shows_the_whole_robot_as_large_as_fits(name):
+    """Nothing is drawn at the edges; and it fills more than half of the window."""
+    answer = solve_assembly(home_posture(load_robot(name)))
+    plotter = robot_plotter(answer, exaggeration=1)
+    plotter.remove_actor("caption")
+    plotter.hide_axes()
+    pixels = plotter.screenshot(return_img=True).astype(int)
+    plotter.close()
+    drawn = np.abs(pixels - pixels[0, 0]).max(axis=2) > 8
+    rows, columns = (np.flatnonzero(drawn.any(axis=k)) for k in (1, 0))
+    height, width = drawn.shape
+    free = (rows[0], height - 1 - rows[-1], columns[0], width - 1 - columns[-1])
+    assert min(free) >= 10
+    assert np.ptp(rows) > height / 2 or np.ptp(columns) > width / 2
+
+
+def test_the_picture_shows_the_axes_of_driven_and_passive_joints():
+    plotter = robot_plotter(_assembly(), exaggeration=20)
+    colours = [actor.prop.color.hex_rgb for actor in plotter.actors.values()
+               if hasattr(actor, "prop") and hasattr(actor.prop, "color")]  # fmt: skip
+    plotter.close()
+    joints = [f for f in _assembly().posture.robot.frames if f.joint != "fixed"]
+    driven = sum(frame.actuated for frame in joints)
+    assert colours.count("#ff8c00") == driven == 2  # dark orange
+    assert colours.count("#202020") == len(joints) - driven
 
 
 @pytest.mark.parametrize(

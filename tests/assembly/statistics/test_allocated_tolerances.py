@@ -46,6 +46,7 @@ def test_a_class_has_the_unit_of_its_first_error():
     assert first == {
         "name": "length", "tolerance": 1.25e-3, "unit": "m", "scaled_alike": 1e-3,
         "cost": 3.0, "loosest_allowed": 1e-2, "at_loosest": False,
+        "share": pytest.approx(3.0 / 1.25e-3 / (3.0 / 1.25e-3 + 5.0 / 0.0999)),
     }  # fmt: skip
     assert (second["name"], second["unit"], second["cost"]) == ("angle", "rad", 5.0)
     for tolerance, loosest in ((0.0999 + 1e-6, True), (0.0999 - 1e-6, False)):
@@ -57,8 +58,9 @@ def test_the_lines_of_an_allocation():
     """Lengths in mm, angles in mrad; what is not proven or not checked is not told."""
     plain = allocation_of(allocation())
     assert allocation_text(plain).splitlines() == [
-        "  length: +-1.25 mm",
+        "  length: +-1.25 mm (98%)",
         "  angle: +-99.9 mrad (the loosest allowed)",
+        "in brackets: the share of the price",
         "price 20, 25 with those of the convex programme scaled alike: 20.0% less",
     ]
     whole = allocation(
@@ -66,8 +68,9 @@ def test_the_lines_of_an_allocation():
         verification=CHECK, tolerances=np.array([1e-3, 2e-2]),
     )  # fmt: skip
     assert allocation_text(allocation_of(whole)).splitlines() == [
-        "  length: +-1 mm",
-        "  angle: +-20 mrad",
+        "  length: +-1 mm (92%)",
+        "  angle: +-20 mrad (8%)",
+        "in brackets: the share of the price",
         "price 20, no tolerances cost less than 19.5",
         "worst energy: 1.5 found, at most 1.75 proven, limit 2",
         "proven when scaled by 0.7500",

@@ -3,6 +3,11 @@
 import numpy as np
 import pytest
 
+from assembly.batch.many_draws import prepare_energies
+from assembly.kinematics.posture import home_posture
+from assembly.model.error_distributions import draw_generator
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.contact_positions import move_to_contact
 
 
@@ -55,3 +60,25 @@ def test_without_a_direction_nothing_moves():
     np.testing.assert_allclose(found[1, 1], 1.0, atol=1e-5)
     still = moved([[0.0, 2.0]], [0, 1, 2], free=[True, False], positions=start[:1])
     np.testing.assert_array_equal(still, start[:1])
+
+
+@pytest.mark.parametrize("length", [0.05, 0.4, 5.0])
+def test_the_contact_length_weighs_moments_against_forces(length):
+    """A pin with tilt t, and the platform on an arm L along x across its axis z.
+
+    The moments at the pin are M_x and M_y - L F_z, of deviations 1 and
+    s = sqrt(1 + (L / length)^2).  Their direction is that of the tilt, so the platform
+    moves along z by L t |cos|, whose median is L t s / sqrt(1 + s^2).
+    """
+    arm, tilt = 0.4, 2e-3
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(tilt=tilt)),
+        Frame("tip", "pin", [arm, 0, 0]),
+    )
+    prepared = prepare_energies(home_posture(Robot("arm", "tip", frames)))
+    draws = prepared.solve(np.zeros((4000, 2, 6)))
+    rngs = [draw_generator(3, i, 9) for i in range(4000)]
+    screws, _ = position_clearances(prepared, draws, "contact", rngs, length)
+    s = np.hypot(1.0, arm / length)
+    expected = arm * tilt * s / np.hypot(1.0, s)
+    assert np.median(np.abs(screws[:, 5])) == pytest.approx(expected, rel=0.03)

@@ -12,6 +12,8 @@ from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment, precision_for
+from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.summary import summarise, summary_text
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
 
@@ -196,3 +198,20 @@ def test_a_tight_limit_asks_for_a_thousandth_of_it(limits, precision):
     if "translation" in limits:
         half = precision_for(limits, 5e-4)
         assert half[1] == pytest.approx(min(1e-6, limits["translation"] * 5e-4))
+
+
+@pytest.mark.parametrize("contact_length", [None, 0.25])
+def test_the_contact_length_is_named_with_the_pose_errors(contact_length):
+    """In the text, the plain values and the data set: given, or the longest body."""
+    frames = (Frame("pin"), Frame("tip", "pin", [0.4, 0, 0]))
+    robot = Robot("arm", "tip", frames)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
+    data = run_draws(
+        Experiment(home_posture(robot), sources, clearance_model="contact",
+                   contact_length=contact_length), 20,
+    )  # fmt: skip
+    summary, length = summarise(data), contact_length or 0.4
+    assert summary["contact_length"] == data.attrs["contact_length"] == length
+    text = summary_text(summary)
+    assert f"moments / {length:g} m, contact length" in text
+    assert "the load of service (--load)" in text

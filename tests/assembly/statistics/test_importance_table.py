@@ -48,7 +48,7 @@ def solved(by="source", draws=400, **options):
 def test_a_platform_that_follows_each_error_has_gains_of_one():
     """An even law of half width w deviates by w / sqrt(3), and so does the platform.
 
-    400 draws know a deviation to 4 %; parts and gains of one draw go together.
+    400 draws know a deviation to 4 %; a gain is a slope, and no draw changes it.
     """
     data, report = solved()
     assert list(data["group"].values) == NAMES
@@ -58,11 +58,9 @@ def test_a_platform_that_follows_each_error_has_gains_of_one():
         moved, still = ("rotation", "translation")[:: 1 if unit == "rad" else -1]
         assert one["error_unit"] == unit
         assert one[f"{moved}_part"] == pytest.approx(size, rel=0.15)
-        assert one[f"{moved}_gain"] == pytest.approx(1.0, rel=0.15)
-        gain = one[f"{moved}_part"] / size
-        assert one[f"{moved}_gain"] == pytest.approx(gain, rel=1e-9)
+        assert one[f"{moved}_gain"] == pytest.approx(1.0, rel=1e-12)
         assert one[f"{still}_part"] == pytest.approx(0.0, abs=1e-3 * size)
-        assert one[f"{still}_gain"] == pytest.approx(0.0, abs=1e-3)
+        assert one[f"{still}_gain"] == pytest.approx(0.0, abs=1e-12)
     assert (report["base_draws"], report["play"]) == (400, "least")
     quantities = report["quantities"]
     assert set(quantities) == {"energy", "rotation", "translation", "force"}
@@ -86,7 +84,10 @@ def test_angles_and_lengths_together_have_parts_and_no_gain():
 
 
 def test_a_group_of_like_errors_gains_by_their_common_spread():
-    """x moves the platform by 3e-4, y by 4e-4: one group of 5e-4 / sqrt(3) by both."""
+    """x moves the platform by 3e-4, y by 4e-4: one group of 5e-4 / sqrt(3) by both.
+
+    Each moves it by as much as it is itself: the gain of both is 1.
+    """
     experiment = arm(clearance_model="least")
     design = importance_design(experiment, ImportanceOptions(400, "source"))
     design = replace(design, groups=[("turn", np.array([0])), ("xy", np.array([1, 2]))])
@@ -95,7 +96,7 @@ def test_a_group_of_like_errors_gains_by_their_common_spread():
     assert list(data["error_unit"].values) == ["rad", "m"]
     part, gain = (data[k].sel(component="translation").values for k in ("part", "gain"))
     assert part[1] == pytest.approx(5e-4 / np.sqrt(3), rel=0.1)
-    assert gain[1] == pytest.approx(part[1] * np.sqrt(3) / 5e-4, rel=1e-9)
+    assert gain[1] == pytest.approx(1.0, rel=1e-12)
 
 
 def test_the_design_draws_from_streams_of_its_own():
@@ -176,7 +177,7 @@ def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_sha
     assert data.attrs["importance_draws"] == 8
 
 
-def told(units, left_out=0.0):
+def told(units, left_out=0.0, rank=(1, 1)):
     """The table's lines for a group of each unit, the first of the largest part."""
     count = len(units)
     platform = {
@@ -188,14 +189,19 @@ def told(units, left_out=0.0):
         for k, unit in enumerate(units)
     }  # fmt: skip
     index = {group: np.array([0.25, 0.2, 0.3]) for group in platform}
-    one = {"total_index": index, "first_index": index, "largest_share_left_out": 0.0}
-    return importance_text({
+    one = {
+        "total_index": index, "first_index": index, "largest_share_left_out": 0.0,
+        "rank": dict.fromkeys(platform, rank),
+    }  # fmt: skip
+    lines = importance_text({
         "base_draws": 64, "play": "least", "platform": platform,
         "quantities": {
             "translation": one, "energy": one | {"largest_share_left_out": left_out},
             "stress": one | {"reason": "it does not vary"},
         },
     }).splitlines()  # fmt: skip
+    assert lines[-1].startswith("largest: group0")
+    return lines[:-1]
 
 
 def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
@@ -203,13 +209,13 @@ def test_lengths_give_um_for_each_um_and_angles_for_each_mrad():
     assert "64 base draws" in head
     assert stress == "stress: it does not vary"
     begin = [columns.index(word) for word in ("for each um", "for each mrad", "[mrad]")]
-    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300)".split()
+    assert length.split() == "group0 3 0.5 2 0.250 (0.200 to 0.300) 1".split()
     assert begin[0] <= length.index(" 0.5 ") < begin[1]
     # 1.5 m for each rad are 1500 um for each mrad
-    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300)".split()
+    assert angle.split() == "group1 2 1500 4 0.250 (0.200 to 0.300) 1".split()
     assert begin[1] <= angle.index(" 1500 ") < begin[2]
     # rad and m together have no gain
-    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300)".split()
+    assert both.split() == "group2 1 6 0.250 (0.200 to 0.300) 1".split()
     ends = [len(line) for line in (length, angle, both)]
     assert len(set(ends)) == 1
 
@@ -224,3 +230,27 @@ def test_draws_left_out_are_told_and_groups_beyond_the_table_counted():
         "group14",
     ]
     assert "more" not in told(["m"] * 15)[-1]
+
+
+def test_errors_with_a_rank_in_common_are_said_not_to_be_distinguished():
+    lines = told(["m", "m"], rank=(1, 2))
+    assert [line.split()[-1] for line in lines[-3:-1]] == ["1-2", "1-2"]
+    assert lines[-1].endswith("are not distinguished by these draws")
+    assert "distinguished" not in told(["m", "m"])[-1]
+
+
+def test_the_largest_error_of_all_legs_is_named_as_one():
+    index = {f"leg{i}.hinge.RX": np.array([0.3, 0.2, 0.4]) for i in (1, 2, 3)}
+    index["leg1.tip.TX"] = np.array([0.1, 0.05, 0.15])
+    ranks = dict.fromkeys(list(index)[:3], (1, 3)) | {"leg1.tip.TX": (4, 4)}
+    platform = {
+        name: {"error_unit": "rad", "translation_part": 1e-6, "rotation_part": 1e-3,
+               "translation_gain": 0.4, "rotation_gain": 1.0}
+        for name in index
+    }  # fmt: skip
+    one = {"total_index": index, "largest_share_left_out": 0.0, "rank": ranks}
+    text = importance_text({
+        "base_draws": 64, "play": "least", "platform": platform,
+        "quantities": {"translation": one},
+    })  # fmt: skip
+    assert text.splitlines()[-1] == "largest: hinge.RX of all legs"

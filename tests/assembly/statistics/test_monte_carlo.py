@@ -257,6 +257,10 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
     [
         (["--errors", "none.toml"], "none.toml: cannot be read"),
         (["--errors", "errors.toml", "--play", "mots"], "--play"),
+        (["--errors", "errors.toml", "--contact-length", "0.3"],
+         "--contact-length: found with --play worst, expected --play contact"),
+        (["--errors", "errors.toml", "--play", "contact", "--contact-length", "0"],
+         "--contact-length: found 0.0, expected > 0 m"),
         (["--errors", "errors.toml", "--seed", "9" * 40], "--seed"),
         (["--errors", "errors.toml", "--limit", "enrgy=3"], 'quantity "enrgy"'),
         (["--errors", "errors.toml", "--limit", "margin=1", "--no-margins"],

@@ -170,10 +170,11 @@ def test_a_limit_within_the_play_of_perfect_parts_is_refused(
                     clearance_model="worst" if worst_play else "least")  # fmt: skip
     requirement = Requirement(postures, plan)
     if not refused:
-        requirement.check_perfect_parts()
+        reached = requirement.perfect_parts()
+        assert all(value <= limits[key] for key, (value, _) in reached.items())
         return
     with pytest.raises(BadInput) as error:
-        requirement.check_perfect_parts()
+        requirement.perfect_parts()
     assert str(error.value) == (
         "limit translation: even perfect parts reach 0.0001 m by clearances alone at "
         "tx = 0.4; expected at most 9e-05 m (or --play least, if clearances stay as "

@@ -191,7 +191,7 @@ def test_a_search_goes_on_from_every_corner_to_the_one_its_slopes_point_to(monke
     """A function of which no slope is known where it is largest, nor a value there."""
     asked = []
 
-    def given(prepared, sources, values, key, model):
+    def given(prepared, sources, values, key, model, contact_length):
         asked.append(values.copy())
         size = values.sum(axis=1)
         slopes = np.tile([1.0, 0.0, np.nan], (len(values), 1))

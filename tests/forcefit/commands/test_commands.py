@@ -252,6 +252,18 @@ def test_every_command_explains_itself(run, words):
     assert run(*words, "-h") == (status, out, err)
 
 
+GROUPS = [w for w, own in EVERY_COMMAND.items() if hasattr(own, "commands")]
+
+
+@pytest.mark.parametrize("group", GROUPS, ids=" ".join)
+def test_a_group_without_a_command_prints_its_help_line_by_line(run, group):
+    status, out, err = run(*group)
+    _, expected, _ = run(*group, "--help")
+    assert (status, out) == (2, "")
+    assert err.strip() == expected.strip()
+    assert len(err.splitlines()) > 5
+
+
 @pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
 def test_help_prints_every_unit_in_brackets_and_cuts_nothing_short(run, words):
     """No part of a text is markup, and a list of commands has whole sentences."""

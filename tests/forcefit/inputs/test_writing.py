@@ -37,6 +37,7 @@ _MAY = {
     "forcefit/inputs/writing.py",
     "stiffness/mesh/mesh.py",  # its cache through whole_file; the mesher's scratch
     "stiffness/mesh/mesh_worker.py",  # likewise
+    "stiffness/surface/surface_worker.py",  # a temporary folder
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "forcefit/commands/assembly.py",  # pixels of a screenshot
     "forcefit/page/page.py",  # into memory

@@ -227,3 +227,82 @@ def test_it_prints_without_its_buttons(tab):
     content = base64.b64decode(pdf["data"])
     assert content.startswith(b"%PDF")
     assert len(content) > 50_000  # with its pictures
+
+
+def test_every_figure_is_printed_as_a_picture_of_dark_lines_on_white(tab):
+    """What WebGL drew may be gone by then; a dark page is not printed dark."""
+    count = tab.execute_script("return document.querySelectorAll('figure').length")
+    tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
+        {"name": "prefers-color-scheme", "value": "dark"}]})  # fmt: skip
+    wait(tab, f"return document.querySelectorAll('img.print').length === {count}")
+    tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    shown = tab.execute_script(
+        "return [...document.querySelectorAll('figure')].map(f => ["
+        "getComputedStyle(f.querySelector('.plot')).display,"
+        "getComputedStyle(f.querySelector('img.print')).display,"
+        "f.querySelector('img.print').naturalWidth])"
+    )
+    assert all(one[:2] == ["none", "block"] for one in shown)
+    corner = (
+        "const c = document.createElement('canvas'); c.width = c.height = 9;"
+        "const g = c.getContext('2d');"
+        "g.drawImage(document.querySelector('figure.scene img.print'), 0, 0, 9, 9);"
+        "return [...g.getImageData(0, 0, 9, 9).data]"
+    )
+    pixels = np.array(tab.execute_script(corner)).reshape(9, 9, 4)[..., :3]
+    assert pixels.max() >= 250  # white paper ..
+    assert pixels.min() < 250  # .. and a robot on it
+    tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+
+
+def test_a_dark_screen_has_a_dark_page_with_light_letters(tab):
+    read = (
+        "const s = getComputedStyle(document.body);"
+        "return [s.backgroundColor, s.color, getComputedStyle("
+        "document.querySelector('figure.map .xtitle')).fill].map(c =>"
+        " c.match(/[0-9]+/g).slice(0, 3).map(Number))"
+    )
+    for scheme in ("dark", "light"):
+        tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
+            {"name": "prefers-color-scheme", "value": scheme}]})  # fmt: skip
+        dark = "true" if scheme == "dark" else "false"
+        wait(tab, "const c = getComputedStyle(document.querySelector("
+             "'figure.map .xtitle')).fill.match(/[0-9]+/g).map(Number);"
+             f"return (c[0] > 128) === {dark}")  # fmt: skip
+        back, ink, axis = (np.mean(c) for c in tab.execute_script(read))
+        assert (back < 64) == (scheme == "dark")
+        assert abs(ink - back) > 128
+        assert abs(axis - back) > 128
+
+
+def test_a_phone_breaks_no_number_and_scrolls_wide_tables_in_their_box(tab):
+    phone = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+    try:
+        # figures are drawn again
+        wait(tab, "return document.documentElement.scrollWidth === 390")
+        tall = tab.execute_script(
+            "const line = parseFloat(getComputedStyle(document.querySelector('td'))"
+            ".fontSize) * 2.5;"
+            "return [...document.querySelectorAll('td[data-v]')].filter(td => "
+            "td.getClientRects()[0] && [...td.childNodes].some(n => {"
+            "const r = document.createRange(); r.selectNodeContents(n);"
+            "return r.getBoundingClientRect().height > line; })).length"
+        )
+        assert tall == 0
+    finally:
+        tab.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_the_enter_key_sorts_by_the_head_that_has_the_focus(tab):
+    from selenium.webdriver.common.keys import Keys
+
+    head = tab.execute_script(
+        "const t = [...document.querySelectorAll('table')].find(t =>"
+        " t.rows[0].cells[1].textContent === 'made perfect');"
+        "const h = t.rows[0].cells[2]; h.removeAttribute('aria-sort'); return h"
+    )
+    head.send_keys(Keys.ENTER)
+    assert head.get_attribute("aria-sort") == "ascending"
+    head.send_keys(" ")
+    assert head.get_attribute("aria-sort") == "descending"

@@ -325,3 +325,66 @@ def test_a_boxs_shear_flows_on_around_its_corners(size):
         for force in (0, 1):
             if abs(direction[force]) > 0.5:
                 assert abs(flow[k, middle, 1 + force]) < 1e-9 * np.abs(flow).max()
+
+
+# [N] weight along -z; wrench at the tip; largest moment; its place from the base
+W, LENGTH = 30.0, 0.8
+SUPPORTS = {
+    "free": ([0.0] * 6, W * LENGTH / 2, 0.0),
+    "pinned at both ends": ([0, 0, 0, 0, 0, W / 2], W * LENGTH / 8, LENGTH / 2),
+    "propped": ([0, 0, 0, 0, 0, 3 * W / 8], W * LENGTH / 8, 0.0),
+    "clamped at both ends": (
+        [0, W * LENGTH / 12, 0, 0, 0, W / 2], W * LENGTH / 12, None,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SUPPORTS)
+def test_a_heavy_beam_bends_as_in_the_books(name):
+    """Timoshenko, Strength of Materials I: q L^2 / 2, / 8, / 8, / 12."""
+    wrench, moment, place = SUPPORTS[name]
+    stress, where = peak_beam_stress(PLATE, LENGTH, wrench, [0, 0, -W])
+    sigma = 6 * moment / (0.02 * 0.05**2)
+    # shear adds up to (0.02 / 0.8)^2 between the ends, nothing at the outer fibres
+    assert stress == pytest.approx(sigma, rel=1e-12)
+    if place is not None:
+        assert where[0] == pytest.approx(place, abs=1e-12)
+
+
+def test_a_propped_beams_own_field_moment_is_found_where_shear_vanishes():
+    """9 q L^2 / 128 at 3/8 of the length from the prop, when the base is relieved."""
+    relieved = [0, -W * LENGTH / 8, 0, 0, 0, 3 * W / 8 - W / 8]
+    stress, where = peak_beam_stress(PLATE, LENGTH, relieved, [0, 0, -W])
+    # M(s) = M_tip - (F s - W s^2 / 2 L): extremum at s = F L / W
+    s = np.linspace(0, LENGTH, 100_001)
+    moments = relieved[1] - relieved[5] * s + W * s**2 / 2 / LENGTH
+    worst = np.abs(moments).argmax()
+    expected = 6 * abs(moments[worst]) / (0.02 * 0.05**2)
+    assert stress == pytest.approx(expected, rel=1e-9)
+    assert where[0] == pytest.approx(LENGTH - s[worst], abs=1e-4)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_hanging_beam_carries_its_weight_at_the_top(section):
+    stress, where = peak_beam_stress(section, LENGTH, np.zeros(6), [W, 0, 0])
+    assert stress == pytest.approx(W / constants(section).area, rel=1e-14)
+    assert where[0] == 0.0
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_heavy_beams_parts_agree_with_the_whole(section, rng):
+    """Cut anywhere: the outer part's wrench at the cut loads the inner part's tip."""
+    for _ in range(20):
+        wrench, weight = rng.normal(size=6) * [1, 1, 1, 20, 20, 20], rng.normal(size=3)
+        weight *= 30
+        cut = rng.uniform(0.1, 0.9) * LENGTH
+        share = 1 - cut / LENGTH
+        at_cut = wrench.copy()
+        at_cut[3:] += share * weight
+        arm = [LENGTH - cut, 0, 0]
+        at_cut[:3] += np.cross(arm, wrench[3:] + share * weight / 2)
+        outer, _ = peak_beam_stress(section, LENGTH - cut, wrench, share * weight)
+        inner, _ = peak_beam_stress(section, cut, at_cut, (1 - share) * weight)
+        whole, _ = peak_beam_stress(section, LENGTH, wrench, weight)
+        # sections in between: a parabola loses 1e-3 at most
+        assert whole == pytest.approx(max(outer, inner), rel=1e-3)

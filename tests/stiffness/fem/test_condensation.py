@@ -15,7 +15,7 @@ from stiffness.fem.condensation import (
 )
 from stiffness.fem.elements import assemble, isoparametric, triangle_areas
 from stiffness.link import scaled
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid
 from stiffness.screws import rotation_matrix
 from tests.solids_for_tests import bar_solid, box_solid, constants
 

@@ -20,7 +20,7 @@ from stiffness.fem.sparse_solver import FactorisationFailed, solve, solver_name
 from stiffness.link import inverted, scaled
 from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import face_nodes, lattice
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid
 from stiffness.screws import rotation_matrix, screw_map
 from tests.solids_for_tests import bar_solid, box_solid, constants, outward
 

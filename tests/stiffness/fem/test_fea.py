@@ -21,9 +21,10 @@ from stiffness.fem.fea import (
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.link import scaled
-from stiffness.mesh.mesh import MeshFailed
+from stiffness.mesh.fit_to_patches import MeshFailed
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
+from stiffness.surface.primitives import Plane
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
 
@@ -80,7 +81,8 @@ def test_the_papers_bar_from_its_surface(cache):
 @pytest.mark.slow
 def test_a_bar_of_two_materials_end_to_end(cache):
     """Stretched: two springs in series, but for the end effect both have."""
-    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226)
+    middle = Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0]))
+    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, planes=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
     one, two = (
         solve_link(bar_surface(), *PLANES, m, options=options).link
@@ -216,6 +218,29 @@ def test_expected_costs_are_those_measured_and_grow_faster_than_the_mesh(monkeyp
     assert 2.5 < twice[1] / seconds < 3
     monkeypatch.setattr(sparse_solver, "solver_name", lambda: "SuperLU")
     assert sparse_solver.expected_cost(400_000) == (3 * memory, 10 * seconds)
+
+
+def test_the_mesher_leaves_time_for_the_solver(monkeypatch):
+    """Of 100 s it gets 60; of what is left after a failure 60 % again."""
+    limits, now = [], itertools.count(0.0, 10.0)
+    monkeypatch.setattr(fea.time, "monotonic", lambda: next(now))
+
+    def fail(*_, time_limit, **__):
+        limits.append(time_limit)
+        raise MeshFailed("no mesh")
+
+    monkeypatch.setattr(fea, "mesh_solid", fail)
+    with pytest.raises(MeshFailed):
+        fea.first_mesh(bar_surface(), *PLANES, Budget(seconds=100.0))
+    np.testing.assert_allclose(limits, 0.6 * (100 - 10 * np.array([1, 3, 5])))
+
+
+def test_a_first_mesh_that_costs_more_than_the_budget_is_refused():
+    """400 000 unknowns take 20 s: after 290 of 300 s, or beyond a million unknowns."""
+    fea._refuse_cost(400_000, Budget(seconds=300.0), 270.0)
+    for unknowns, spent in ((400_000, 290.0), (1_200_000, 0.0)):
+        with pytest.raises(MeshFailed, match=f"{unknowns} unknowns, about .* s and"):
+            fea._refuse_cost(unknowns, Budget(seconds=300.0), spent)
 
 
 def test_a_mesher_that_fails_is_asked_for_finer_meshes_while_there_is_time(monkeypatch):

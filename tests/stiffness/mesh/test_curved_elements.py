@@ -13,7 +13,7 @@ from stiffness.mesh.curved_elements import (
 )
 from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import lattice, shape_functions
-from stiffness.mesh.mesh import Solid, boundary_faces
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Plane, Sphere
 from tests.solids_for_tests import bar_solid, box_cells, box_solid, outward
 

@@ -17,8 +17,8 @@ from stiffness.mesh.edge_grading import (
     split_joining_edges,
 )
 from stiffness.mesh.lagrange import FACES
-from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.mesh.refine import edges_of
+from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Plane
 from tests.solids_for_tests import (
     Z,

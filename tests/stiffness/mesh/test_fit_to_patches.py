@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.mesh.mesh import (
-    MeshFailed,
+from stiffness.mesh.fit_to_patches import MeshFailed, _nearest_patch, fit_to_patches
+from stiffness.mesh.solid import (
     Solid,
-    _nearest_patch,
     boundary_faces,
-    fit_to_patches,
     moved_onto_shapes,
     node_patches,
     on_shapes,
@@ -201,7 +199,8 @@ def test_a_mesh_of_another_volume_is_not_the_part(stretch):
 @pytest.mark.parametrize(("other", "missing"), [(1, "base"), (0, "tip"), (2, "base")])
 def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
-    patches = Patches(np.full(len(CUBE_TRIANGLES), other), (None, None, None))
+    far = Plane(50 * Z, Z)  # out of every corner's reach
+    patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))
     with pytest.raises(BadInput, match=f"cube: no face of the mesh on the {missing}"):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 

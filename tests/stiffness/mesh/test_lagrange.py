@@ -15,7 +15,7 @@ from stiffness.mesh.lagrange import (
     quadrature,
     shape_functions,
 )
-from stiffness.mesh.mesh import Solid
+from stiffness.mesh.solid import Solid
 from tests.solids_for_tests import bar_solid, box_solid
 
 ORDERS = (1, 2, 3)

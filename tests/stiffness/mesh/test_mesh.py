@@ -9,14 +9,10 @@ import pytest
 from forcefit.native.libraries import load_library
 from stiffness.fem.quality import element_quality
 from stiffness.mesh import mesh as mesh_module
-from stiffness.mesh.mesh import (
-    MeshFailed,
-    boundary_faces,
-    cache_folder,
-    fit_to_patches,
-    mesh_solid,
-)
+from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
+from stiffness.mesh.mesh import mesh_solid
 from stiffness.mesh.refine import refine
+from stiffness.mesh.solid import boundary_faces
 from stiffness.surface.decimate import coarser_surface, euler_characteristic
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
@@ -303,13 +299,6 @@ def test_a_mesher_that_dies_is_reported(tmp_path, monkeypatch):
         mesh_solid(bar(), *faces, cache=tmp_path)
 
 
-def test_the_cache_is_where_the_user_says(monkeypatch, tmp_path):
-    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path))
-    assert cache_folder() == tmp_path
-    monkeypatch.delenv("FORCEFIT_CACHE")
-    assert cache_folder().name == "forcefit"
-
-
 def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
     """The ends' faces look along the bar, the side's across; its corners are on it."""
     surface, ends = bar(), (parse_interface("z=0"), parse_interface("z=0.1"))
@@ -329,24 +318,3 @@ def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
     assert np.hypot(side[..., 0], side[..., 1]) == pytest.approx(0.02)
     assert np.abs(along[solid.patch > 1]).max() < 1e-9
     assert (solid.volumes() > 0).all()
-
-
-@pytest.mark.parametrize(
-    ("system", "variable", "within"),
-    [
-        ("win32", "LOCALAPPDATA", ""),
-        ("darwin", "", "Library/Caches"),
-        ("linux", "XDG_CACHE_HOME", ".cache"),
-    ],
-)
-def test_the_cache_is_where_each_system_keeps_them(
-    system, variable, within, monkeypatch, tmp_path
-):
-    monkeypatch.setattr(mesh_module.sys, "platform", system)
-    monkeypatch.setattr(mesh_module.Path, "home", lambda: tmp_path / "me")
-    for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    assert cache_folder() == tmp_path / "me" / within / "forcefit"
-    if variable:
-        monkeypatch.setenv(variable, str(tmp_path / "other"))
-        assert cache_folder() == tmp_path / "other" / "forcefit"

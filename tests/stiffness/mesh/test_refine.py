@@ -5,7 +5,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from stiffness.mesh.mesh import Solid, boundary_faces
 from stiffness.mesh.refine import (
     _terminal_edges,
     chosen_by_all,
@@ -15,6 +14,7 @@ from stiffness.mesh.refine import (
     refine,
     split_edges,
 )
+from stiffness.mesh.solid import Solid, boundary_faces
 from tests.solids_for_tests import bar_solid, box_solid
 
 

@@ -5,6 +5,9 @@ import pytest
 
 from forcefit.inputs.table import BadInput
 from stiffness.surface.interface import Interface, parse_interface
+from stiffness.surface.patches import refuse_common_edges
+from stiffness.surface.surface import check_surface
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
 
 
 @pytest.mark.parametrize(
@@ -147,3 +150,12 @@ def test_a_table_says_what_is_wrong_with_it(table, message):
     assert str(caught.value).startswith("tip: " + message) or (
         message.startswith("did") and message in str(caught.value)
     )
+
+
+def test_rigid_faces_that_share_an_edge_are_refused():
+    """Two sides of a cube: the stiffness between them has no finite value."""
+    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
+    one, other = parse_interface("y=0"), parse_interface("z=0.1")
+    with pytest.raises(BadInput, match=r"cube: base .* and tip .* share an edge near"):
+        refuse_common_edges(surface, one, other)
+    refuse_common_edges(surface, one, parse_interface("y=0.1"))

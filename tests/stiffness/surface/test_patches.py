@@ -5,9 +5,7 @@ import pytest
 
 from forcefit.inputs.table import BadInput
 from stiffness.fem.elements import integration, isoparametric
-from stiffness.mesh.mesh import (
-    mesh_solid,
-)
+from stiffness.mesh.mesh import mesh_solid
 from stiffness.screws import rotation_matrix
 from stiffness.surface.facets import Facets
 from stiffness.surface.interface import parse_interface

@@ -80,6 +80,19 @@ def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
     assert tenth == pytest.approx(0.1 * read_surface("bar.stp", "dm").diagonal)
 
 
+@pytest.mark.parametrize(("size", "unit"), [(1e-4, "m"), (100.0, "mm")])
+def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkeypatch):
+    """A part of 0.1 m whose numbers are metres under the head of millimetres."""
+    points, triangles = cylinder(0.2 * size, size)
+    monkeypatch.setattr(
+        surface_module, "_read_triangles", lambda *_: (points, triangles)
+    )
+    with pytest.raises(
+        BadInput, match=f'"stated in the file"; is the file in "{unit}"'
+    ):
+        read_surface("bar.step", "inch")
+
+
 @pytest.mark.parametrize("corner", [-1, 8])
 def test_a_corner_beyond_the_points_is_refused(corner):
     wrong = CUBE_TRIANGLES.copy()
@@ -131,6 +144,14 @@ def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
         else:
             with pytest.raises(BadInput, match="cube: the surface is open: 4 edges"):
                 check_surface(points, triangles, "cube")
+
+
+def test_a_crowd_of_vertices_is_refused_before_their_pairs_fill_the_memory(rng):
+    """Two billion pairs of 1e-9 m would be 32 GB."""
+    points = np.concatenate([CUBE, 1e-9 * rng.normal(size=(60_000, 3))])
+    triangles = np.concatenate([CUBE_TRIANGLES, np.arange(8, 60_008).reshape(-1, 3)])
+    with pytest.raises(BadInput, match="dust: most of its 60008 vertices are nearer"):
+        check_surface(points, triangles, "dust")
 
 
 def test_a_wall_within_a_part_has_edges_of_three_triangles():

@@ -1,4 +1,4 @@
-"""Surfaces from MSH and STEP."""
+"""Surfaces from MSH and STEP, and readers in a process of their own."""
 
 import subprocess
 import sys
@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
+from stiffness.surface import surface_files
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import read_surface
-from stiffness.surface.surface_files import _sides
+from stiffness.surface.surface_worker import _sides, _step
+from tests.solids_for_tests import cylinder
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
 SIDES = [
@@ -97,11 +99,11 @@ def test_a_msh_file_that_is_none_is_refused(tmp_path, content, message, capfd):
 
 
 def test_step_without_gmsh_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "gmsh", None)
+    monkeypatch.setitem(sys.modules, "gmsh", None)
     path = tmp_path / "part.step"
     path.write_text("ISO-10303-21;")
     with pytest.raises(BadInput, match=r"install forcefit\[gmsh\], or export .* STL"):
-        read_surface(path)
+        _step(path, "")
 
 
 @pytest.fixture
@@ -189,12 +191,24 @@ def test_a_broken_step_file_is_refused(tmp_path, gmsh):
         read_surface(path)
 
 
-@pytest.mark.parametrize("face", ["f 1 2 4", "f 1 2 3\nf 2 3 400000000"])
-def test_a_face_of_points_that_are_not_there_is_refused(face, tmp_path):
-    """VTK's filters read beyond the points, and died of it."""
-    path = tmp_path / "part.obj"
-    path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{face}\n")
-    with pytest.raises(BadInput, match=r"found a cell of point \d+, expected 1 to 3"):
+@pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
+def test_a_file_that_crashes_its_reader_is_refused(tmp_path, kept):
+    """VTK reads beyond the end of a binary PLY file that is cut, and dies of it."""
+    pyvista = pytest.importorskip("pyvista")
+    path = tmp_path / "part.ply"
+    pyvista.PolyData.from_regular_faces(*cylinder()).save(path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(kept * len(content))])
+    with pytest.raises(BadInput, match=r"part\.ply: not a readable PLY file"):
+        read_surface(path)
+
+
+def test_a_reader_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+    """The time limit of the reader's process; none reads a file within 1 ms."""
+    path = tmp_path / "part.vtk"
+    path.write_text("# vtk DataFile Version 3.0\n")
+    monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)
+    with pytest.raises(BadInput, match=r"part\.vtk: not read after 0\.001 s as VTK"):
         read_surface(path)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
@@ -167,7 +168,7 @@ def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
 def test_rods_that_roll_are_held_and_said_to_be():
     """The delta's rods roll by radians under a load; without one they need no holding.
 
-    Then the exact model, in which they are free, is not compared.
+    Both virtual-joint models then have the same springs, and all agree.
     """
     still = crosscheck(erring("delta", 1600.0), (1.0, 0.5))
     assert still.passed, still.text()
@@ -176,7 +177,30 @@ def test_rods_that_roll_are_held_and_said_to_be():
     assert all(pair.simulated.held for pair in pushed.pairs)
     assert "held" in pushed.text()
     assert max(check.value for check in pushed.metric.limits.values()) < 1e-3
-    assert not any("do not explain" in name for name in pushed.checks)
+    springs = crosscheck(
+        erring("delta", 1600.0), (1.0, 0.5), load=[0, 0, 0, 50, 20, -9], links="spring"
+    )
+    assert springs.passed, springs.text()
+    shares = [c for k, c in springs.checks.items() if "do not explain" in k]
+    assert [check.verdict for check in shares] == ["ok", "ok"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("load", [None, [0, 0, 0, 0, 0, -100.0]])
+def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
+    """Rods that roll are held alike in all models, and no order hides another.
+
+    The slope through the logarithms was 1.36 for seed 2 under the load, and limits of
+    links failed by what the simulation's weak springs do to them.
+    """
+    robot = load_robot("delta")
+    sources = tolerance_sources(
+        robot, [3e-3] * 3 + [0] * 3, [f.name for f in robot.frames]
+    )
+    errors = sources.errors(sources.draw(0, 1, seed))[0]
+    check = crosscheck(home_posture(robot.with_errors(errors)), load=load)
+    assert check.passed, check.text()
 
 
 def test_two_scales_at_full_errors_are_made_enough(irsbot2):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from validation.crosscheck.limits import extrapolate, fit_slope
+from validation.crosscheck.limits import difference_slope, extrapolate, slope_check
 
 
 def test_extrapolation_is_exact_for_polynomials():
@@ -15,19 +15,55 @@ def test_extrapolation_is_exact_for_polynomials():
     np.testing.assert_allclose(extrapolate(s, values), [3, 0], atol=1e-14)
 
 
+SCALES = np.array([1.0, 0.5, 0.25, 0.125])
+
+
 def test_a_slope_ignores_what_is_below_the_floor():
     scales = [1.0, 0.1, 0.01]
-    assert fit_slope(scales, [1e-3, 1e-5, 1e-6], 1e-5 / 2) == pytest.approx(2.0)
-    assert math.isnan(fit_slope(scales, [1e-3, 1e-9, 1e-9], 1e-5))
+    slope = difference_slope(scales, [1e-3, 1e-5, 1e-6], 1e-5 / 2)
+    assert slope == pytest.approx(2.0)
+    assert math.isnan(difference_slope(scales, [1e-3, 1e-9, 1e-9], 1e-5))
 
 
-def test_a_third_order_term_does_not_spoil_the_slope():
-    """d = s^2 + s^3/2: the plain fit says 2.21, the one with a correction 2.02."""
-    s = np.array([1.0, 0.5, 0.25, 0.125])
-    assert fit_slope(s, s**2 + s**3 / 2, 0.0) == pytest.approx(2.0, abs=0.03)
+def test_higher_orders_do_not_change_the_slope_whatever_they_cancel():
+    """Second and third order nearly opposite: lines through logarithms say 2.9 to 1.8.
+
+    The polynomial through four scales holds orders one to four exactly.
+    """
+    second, third = np.array([1.4, 0.3, 0.0]), np.array([-1.3, -0.2, 0.4])
+    s = SCALES[:, None]
+    difference = second * s**2 + third * s**3 + 0.2 * s**4
+    sizes = np.linalg.norm(difference, axis=1)
+    local = np.diff(np.log(sizes)) / np.diff(np.log(SCALES))
+    assert np.abs(local - 2).max() > 0.3
+    assert difference_slope(SCALES, difference, 0.0) == pytest.approx(2.0, abs=1e-9)
 
 
-def test_a_first_order_term_of_two_per_cent_shows_in_the_slope():
-    """d = s^2 + s/50, two per cent of a difference that is itself one per cent."""
-    s = np.array([1.0, 0.5, 0.25, 0.125])
-    assert fit_slope(s, s**2 + s / 50, 0.0) < 2.0 - 0.1
+def test_a_difference_of_third_order_has_no_first_order_either():
+    """Where symmetry takes the second order away: no fault of the linear model."""
+    assert slope_check(SCALES, SCALES**3, 0.0, 0.1).verdict == "ok"
+
+
+@pytest.mark.parametrize(("first", "expected"), [(1.0, 1.0), (0.02, 2 - 0.16 / 1.16)])
+def test_the_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(
+    first, expected
+):
+    """d = s^2 + s/50 at 1/8: s^2 is 0.0156, s/50 is 0.0025, 0.16 of it."""
+    second = 1.0 if first < 1 else 0.0
+    found = difference_slope(SCALES, second * SCALES**2 + first * SCALES, 0.0)
+    assert found == pytest.approx(expected, abs=1e-9)
+    assert slope_check(
+        SCALES, second * SCALES**2 + first * SCALES, 0.0, 0.1
+    ).verdict == ("fails")
+
+
+def test_noise_that_may_be_the_whole_first_order_is_no_signal():
+    """1e-10 on differences of 2e-10 at the smallest scale; with 1e-12 it is a slope."""
+    rng = np.random.default_rng(1)
+    right = 2e-10 * (SCALES[:, None] / SCALES[-1]) ** 2 * [1.0, 0.0, 0.0]
+    noisy = right + 1e-10 * rng.choice([-1.0, 1.0], size=(4, 3))
+    verdict = slope_check(SCALES, noisy, 1e-10, 0.1).verdict
+    assert verdict in {"ok", "no signal"}
+    assert slope_check(SCALES, right, 1e-12, 0.1).verdict == "ok"
+    wrong = right + 1e-10 * SCALES[:, None] / SCALES[-1]
+    assert slope_check(SCALES, wrong, 1e-12, 0.1).verdict == "fails"

@@ -58,10 +58,10 @@ def test_numbers_of_a_function_are_zero_until_they_are_found():
 
 def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities):
     s, q = sensitivities
-    columns, mixed = s.basis("q.one", LINE)
+    columns, mixed = s.basis(("q.one",), LINE)
     np.testing.assert_allclose(columns.T @ columns / 12, np.eye(2), atol=1e-12)
     np.testing.assert_allclose(np.array([q**0, q]).T @ mixed, columns, atol=1e-12)
-    columns, mixed = s.basis("q.two", CandidateShape("powers", ("1",)))
+    columns, mixed = s.basis(("q.two",), CandidateShape("powers", ("1",)))
     assert not columns.any()
     assert mixed.tolist() == [[1.0]]
 
@@ -72,7 +72,7 @@ def test_a_power_that_is_the_one_below_it_but_for_rounding_is_left_out(width, ke
     campaign = bar(rows=36, temperature=1.0 + width * np.tile([-1.0, 1.0], 18))
     conditions = conditions_of(campaign)
     s = Sensitivities(conditions, campaign.robot, responses(conditions))
-    columns, mixed = s.basis("cov.temperature", LINE)
+    columns, mixed = s.basis(("cov.temperature",), LINE)
     assert mixed.shape == (2, kept)
     np.testing.assert_allclose(columns.T @ columns / 36, np.eye(kept), atol=1e-5)
 
@@ -82,7 +82,7 @@ def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):
     s, q = sensitivities
     ends = (("first", q[0]), ("last", q[-1]))
     shape = CandidateShape("spline", tuple("12345"), ends)
-    columns, mixed = s.basis("q.one", shape)
+    columns, mixed = s.basis(("q.one",), shape)
     assert np.sum(np.mean(columns**2, axis=0)) == pytest.approx(1.0)
     covariance = np.linalg.inv(roughness(5) + 0.1 * np.eye(5))
     factor = np.trace(covariance) / np.trace(mixed @ mixed.T)
@@ -93,7 +93,7 @@ def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):
 def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
     """T x, and their deviations; as small as they may be."""
     s, _ = sensitivities
-    _, mixed = s.basis("q.one", LINE)
+    _, mixed = s.basis(("q.one",), LINE)
     x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
     (function,) = s.fitted(one_at(("tx", "rz")), x, std)
     assert function.components == ("tx", "rz")
@@ -110,7 +110,7 @@ def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
 def test_components_that_are_not_seen_are_left_out(sensitivities):
     """Of one that is left its numbers have no name before theirs; of none, nothing."""
     s, _ = sensitivities
-    _, mixed = s.basis("q.one", LINE)
+    _, mixed = s.basis(("q.one",), LINE)
     x = np.array([1e-12, 0.0, 1e-3, 2e-3])
     (function,) = s.fitted(one_at(("tx", "rz")), x, np.full(4, 1e-4))
     assert function.components == ("rz",)
@@ -198,7 +198,7 @@ def test_a_column_has_mean_square_one_in_any_unit(units):
     campaign = bar(temperature=heat)
     conditions = conditions_of(campaign)
     s = Sensitivities(conditions, campaign.robot, responses(conditions))
-    columns, _ = s.basis("cov.temperature", CandidateShape("powers", ("1",)))
+    columns, _ = s.basis(("cov.temperature",), CandidateShape("powers", ("1",)))
     expected = heat / np.sqrt(np.mean(heat**2))
     np.testing.assert_allclose(columns[:, 0], expected, rtol=1e-12)
 

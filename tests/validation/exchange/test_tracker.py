@@ -236,7 +236,7 @@ def test_readings_joined_by_order_and_read_twice(lab, run):
         ("A 1 2 3\nA 1 2 4", {}, 'found 2 readings of "A" for 13 commands'),
         ("name;x;y;z;time\nA;1;2;3;noon", {}, "expected a time: seconds"),
         ("name;x;y;z;date\nA;1;2;3;3/4/2026 10:00:00", {}, 'expected dates = "day_fi'),
-        ("name;x;y;z;U95 x\nA;1;2;3;0", {}, "found 0, expected > 0"),
+        ("name;x;y;z;U95 x\nA;1;2;3;-4", {}, "found -0.002 m, expected >= 0"),
         ("", {}, "empty; expected a table"),
         ("A 1 2 3", {"unit": '"ft"'}, "unit: found 'ft'"),
         ("A 1 2 3", {"robot": None}, "robot: missing"),

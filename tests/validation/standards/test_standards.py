@@ -125,3 +125,56 @@ def test_where_the_device_stands_does_not_matter_to_repeatability(tmp_path, rng)
     (pose,) = standard_figures(read_campaign(folder)).poses
     assert pose.accuracy == pytest.approx(1.5e-5)
     assert pose.angles is None
+
+
+def distances(folder):
+    """Ids of each pair, and its AD_P [m]."""
+    figures = standard_figures(read_campaign(folder))
+    return {pair.labels: pair.accuracy for pair in figures.distances}
+
+
+TWO_POSES = [("a", "0"), ("b", repr(np.pi / 2))]
+
+
+def test_distance_accuracy_pairs_poses_of_one_load_only(tmp_path):
+    """A load moves both poses by 1 mm alike: every distance is the one commanded."""
+    rows = [
+        f"{name}{fx}{k},{angle},0,{0.001 * (fx > 0)},0,0,{fx}"
+        for name, angle in TWO_POSES for fx in (0, 100) for k in range(2)
+    ]  # fmt: skip
+    head = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,load.fx"
+    found = distances(write_campaign(tmp_path / "lab", head=head, rows=rows))
+    assert found == pytest.approx({("a00", "b00"): 0, ("a1000", "b1000"): 0}, abs=1e-15)
+
+
+def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
+    """On Tuesday the device stood 2 m elsewhere."""
+    rows = [
+        f"{name}{day}{k},{day},{angle},0,{shift},0,0"
+        for name, angle in TWO_POSES
+        for day, shift in (("mon", 0), ("tue", 2)) for k in range(2)
+    ]  # fmt: skip
+    head = "id,session,q.one,q.two,meas.tx,meas.ty,meas.tz"
+    toml = {"registration": '"unknown"'}
+    folder = write_campaign(tmp_path / "lab", head=head, rows=rows, toml=toml)
+    found = distances(folder)
+    assert set(found) == {("amon0", "bmon0"), ("atue0", "btue0")}
+    assert np.abs(list(found.values())).max() < 1e-15
+
+
+def test_positioning_of_an_axis_is_told_apart_by_load(tmp_path):
+    """A deflection of 1 mm under a load is no deviation along the axis: E = 20 um."""
+    rows = [
+        f"{name}{fx}{side}{k},{angle},0,{1e-5 * (fx + side)},0,0,{side},{fx}"
+        for name, angle in TWO_POSES
+        for fx in (0, 100) for side in (-1, 1) for k in range(2)
+    ]  # fmt: skip
+    rows = [f"{row},{time}" for time, row in enumerate(rows)]
+    head = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.approach,load.fx,cov.time"
+    folder = write_campaign(tmp_path / "lab", head=head, rows=rows)
+    axes = standard_figures(read_campaign(folder)).axes
+    tx = {
+        name: axis.systematic_deviation for name, axis in axes.items() if "tx" in name
+    }
+    expected = {"tx from a0-10": 2e-5, "tx from a100-10": 2e-5}
+    assert tx == pytest.approx(expected, rel=1e-9)

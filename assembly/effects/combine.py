@@ -1,0 +1,116 @@
+"""An effect that a robot's file declares, together with the difference found for it.
+
+Effects act one after the other: the declared one first, then what a diagnosis found.
+Both together are one effect again, with other numbers: offsets and compliances add,
+factors multiply, eccentricities add as vectors, turned frames are multiplied.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from assembly.effects.effect import Values
+from assembly.effects.registration import BASE
+from stiffness.screws import rotation_matrix, rotation_vector
+
+Effects = Mapping[str, Values]
+
+
+def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
+    """Effects of a robot's file with what was found in addition to them.
+
+    Args:
+        declared: parameters by their public names, by effect.
+        found: of effects that act after the declared ones, in the same form.
+
+    Returns:
+        Parameters of every effect, which do the same as both in turn.
+
+    Raises:
+        ValueError: no numbers of the effect do the same: two contact laws in one
+            joint, or two drifts of different time constants.
+    """
+    both = {name: dict(values) for name, values in declared.items()}
+    for name, values in found.items():
+        before = both.get(name)
+        if before is None:
+            both[name] = dict(values)
+        else:
+            both[name] = _COMBINE.get(name, _sum)(before, values)
+    return both
+
+
+def _sum(declared: Values, found: Values) -> dict[str, float]:
+    """Parameters that add."""
+    return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
+
+
+def _in_series(declared: Values, found: Values) -> dict[str, float]:
+    """Stiffnesses of springs in series; absent means rigid."""
+    soft = {k: 1 / v + 1 / declared.get(k, math.inf) for k, v in found.items()}
+    return dict(declared) | {k: 1 / c for k, c in soft.items()}
+
+
+def _product(declared: Values, found: Values) -> dict[str, float]:
+    """Factors, one after the other."""
+    return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
+
+
+def _load(declared: Values, found: Values) -> dict[str, float]:
+    """Gains of the load, the found one of what the declared one gives."""
+    factor = found.get("factor", 1.0)
+    offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
+    more = {k: v for k, v in found.items() if k != "factor"}
+    return {"factor": factor * declared.get("factor", 1.0), **_sum(offsets, more)}
+
+
+def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
+    """Amplitude and phase of two sines of one angle."""
+    both = dict(declared)
+    for key, amplitude in found.items():
+        name, _, kind = key.rpartition(".")
+        if kind != "amplitude":
+            continue
+        phase = f"{name}.phase"
+        vector = amplitude * np.exp(1j * found.get(phase, 0.0))
+        vector += declared.get(key, 0.0) * np.exp(1j * declared.get(phase, 0.0))
+        both[key], both[phase] = float(abs(vector)), float(np.angle(vector))
+    return both
+
+
+def _registration(declared: Values, found: Values) -> dict[str, float]:
+    """The found turn and shift of the frame that the declared one gives."""
+    first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
+    R = rotation_matrix(second[:3])
+    turn = rotation_vector(R @ rotation_matrix(first[:3]))
+    placed = np.concatenate([turn, R @ first[3:] + second[3:]])
+    tool = [{k: x for k, x in v.items() if k not in BASE} for v in (declared, found)]
+    return {**_sum(*tool), **dict(zip(BASE, placed.tolist(), strict=True))}
+
+
+def _drift(declared: Values, found: Values) -> dict[str, float]:
+    """Amplitudes of one time constant."""
+    constant = declared["time_constant"]
+    if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
+        raise ValueError("drifts of different time constants are no single drift")
+    return {**_sum(declared, found), "time_constant": constant}
+
+
+def _contact(declared: Values, found: Values) -> dict[str, float]:
+    """Contact laws of different joints."""
+    if set(declared) & set(found):
+        raise ValueError("two contact laws in series are no single contact law")
+    return {**declared, **found}
+
+
+_COMBINE: dict[str, Callable[[Values, Values], dict[str, float]]] = {
+    "drive_compliance": _in_series,
+    "base_compliance": _in_series,
+    "modulus_scale": _product,
+    "load_gain": _load,
+    "encoder_eccentricity": _eccentricity,
+    "registration": _registration,
+    "drift": _drift,
+    "contact_stiffening": _contact,
+}

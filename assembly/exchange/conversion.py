@@ -1,0 +1,81 @@
+"""What became of a robot that was converted, for people and for machines."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from assembly.exchange.mujoco_reading import Comparison
+from assembly.model.robot import Robot
+from forcefit.inputs.errors import quoted
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """What became of a robot.
+
+    Attributes:
+        robot: as it stands in the robot file, or as it was read from one.
+        files: written.
+        open_before: [rad, m] what the loops leave open where the file's own home is.
+        open_after: [rad, m] likewise in the home that was found.
+        drives_held: whether the drives stand where the file has them.
+        difference: largest of any body's pose in 100 random postures, read back.
+        comparisons: with what another program reads in the files.
+        left_out: what the new file cannot hold, in words.
+        taken: what the files leave open, and what was taken, in words.
+    """
+
+    robot: Robot
+    files: tuple[Path, ...]
+    open_before: float
+    open_after: float
+    drives_held: bool
+    difference: float
+    left_out: tuple[str, ...]
+    taken: tuple[str, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether no other program read another robot."""
+        return all(comparison.agrees for comparison in self.comparisons)
+
+    def table(self) -> dict[str, Any]:
+        """Plain values for ``--json``."""
+        return {
+            "robot": self.robot.name,
+            "platform": self.robot.platform,
+            "frames": len(self.robot.frames),
+            "closures": len(self.robot.closures),
+            "files": [str(path) for path in self.files],
+            "home": {
+                "open_before": self.open_before,
+                "open_after": self.open_after,
+                "drives_held": self.drives_held,
+            },
+            "largest_difference": self.difference,
+            "compared": [comparison.table() for comparison in self.comparisons],
+            "left_out": list(self.left_out),
+            "taken": list(self.taken),
+        }
+
+    def text(self) -> str:
+        """A few lines for people."""
+        robot = self.robot
+        count = len(robot.closures)
+        lines = [
+            f"{robot.name}: {len(robot.frames)} frames, "
+            f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
+            f"read back in 100 random postures: bodies within {self.difference:.1e} "
+            "(by forcefit itself: nothing was lost in writing)",
+            *(comparison.text() for comparison in self.comparisons),
+        ]
+        if count:
+            moved = "" if self.drives_held else "; the drives had to move"
+            lines.append(
+                f"home: loops open by {self.open_before:.2g} rad or m in the file's "
+                f"own, {self.open_after:.1e} in the one found{moved}"
+            )
+        lines += [f"taken: {line}" for line in self.taken]
+        lines += [f"left out: {line}" for line in self.left_out]
+        return "\n".join([*lines, f"written: {', '.join(map(str, self.files))}"])

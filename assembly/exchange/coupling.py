@@ -1,0 +1,85 @@
+"""Joints that follow other joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from forcefit.inputs.errors import BadInput, quoted
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that follows another: q = rest + sum of c_k (q_leader - leader_rest)^k.
+
+    Attributes:
+        follower: name of the joint.
+        leader: name of the other, None where the follower is held.
+        coefficients: c_0, c_1, ..
+        rest: [rad or m] of the follower.
+        leader_rest: [rad or m] likewise of the leader.
+    """
+
+    follower: str
+    leader: str | None
+    coefficients: tuple[float, ...]
+    rest: float = 0.0
+    leader_rest: float = 0.0
+
+    def at(self, leader: float) -> tuple[float, float]:
+        """The follower's coordinate at the leader's, and its derivative."""
+        x = leader - self.leader_rest
+        value = slope = 0.0
+        for c in reversed(self.coefficients):
+            slope = slope * x + value
+            value = value * x + c
+        return self.rest + value, slope
+
+    def text(self) -> str:
+        """The rule in words, with the names of both joints."""
+        c = [*self.coefficients, 0.0, 0.0]
+        if self.leader is None:
+            return f"{self.follower} = {self.rest + c[0]:g}"
+        if not any(c[2:]):
+            offset = self.rest + c[0] - c[1] * self.leader_rest
+            return f"{self.follower} = {c[1]:g} * {self.leader} + {offset:g}"
+        terms = [f"{v:g} * x^{k}" for k, v in enumerate(c) if v and k]
+        shift = f" - {self.leader_rest:g}" if self.leader_rest else ""
+        sum_of_terms = " + ".join([f"{self.rest + c[0]:g}", *terms])
+        return f"{self.follower} = {sum_of_terms}, x = {self.leader}{shift}"
+
+
+def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
+    """Couplings sorted so that a leader's own comes first.
+
+    Args:
+        couplings: in any order.
+        file: for messages.
+
+    Returns:
+        The couplings.
+
+    Raises:
+        BadInput: a joint follows two others, itself, or one that follows it.
+    """
+    of: dict[str, Coupling] = {}
+    for coupling in couplings:
+        if coupling.follower in of:
+            raise BadInput(
+                f"{file}: joint {quoted(coupling.follower)}: found two rules by which "
+                "it follows, expected one"
+            )
+        of[coupling.follower] = coupling
+    order: list[Coupling] = []
+    for first in couplings:
+        path: list[Coupling] = []
+        one: Coupling | None = first
+        while one is not None and one not in order:
+            if one in path:
+                ring = " -> ".join(quoted(c.follower) for c in path)
+                raise BadInput(
+                    f"{file}: joint {quoted(one.follower)}: found that it follows "
+                    f"itself ({ring}), expected another joint"
+                )
+            path.append(one)
+            one = of.get(one.leader or "")
+        order += reversed(path)
+    return tuple(order)

@@ -1,0 +1,122 @@
+"""MJCF's joints as joints of one freedom, and their places in a key."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import HERE, Joint, ball, motion, slides
+from assembly.exchange.mjcf_orientation import Angles
+from assembly.exchange.orientation import from_quaternion
+from assembly.exchange.xml_file import Node, placed
+from forcefit.inputs.errors import quoted
+
+_ZERO = np.zeros(3)
+
+
+def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list[Joint]:
+    """A ball joint, or the six freedoms of a body that nothing holds.
+
+    Args:
+        given: the element, defaults filled in.
+        name: of the joint.
+        kind: ``"ball"`` or ``"free"``.
+        offset: (4, 4) of the frame in which it is written, seen from the body.
+
+    Returns:
+        Joints of one freedom, in order, their bodies left open.
+
+    Raises:
+        BadInput: a number is none.
+    """
+    freedoms = ball() if kind == "ball" else slides() + ball()
+    anchor = np.eye(4)
+    if kind == "ball":
+        anchor = offset @ placed(given.numbers("pos", 3, "m", _ZERO), np.eye(3))
+    last = len(freedoms) - 1
+    return [
+        Joint(
+            f"{name}.{part}", one, "", "",
+            placement=anchor if i == 0 else HERE, axis=axis,
+            after=np.linalg.inv(anchor) if i == last else HERE,
+        )
+        for i, (part, one, axis) in enumerate(freedoms)
+    ]  # fmt: skip
+
+
+def one_freedom(
+    given: Node, name: str, kind: str, offset: NDArray, angles: Angles
+) -> Joint:
+    """A hinge or a slide, with its spring.
+
+    Args:
+        given: the element, defaults filled in.
+        name: of the joint.
+        kind: ``"revolute"`` or ``"prismatic"``.
+        offset: (4, 4) of the frame in which it is written, seen from the body.
+        angles: of the file.
+
+    Returns:
+        The joint, its bodies left open.
+
+    Raises:
+        BadInput: a number is none, or the axis is no direction.
+    """
+    unit = angles.unit
+    pos = given.numbers("pos", 3, "m", _ZERO)
+    anchor = offset @ placed(pos, np.eye(3))
+    axis = given.unit_vector("axis", np.array([0.0, 0.0, 1.0]))
+    ref = given.number("ref", "angle or m", 0.0)
+    ref *= unit if kind == "revolute" else 1.0
+    joint = Joint(name, kind, "", "", anchor, axis, np.linalg.inv(anchor))
+    stiffness, rest = 0.0, 0.0
+    if len(given.optional("stiffness").split()) == 1:
+        stiffness = given.number("stiffness", "N m/rad or N/m")
+        rest = given.number("springref", "angle or m", 0.0)
+        rest *= unit if kind == "revolute" else 1.0
+    # the coordinate at rest is ref: the joint's own zero lies before it
+    return replace(
+        joint, placement=anchor @ motion(joint, -ref), position=ref,
+        stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
+    )  # fmt: skip
+
+
+def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
+    """Range of a hinge or slide; ``limited`` absent means that a range binds."""
+    limited = node.optional("limited") or "auto"
+    binds = limited == "true" or (limited == "auto" and angles.range_limits)
+    if not node.has("range") or not binds:
+        return None
+    ends = node.text("range").split()
+    if len(ends) != 2:
+        raise node.bad("range", f"found {quoted(' '.join(ends))}, expected 2 numbers")
+    unit = angles.unit if kind == "revolute" else 1.0
+    return node.limits(ends[0], ends[1], unit)
+
+
+def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
+    """A joint at its numbers of a key; the first of several takes up their motion.
+
+    Args:
+        key: the element.
+        joint: of one freedom, or the first of a ball or free joint.
+        values: one number, a quaternion, or a place and a quaternion.
+
+    Returns:
+        The joint at home.
+
+    Raises:
+        BadInput: a quaternion of zero.
+    """
+    if len(values) == 1:
+        return replace(joint, position=float(values[0]))
+    quaternion = values[-4:]
+    if not quaternion.any():
+        raise key.bad("qpos", f"found a quaternion of zero for {quoted(joint.name)}")
+    turn = placed(
+        values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
+    )
+    # a free body's numbers are its place in the world, a ball's its turn from rest
+    return replace(
+        joint, placement=turn if len(values) == 7 else joint.placement @ turn
+    )

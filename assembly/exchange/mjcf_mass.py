@@ -1,0 +1,179 @@
+"""Masses of MJCF's bodies: written, or made of shapes, bounded and scaled.
+
+Sources:
+    MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
+    ``inertiagrouprange``, ``boundmass``, ``settotalmass``) and geom (sizes, ``fromto``,
+    ``mass``, ``density``, ``shellinertia``); the area of an ellipsoid by Thomsen's
+    formula, which MuJoCo uses.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import WORLD, Body
+from assembly.exchange.shapes import area, together, volume
+from assembly.exchange.xml_file import Node
+
+_SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+_REGULAR = 1e-6  # [kg] bounds up to it only let a body without mass be moved
+_KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
+
+
+@dataclass(frozen=True, eq=False)
+class MassRules:
+    """What the compiler does with masses.
+
+    Attributes:
+        from_shapes: ``true``, ``false`` or ``auto``: where none is written.
+        groups: least and largest group of the shapes that count.
+        least: [kg] of every body.
+        total: [kg] to which all are scaled, if above zero.
+    """
+
+    from_shapes: str = "auto"
+    groups: tuple[float, float] = (0.0, 5.0)
+    least: float = 0.0
+    total: float = -1.0
+
+    @staticmethod
+    def of(root: Node) -> "MassRules":
+        """As the file's compilers say, the last counts."""
+        rules = MassRules()
+        for node in root.children("compiler"):
+            groups = node.numbers(
+                "inertiagrouprange", 2, "group", np.array(rules.groups)
+            )
+            rules = MassRules(
+                node.choice(
+                    "inertiafromgeom", ("false", "true", "auto"), rules.from_shapes
+                ),
+                (float(groups[0]), float(groups[1])),
+                node.number("boundmass", "kg", rules.least),
+                node.number("settotalmass", "kg", rules.total),
+            )
+        return rules
+
+    def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
+        """Bodies of a file, each at least as heavy as it says, all scaled."""
+        least = self.least if self.least > _REGULAR else 0.0
+        bounded = {
+            name: replace(body, mass=max(body.mass, least)) if name != WORLD else body
+            for name, body in bodies.items()
+        }  # fmt: skip
+        total = sum(body.mass for body in bounded.values())
+        if self.total <= 0 or not total:
+            return bounded
+        factor = self.total / total
+        return {k: replace(b, mass=b.mass * factor) for k, b in bounded.items()}
+
+
+def written_mass(inertial: Node, offset: NDArray) -> tuple[float, NDArray]:
+    """[kg] and (3,) [m] of ``inertial``, seen from its body.
+
+    Args:
+        inertial: the element.
+        offset: (4, 4) of the frame in which it stands, seen from the body.
+
+    Returns:
+        Mass and centre.
+
+    Raises:
+        BadInput: the mass is below zero, or a number is none.
+    """
+    mass = inertial.number("mass", "kg")
+    if mass < 0:
+        raise inertial.bad("mass", f"found {mass:g}, expected >= 0 [kg]")
+    centre = inertial.numbers("pos", 3, "m", np.zeros(3))
+    return mass, offset[:3, :3] @ centre + offset[:3, 3]
+
+
+def shape_mass(
+    geom: Node, T: NDArray, rules: MassRules
+) -> tuple[float, NDArray] | None:
+    """[kg] and (3,) [m] of a shape; None where it is a mesh, whose volume is not known.
+
+    Args:
+        geom: the element, defaults filled in.
+        T: (4, 4) where it stands in its body.
+        rules: of the file.
+
+    Returns:
+        Mass and centre.
+
+    Raises:
+        BadInput: a size or mass is not what it should be.
+    """
+    kind = geom.choice("type", _KINDS, "sphere")
+    group = geom.number("group", "-", 0.0)
+    if kind == "plane" or not rules.groups[0] <= group <= rules.groups[1]:
+        return 0.0, T[:3, 3]
+    given = geom.number("mass", "kg") if geom.has("mass") else None
+    if given is not None and given < 0:
+        raise geom.bad("mass", f"found {given:g}, expected >= 0 [kg]")
+    if kind not in _SIZES or geom.has("mesh"):  # or a shape fitted to a mesh
+        return (0.0, T[:3, 3]) if given == 0.0 else None
+    if given is not None:
+        return given, T[:3, 3]
+    density = geom.number("density", "kg/m^3", 1000.0)
+    sizes = _sizes(geom, kind)
+    if geom.optional("shellinertia") == "true":
+        skin = _thomsen(sizes) if kind == "ellipsoid" else area(kind, sizes)
+        return density * skin, T[:3, 3]
+    return density * volume(kind, sizes), T[:3, 3]
+
+
+def _sizes(geom: Node, kind: str) -> list[float]:
+    """[m] sizes of a shape, lengths and edges whole."""
+    given = geom.optional("size").split()
+    count = _SIZES[kind]
+    if geom.has("fromto"):
+        ends = geom.numbers("fromto", 6, "m")
+        half = float(np.linalg.norm(ends[3:] - ends[:3])) / 2
+        radius = _first(geom, len(given))
+        sizes = [radius, half] if count == 2 else [radius, radius, half]
+    else:
+        # numbers beyond those that the shape needs mean nothing
+        sizes = geom.numbers("size", max(count, len(given)), "m").tolist()[:count]
+    if min(sizes) <= 0:
+        raise geom.bad("size", f"found {min(sizes):g}, expected > 0 [m]")
+    if kind == "box":
+        return [2 * size for size in sizes]
+    return [sizes[0], 2 * sizes[1]] if count == 2 else sizes
+
+
+def _first(geom: Node, count: int) -> float:
+    """[m] the first size."""
+    return float(geom.numbers("size", max(1, count), "m")[0])
+
+
+def _thomsen(half_axes: list[float]) -> float:
+    """[m^2] area of an ellipsoid, to 1 %."""
+    a, b, c = (x**1.6075 for x in half_axes)
+    return 4 * math.pi * ((a * b + b * c + c * a) / 3) ** (1 / 1.6075)
+
+
+def body_of(
+    name: str, written: tuple[float, NDArray] | None,
+    shapes: list[tuple[float, NDArray]], rules: MassRules,
+) -> Body:  # fmt: skip
+    """A body of what is written of its mass and of its shapes.
+
+    Args:
+        name: of the body.
+        written: [kg] and (3,) [m], None without ``inertial``.
+        shapes: the same of each shape.
+        rules: of the file.
+
+    Returns:
+        The body.
+    """
+    use_shapes = rules.from_shapes == "true" and bool(shapes)
+    if written is not None and not use_shapes:
+        return Body(name, *written)
+    if rules.from_shapes == "false" or not shapes:
+        return Body(name)
+    return Body(name, *together(*zip(*shapes, strict=True)))

@@ -1,0 +1,206 @@
+"""What ties MJCF's bodies beside joints: equality constraints, tendons, actuators.
+
+Sources:
+    MuJoCo documentation, XML reference, equality: ``connect`` and ``weld`` hold what
+    coincides in the initial configuration unless sites or ``relpose`` say more; of a
+    weld ``anchor`` is a place of body2, which meets the place of ``relpose`` in body1;
+    joint1 = rest1 + polynomial in (joint2 - rest2).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    WORLD,
+    Loop,
+)
+from assembly.exchange.orientation import from_quaternion
+from assembly.exchange.xml_file import Node, placed
+from forcefit.inputs.errors import nearest, quoted
+from stiffness.screws import transform
+
+LOADED = ", not converted, though it may carry load"
+_DRIVEN_BY = ("joint", "jointinparent")
+
+
+@dataclass
+class Ties:
+    """Constraints of a file, and what of it is left out.
+
+    Attributes:
+        root: ``<mujoco>``.
+        defaults: attributes of ``equality`` by default.
+        sites: body and (4, 4) place in it, by name.
+        rests: [rad or m] coordinate in the initial configuration by joint.
+        parts: joints of one freedom by that of the whole.
+        extra: what is left out, with names; added to.
+    """
+
+    root: Node
+    defaults: Mapping[str, str]
+    sites: Mapping[str, tuple[str, NDArray]]
+    rests: Mapping[str, float]
+    parts: Mapping[str, list[str]]
+    extra: dict[str, list[str]] = field(default_factory=dict)
+
+    def leave_out(self, what: str, name: str) -> None:
+        """Take down what is not converted."""
+        self.extra.setdefault(what, []).append(name)
+
+    @cached_property
+    def equalities(self) -> list[Node]:
+        """Active constraints, those by default too; others are left out."""
+        given = [n for g in self.root.children("equality") for n in g.children()]
+        default = self.defaults.get("active", "true")
+        off = [node for node in given if node.element.get("active", default) == "false"]
+        for node in off:
+            self.leave_out(f"equality {node.tag}, not active", _name(node))
+        return [node for node in given if node not in off]
+
+    def loops(self, poses: Mapping[str, NDArray]) -> Iterator[Loop]:
+        """``connect`` and ``weld`` as loops.
+
+        Args:
+            poses: (4, 4) of all bodies in the initial configuration.
+
+        Yields:
+            The loops.
+
+        Raises:
+            BadInput: a body or site is not there, or both ends are of one body.
+        """
+        names: set[str] = set()
+        for count, node in enumerate(self.equalities, 1):
+            if node.tag in {"tendon", "joint"}:
+                continue
+            if node.tag not in {"connect", "weld"}:
+                raise node.bad("", "found it, expected connect, weld, joint or tendon")
+            name = node.optional("name") or f"loop{count}"
+            if name in names:
+                raise node.bad("name", "found it twice; expected names that differ")
+            names.add(name)
+            loop = self._loop(node, name, poses)
+            if loop.first == loop.second:
+                found = f"found {quoted(loop.first)} twice, expected two bodies"
+                raise node.bad("", found)
+            yield loop
+
+    def _loop(self, node: Node, name: str, poses: Mapping[str, NDArray]) -> Loop:
+        """One ``connect`` or ``weld``."""
+        point = node.tag == "connect"
+        # a weld whose turns weigh nothing holds its anchor only
+        point |= node.number("torquescale", "-", 1.0) == 0.0
+        if node.has("site1"):
+            (a, A), (b, B) = (
+                _known(node, key, self.sites) for key in ("site1", "site2")
+            )
+            return Loop(name, a, b, A, B, point)
+        bodies = {body: body for body in poses}
+        a = _known(node, "body1", bodies)
+        b = _known(node, "body2", bodies) if node.has("body2") else WORLD
+        if node.tag == "connect":
+            A = placed(node.numbers("anchor", 3, "m"), np.eye(3))
+            there = np.linalg.inv(poses[b]) @ poses[a] @ A
+            return Loop(name, a, b, A, transform(there[:3, 3], np.eye(3)), point)
+        B = placed(node.numbers("anchor", 3, "m", np.zeros(3)), np.eye(3))
+        given = node.numbers("relpose", 7, "m, -", np.zeros(7))
+        if given[3:].any():
+            A = placed(given[:3], from_quaternion(given[3:]))
+        else:
+            A = np.linalg.inv(poses[a]) @ poses[b] @ B
+        return Loop(name, a, b, A, B, point)
+
+    def couplings(self, driven: set[str]) -> Iterator[Coupling]:
+        """``joint`` constraints: joints that follow others.
+
+        Args:
+            driven: joints with an actuator.
+
+        Yields:
+            The couplings; of a driven follower of a joint without a drive the inverse,
+            where the rule is a straight line.
+
+        Raises:
+            BadInput: a joint is not there, or has several freedoms.
+        """
+        for node in self.equalities:
+            if node.tag != "joint":
+                continue
+            keys = [key for key in ("joint1", "joint2") if node.has(key)]
+            first, *second = [
+                _known(node, key, {name: name for name in self.rests}) for key in keys
+            ] or [node.text("joint1")]
+            leader = second[0] if second else None
+            c = _polynomial(node)
+            rest = self.rests[first]
+            other = 0.0 if leader is None else self.rests[leader]
+            rules = c if leader is not None else c[:1]
+            turned = leader is not None and first in driven and leader not in driven
+            if turned and c[1] and not any(c[2:]):
+                yield Coupling(
+                    str(leader), first, (-c[0] / c[1], 1 / c[1]), other, rest
+                )
+            else:
+                while len(rules) > 1 and not rules[-1]:
+                    rules.pop()
+                yield Coupling(first, leader, tuple(rules), rest, other)
+
+    def driven(self) -> set[str]:
+        """Joints with an actuator; other actuators are left out."""
+        names = set()
+        for group in self.root.children("actuator"):
+            for node in group.children():
+                key = next((key for key in _DRIVEN_BY if node.has(key)), None)
+                if key is None:
+                    held = [k for k in ("tendon", "site", "body", "cranksite")
+                            if node.has(k)]  # fmt: skip
+                    what = f"actuator of a {held[0] if held else node.tag}{LOADED}"
+                    self.leave_out(what, _name(node, held))
+                    continue
+                name = node.text(key)
+                if name not in self.parts:
+                    hint = nearest(name, self.parts)
+                    raise self.root.bad(
+                        "actuator", f"found {quoted(name)}, no joint{hint}"
+                    )
+                names.add(name)
+        return names
+
+    def tendons(self) -> None:
+        """Leave out tendons and what holds them, by name."""
+        for group in self.root.children("tendon"):
+            for node in group.children():
+                self.leave_out(f"tendon{LOADED}", f"{node.tag} {_name(node)}".strip())
+        for node in self.equalities:
+            if node.tag == "tendon":
+                self.leave_out(f"equality tendon{LOADED}", _name(node, ["tendon1"]))
+
+
+def _polynomial(node: Node) -> list[float]:
+    """Five coefficients; those that are not written are the format's default."""
+    count = len(node.optional("polycoef").split())
+    default = [0.0, 1.0, 0.0, 0.0, 0.0]
+    if not count:
+        return default
+    given = node.numbers("polycoef", min(count, 5), "-").tolist()
+    return [*given, *default[count:]]
+
+
+def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
+    """Of an element, or of what it holds."""
+    found = (node.optional(key) for key in ("name", *keys))
+    return next((name for name in found if name), "")
+
+
+def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
+    """What a name stands for."""
+    name = node.text(key)
+    if name not in valid:
+        raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")
+    return valid[name]

@@ -1,0 +1,298 @@
+"""What MuJoCo reads in a robot's file, beside what was read here.
+
+MuJoCo is not needed; where it is installed, its own compiler and kinematics say where
+bodies stand, what they weigh and how far constraints are open, in random postures.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import Mechanism, body_poses
+from assembly.exchange.orientation import to_quaternion
+from assembly.exchange.xml_file import read_xml
+from forcefit.inputs.errors import one_line
+from stiffness.screws import rotation_vector
+
+AGREED = 1e-9  # [rad, m, kg over the largest] what another program may differ by
+_POSTURES = 20
+_LIGHTEST = 1.01e-6  # [kg] what a body without a mass may get, to be moved at all
+_UNIT_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
+_DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What another program read in a file, compared with what was read here.
+
+    Attributes:
+        reader: its name and version.
+        file: that both read.
+        why_not: the reason where it could not be compared, else empty.
+        bodies: how many were compared.
+        masses: of how many bodies.
+        loops: how many.
+        difference: the largest, [rad, m] or relative mass; lengths over the robot's
+            size where that is above 1 m.
+        where: of the largest difference, in words.
+        weights: [kg] and (3,) [m] of bodies whose mass only the other program knows.
+    """
+
+    reader: str
+    file: str
+    why_not: str = ""
+    bodies: int = 0
+    masses: int = 0
+    loops: int = 0
+    difference: float = 0.0
+    where: str = ""
+    weights: Mapping[str, tuple[float, NDArray]] = field(default_factory=dict)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it found the same robot; what was not compared is no difference."""
+        return self.difference <= AGREED
+
+    def table(self) -> dict[str, Any]:
+        """Plain values for ``--json``."""
+        keys = ("reader", "file", "why_not", "bodies", "masses", "loops", "difference",
+                "where")  # fmt: skip
+        return {key: getattr(self, key) for key in keys}
+
+    def text(self) -> str:
+        """One line for people."""
+        if self.why_not:
+            return f"{self.file} was compared with no other program: {self.why_not}"
+        what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
+        if not self.agrees:
+            return (
+                f"{self.reader} reads {self.file} otherwise: {self.where} differs by "
+                f"{self.difference:.2g}; find out which is right"
+            )
+        return (
+            f"{self.reader} reads {self.file} alike within {self.difference:.1e} in "
+            f"{_POSTURES} random postures: {what}"
+        )
+
+
+def compare(mechanism: Mechanism, path: Path) -> Comparison:
+    """Compare a mechanism with what MuJoCo reads in its file.
+
+    Args:
+        mechanism: as it was read, or as it was written.
+        path: of a URDF or MJCF file.
+
+    Returns:
+        What was compared, or why nothing was.
+    """
+    name = path.name
+    if path.suffix.lower() not in {".urdf", ".xml"}:
+        return Comparison("", name, f"MuJoCo reads no {path.suffix.upper()[1:]}")
+    try:
+        import mujoco
+    except ImportError:
+        return Comparison("", name, "MuJoCo is not installed")
+    reader = f"MuJoCo {mujoco.__version__}"
+    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log file
+    try:
+        with catch_warnings():
+            simplefilter("ignore")
+            model, whole = _model(mujoco, path)
+        return _compared(mujoco, model, mechanism, Comparison(reader, name), whole)
+    except Exception as error:  # of many kinds, from C++
+        reason = (
+            f"{reader} does not read it ({one_line(' '.join(str(error).split()), 160)})"
+        )
+        return Comparison(reader, name, reason)
+
+
+def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
+    """The compiled model, and whether its meshes were there."""
+    if path.suffix.lower() == ".urdf":
+        return _settled(mujoco, mujoco.MjSpec.from_string(_bare_urdf(path))), True
+    try:
+        return _settled(mujoco, mujoco.MjSpec.from_file(str(path))), True
+    except ValueError:
+        spec = mujoco.MjSpec.from_file(str(path))
+        drawn = [g for g in spec.geoms if g.meshname or g.hfieldname]
+        parts = (drawn, spec.skins, spec.meshes, spec.hfields)
+        for part in [one for several in parts for one in several]:
+            spec.delete(part)
+        for geom in spec.geoms:
+            geom.material = ""
+        for part in [*spec.materials, *spec.textures]:
+            spec.delete(part)
+        return _settled(mujoco, spec), False
+
+
+def _settled(mujoco: Any, spec: Any) -> Any:
+    """A model in which bodies keep their frames and may have no mass."""
+    compiler = spec.compiler
+    compiler.fusestatic = compiler.alignfree = 0
+    for joint in spec.joints:
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
+    compiler.balanceinertia = 1
+    compiler.boundmass = max(compiler.boundmass, 1e-9)
+    compiler.boundinertia = max(compiler.boundinertia, 1e-9)
+    model = spec.compile()
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    return model
+
+
+def _bare_urdf(path: Path) -> str:
+    """A URDF without shapes, whose meshes may be elsewhere."""
+    from xml.etree.ElementTree import Element, tostring
+
+    root = read_xml(path, "robot").element
+    for element in list(root.iter()):
+        if element.tag.endswith(":joint") or element.get("quat_xyzw"):
+            raise ValueError(f"its URDF has no {element.tag} of this kind")
+        if element.tag == "inertia":  # of thin rods refused, and not compared
+            element.attrib.update(_UNIT_INERTIA)
+        for inner in list(element):
+            if inner.tag in _DRAWN or ":" in inner.tag:
+                element.remove(inner)
+    for key in [key for key in root.attrib if ":" in key or key == "xmlns"]:
+        del root.attrib[key]
+    for inertial in root.iter("inertial"):
+        if inertial.find("mass") is not None and inertial.find("inertia") is None:
+            inertial.append(Element("inertia", _UNIT_INERTIA))
+    root.append(Element("mujoco"))
+    return tostring(root, encoding="unicode")
+
+
+def _compared(
+    mujoco: Any, model: Any, mechanism: Mechanism, start: Comparison, whole: bool
+) -> Comparison:
+    """The comparison in random postures."""
+    bodies = _body_names(model)
+    strange = [name for name in bodies[1:] if name not in mechanism.bodies]
+    unread = {} if not strange else {f"body {strange[0]}, which was not read,": np.inf}
+    unweighed = set(mechanism.unweighed)
+    known = [
+        i for i, name in enumerate(bodies)
+        if i and name in mechanism.bodies and whole and name not in unweighed
+    ]  # fmt: skip
+    gaps = unread | _mass_gaps(model, mechanism, [(i, bodies[i]) for i in known])
+    rules = _rules(mujoco, model)
+    loops = [loop for loop in mechanism.loops if loop.name in rules]
+    random, data = np.random.default_rng(1), mujoco.MjData(model)
+    for _ in range(_POSTURES):
+        q = mechanism.home + random.uniform(-1, 1, len(mechanism.joints))
+        poses = _placed(mujoco, model, data, mechanism, q)
+        reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
+        for i, name in enumerate(bodies):
+            if i and name in poses:
+                gap = np.abs(data.xmat[i].reshape(3, 3) - poses[name][:3, :3]).max()
+                off = np.abs(data.xpos[i] - poses[name][:3, 3]).max() / reach
+                _widen(gaps, f"body {name}", max(gap, off))
+        for loop in loops:
+            rows = data.efc_pos[_rows(mujoco, data, rules[loop.name][0])]
+            A = poses[loop.first] @ loop.at_first
+            B = poses[loop.second] @ loop.at_second
+            apart = float(np.linalg.norm(A[:3, 3] - B[:3, 3]))
+            open_by = abs(apart - float(np.linalg.norm(rows[:3]))) / reach
+            if not loop.point:
+                angle = np.linalg.norm(rotation_vector(A[:3, :3].T @ B[:3, :3]))
+                turned = float(np.linalg.norm(rows[3:6])) / rules[loop.name][1]
+                open_by = max(open_by, abs(np.sin(angle / 2) - turned))
+            _widen(gaps, f"loop {loop.name}", open_by)
+    worst = max(gaps, key=lambda where: gaps[where], default="")
+    weights = {
+        name: (float(model.body_mass[i]), np.array(model.body_ipos[i]))
+        for i, name in enumerate(bodies) if whole and name in unweighed
+    }  # fmt: skip
+    compared = len([name for name in bodies[1:] if name in mechanism.bodies])
+    return Comparison(
+        start.reader, start.file, "", compared, len(known), len(loops),
+        float(gaps.get(worst, 0.0)), worst, weights,
+    )  # fmt: skip
+
+
+def _widen(gaps: dict[str, float], where: str, gap: float) -> None:
+    """Keep the largest gap of a place."""
+    gaps[where] = max(gaps.get(where, 0.0), float(gap))
+
+
+def _body_names(model: Any) -> list[str]:
+    """Of all bodies; those without are numbered, as they are here."""
+    return [model.body(i).name or f"body{i}" for i in range(model.nbody)]
+
+
+def _mass_gaps(
+    model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
+) -> dict[str, float]:
+    """Relative differences of masses, and of centres [m]."""
+    gaps: dict[str, float] = {}
+    for i, name in bodies:
+        body, mass = mechanism.bodies[name], float(model.body_mass[i])
+        if body.mass or mass > _LIGHTEST:
+            largest = max(mass, body.mass)
+            gaps[f"mass of {name}"] = abs(mass - body.mass) / largest
+            off = np.abs(model.body_ipos[i] - body.centre).max()
+            gaps[f"centre of mass of {name}"] = float(off)
+    return gaps
+
+
+def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
+    """Rows and scales of turns of active constraints, by the names they have here."""
+    kinds = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
+    active = [i for i in range(model.neq) if model.eq_active0[i]]
+    return {
+        model.equality(i).name or f"loop{count}": (i, float(model.eq_data[i, 10]))
+        for count, i in enumerate(active, 1) if int(model.eq_type[i]) in kinds
+    }  # fmt: skip
+
+
+def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
+    """Rows of one equality constraint."""
+    equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    return np.asarray(equal & (data.efc_id == constraint))
+
+
+def _placed(
+    mujoco: Any, model: Any, data: Any, mechanism: Mechanism, q: NDArray
+) -> dict[str, NDArray]:
+    """Poses of all bodies here; MuJoCo's are in ``data``, at the same coordinates."""
+    names, kinds = _body_names(model), mujoco.mjtJoint
+    row = {j.name: k for k, j in enumerate(mechanism.joints) if j.kind != "fixed"}
+    known: set[str] = set()
+    several: list[tuple[int, str, bool]] = []
+    number = np.zeros(model.nbody, dtype=int)
+    data.qpos[:] = model.qpos0
+    for i in range(model.njnt):
+        body, first = int(model.jnt_bodyid[i]), number[model.jnt_bodyid[i]] == 0
+        number[body] += 1
+        name = model.joint(i).name or f"{names[body]}.joint{number[body]}"
+        if name in row:
+            known.add(name)
+            data.qpos[model.jnt_qposadr[i]] = q[row[name]]
+        elif f"{name}.rx" in row and model.jnt_type[i] in {
+            int(kinds.mjJNT_BALL), int(kinds.mjJNT_FREE)
+        }:  # fmt: skip
+            known |= {f"{name}.{part}" for part in ("tx", "ty", "tz", "rx", "ry", "rz")}
+            several.append((i, name, bool(first)))
+    # joints that the other program does not know stay where the file has them
+    held = [joint.name not in known for joint in mechanism.joints]
+    poses = body_poses(mechanism, np.where(held, 0.0, q))
+    for i, name, first in several:
+        at, body = int(model.jnt_qposadr[i]), int(model.jnt_bodyid[i])
+        last = mechanism.joints[row[f"{name}.rz"]]
+        C = poses[last.child]
+        if model.jnt_type[i] == int(kinds.mjJNT_FREE):
+            data.qpos[at : at + 3], at = C[:3, 3], at + 3
+            turn = C[:3, :3]
+        else:
+            before = poses[mechanism.joints[row[f"{name}.rx"]].parent][:3, :3]
+            own = np.eye(3).ravel()
+            if first:
+                mujoco.mju_quat2Mat(own, model.body_quat[body])
+            turn = (before @ own.reshape(3, 3)).T @ C[:3, :3]
+        data.qpos[at : at + 4] = to_quaternion(turn)
+    mujoco.mj_fwdPosition(model, data)
+    return poses

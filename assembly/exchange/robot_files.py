@@ -1,0 +1,84 @@
+"""Robots read from and written to files of any kind, by the ending of their names."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from assembly.files.robot_file import Closing
+from assembly.files.robot_file import write_robot as write_robot_file
+from assembly.model.robot import Robot
+from assembly.robots import load_robot as load_declared
+
+OTHERS = (".urdf", ".xml", ".sdf")
+# of what is left out, words that say that it may change results
+_WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
+
+
+def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
+    """A built-in robot by its name, or the robot of a file of any kind.
+
+    Args:
+        name: such as ``"irsbot2"``, or the path of a robot file, a URDF (with its loops
+            beside it), MJCF or SDF file.
+        close: makes of a robot as declared one whose closures hold, as
+            :mod:`assembly.kinematics.closing` does; none if absent.
+
+    Returns:
+        The robot; of other programs' files what was taken and what was left out is
+        among its remarks.
+
+    Raises:
+        BadInput: neither a built-in name nor a file, or the file breaks a rule.
+    """
+    path = Path(name)
+    if path.suffix.lower() not in OTHERS:
+        return load_declared(name, close)
+    from assembly.exchange.foreign import robot_of_file
+
+    conversion = robot_of_file(path, ask=False)[0]
+    said = [*(f"taken: {line}" for line in conversion.taken)]
+    said += [
+        f"left out: {line}"
+        for line in conversion.left_out
+        if any(word in line for word in _WEIGHTY)
+    ]
+    remarks = tuple(f"{path.name}: {line}" for line in said)
+    robot = conversion.robot if close is None else close(conversion.robot)
+    return replace(robot, remarks=(*robot.remarks, *remarks))
+
+
+def read_robot(path: str | Path) -> Robot:
+    """The robot of a file of any kind; see :func:`load_robot`.
+
+    Args:
+        path: of a robot file, a URDF, MJCF or SDF file.
+
+    Returns:
+        The robot.
+
+    Raises:
+        BadInput: the file breaks a rule.
+    """
+    return load_robot(Path(path).absolute() if not Path(path).suffix else path)
+
+
+def write_robot(robot: Robot, path: str | Path) -> None:
+    """Write a robot to a file of the kind that its ending says.
+
+    Args:
+        robot: to be written.
+        path: ``.toml``: a robot file, which holds all of the robot; ``.urdf`` (and a
+            YAML beside it) or ``.xml`` (MJCF): its rigid bodies and joints, see
+            ``forcefit convert``, which says what they leave out.
+
+    Raises:
+        BadInput: another ending, a file of another program is there, or it cannot be
+            written.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".toml":
+        write_robot_file(robot, path)
+        return
+    from assembly.exchange.convert import check_target, write_converted
+
+    check_target(path)
+    write_converted(robot, path)

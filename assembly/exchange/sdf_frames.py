@@ -1,0 +1,287 @@
+"""Frames of SDF: links, joints, frames and nested models, placed and attached.
+
+Sources:
+    sdformat.org, specification 1.12 and "Pose frame semantics": a link's pose is in its
+    model's frame, a joint's in its child's, a frame's in what it is attached to, unless
+    ``relative_to`` says another; names of nested models are joined by ``::``.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import WORLD
+from assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw
+from assembly.exchange.xml_file import Node, placed, read_xml
+from forcefit.inputs.errors import BadInput, nearest, quoted
+
+MODEL = "__model__"
+FRAMES = ("link", "joint", "frame")
+_AROUND = f"{WORLD}::"
+_NESTED = 20  # models inside models
+_OLD = 1.4  # version until which axes are seen from the model
+
+
+@dataclass(frozen=True)
+class Named:
+    """An element that has a pose, and what stands before names in its model.
+
+    Attributes:
+        node: of a link, joint, frame or model.
+        scope: empty in the outermost model, such as ``"arm::"`` in one inside,
+            ``"world::"`` in the world around it.
+        old: whether its file is of a version in which axes are seen from the model.
+    """
+
+    node: Node
+    scope: str
+    old: bool = False
+
+
+@dataclass
+class Frames:
+    """Named frames of a model and of models inside it, placed when first asked for.
+
+    Attributes:
+        model: the outermost.
+        named: links, joints, frames and models by their names from outside.
+        poses: (4, 4) seen from the world, of those that were asked for.
+    """
+
+    model: Node
+    named: dict[str, Named] = field(default_factory=dict)
+    poses: dict[str, NDArray] = field(default_factory=dict)
+
+    def of(self, tag: str) -> Iterator[tuple[str, Named]]:
+        """Names and elements of one kind, as they are written."""
+        return ((k, v) for k, v in self.named.items() if v.node.tag == tag)
+
+    def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
+        """The name from outside of a name in a model, or an error of an element."""
+        if name == WORLD or (name, scope) == (MODEL, _AROUND):
+            return WORLD
+        own = f"{self.model.optional('name')}::"
+        for full in (scope + name, f"{scope}{name}::{MODEL}"):
+            if full in self.named:
+                return full
+        if scope in {"", _AROUND} and own != "::" and name.startswith(own):
+            return self.name(name.removeprefix(own), "", node, key)
+        here = [k.removeprefix(scope) for k in self.named if k.startswith(scope)]
+        hint = nearest(name, [k for k in here if not k.endswith(MODEL)])
+        raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
+
+    def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
+        """(4, 4) seen from the world, by the name from outside."""
+        if name == WORLD:
+            return np.eye(4)
+        if name not in self.poses:
+            node, scope = self.named[name].node, self.named[name].scope
+            if name in asked:
+                raise node.bad("pose", "found a ring of relative_to")
+            own = node.child("pose")
+            relative = ""
+            if own is not None:  # "frame" until 1.6
+                relative = own.optional("relative_to") or own.optional("frame")
+            relative = relative or self._default(name)
+            base = self.pose(self.name(relative, scope, node, "pose"), (*asked, name))
+            T = base @ (np.eye(4) if own is None else own_pose(own))
+            held = node.optional("placement_frame") if node.tag == "model" else ""
+            if held:
+                inside = replace(self, poses={name: np.eye(4)})
+                full = self.name(held, name.removesuffix(MODEL), node)
+                T = T @ np.linalg.inv(inside.pose(full))
+            self.poses[name] = T
+        return self.poses[name]
+
+    def _default(self, name: str) -> str:
+        """What a pose is relative to where it does not say so."""
+        node = self.named[name].node
+        if node.tag == "joint":
+            return word(node, "child")
+        return (node.optional("attached_to") if node.tag == "frame" else "") or MODEL
+
+    def link(self, name: str, asked: tuple[str, ...] = ()) -> str:
+        """Name of the link that something is attached to, ``"world"`` of the world."""
+        if name == WORLD:
+            return WORLD
+        node, scope = self.named[name].node, self.named[name].scope
+        if node.tag == "link":
+            return name
+        if name in asked:
+            raise node.bad("attached_to", "found a ring of frames")
+        if node.tag == "model":
+            return self._canonical(name.removesuffix(MODEL), node)
+        to = self._default(name)
+        return self.link(self.name(to, scope, node), (*asked, name))
+
+    def _canonical(self, scope: str, model: Node) -> str:
+        """The link that a model's own frame is attached to."""
+        given = model.optional("canonical_link")
+        if given:
+            return self.link(self.name(given, scope, model, "canonical_link"))
+        for name, _ in self.of("link"):
+            if name.startswith(scope):
+                return name
+        raise model.bad("link", "missing; expected at least one")
+
+
+def frames_of(root: Node) -> Frames:
+    """All named frames of a file's one model, and of the world around it.
+
+    Args:
+        root: ``<sdf>``.
+
+    Returns:
+        The frames, none placed yet.
+
+    Raises:
+        BadInput: a name is missing or found twice, or not one model is there.
+    """
+    worlds = list(root.children("world"))
+    models = [m for group in (root, *worlds) for m in group.children("model")]
+    if not models:  # one that is elsewhere
+        given = [i for group in (root, *worlds) for i in group.children("include")]
+        models = given if len(given) == 1 else []
+    if len(models) != 1:
+        raise BadInput(f"{root.file}: found {len(models)} models, expected exactly one")
+    model, old = models[0], _is_old(root)
+    if model.tag == "include":
+        model, old = included(model)
+    frames = Frames(model)
+    for node in (inner for world in worlds for inner in world.children()):
+        if node.tag in {"frame", "joint"}:
+            _take(frames, node, _AROUND, node.text("name"), old)
+    _gather(frames, model, "", _AROUND, old)
+    return frames
+
+
+def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:
+    """Take up what a model holds, models inside it too."""
+    if scope.count("::") > _NESTED:
+        raise model.bad("", f"found models more than {_NESTED} deep")
+    frames.named[scope + MODEL] = Named(model, outer, old)
+    nodes = sorted(model.children(), key=lambda node: node.tag != "link")
+    for node in nodes:
+        if node.tag in FRAMES:
+            _take(frames, node, scope, node.text("name"), old)
+            continue
+        inside, its = (node, old) if node.tag == "model" else (None, old)
+        if node.tag == "include":
+            inside, its = included(node)
+        if inside is not None:
+            within = f"{scope}{inside.text('name')}::"
+            if within + MODEL in frames.named:
+                raise node.bad("name", "found it twice; expected names that differ")
+            _gather(frames, inside, within, scope, its)
+
+
+def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
+    """Take up a link, joint or frame; a link's name counts before a joint's."""
+    full = scope + name
+    if full in frames.named and frames.named[full].node.tag != node.tag:
+        full += f"_{node.tag}"  # as libsdformat renames it
+    if full in frames.named:
+        raise node.bad("name", "found it twice; expected names that differ")
+    frames.named[full] = Named(node, scope, old)
+
+
+def _is_old(root: Node) -> bool:
+    """Whether a file is of a version in which axes are seen from the model."""
+    try:
+        return float(root.optional("version")) <= _OLD
+    except ValueError:
+        return False
+
+
+def included(node: Node) -> tuple[Node, bool]:
+    """The model of a file that another includes, and whether that is an old one.
+
+    Args:
+        node: ``<include>``, whose address is a file or folder beside its own file's
+            folder or beside one of the folders around it.
+
+    Returns:
+        The model with the name, pose and placement frame of the include.
+
+    Raises:
+        BadInput: no such file is there, or it is no file of one model.
+    """
+    if node.optional("merge") in {"true", "1"}:
+        raise node.bad("merge", "found it; expected a model with names of its own")
+    address = word(node, "uri")
+    path = address.removeprefix("model://").removeprefix("file://")
+    folder = Path(node.file).absolute().parent
+    around = [folder, *folder.parents[:2]] if not Path(path).is_absolute() else [folder]
+    places = [place / path for place in around]
+    places = [p / "model.sdf" if p.is_dir() else p for p in places]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        raise node.bad("uri", f"found {quoted(address)}, no file or folder near this")
+    root = read_xml(found, "sdf")
+    models = list(root.children("model"))
+    if len(models) != 1:
+        raise BadInput(f"{found}: found {len(models)} models, expected exactly one")
+    element = models[0].element
+    for tag in ("name", "placement_frame"):
+        inner = node.child(tag)
+        if inner is not None and inner.content:
+            element.set(tag, inner.content)
+    pose = node.child("pose")
+    if pose is not None:
+        own = element.find("pose")
+        if own is not None:
+            element.remove(own)
+        element.append(pose.element)
+    return models[0], _is_old(root)
+
+
+def word(node: Node, tag: str) -> str:
+    """Text of an element inside that names a link.
+
+    Args:
+        node: a joint.
+        tag: of the element.
+
+    Returns:
+        The name.
+
+    Raises:
+        BadInput: it is missing or empty.
+    """
+    inner = node.child(tag)
+    if inner is None or not inner.content:
+        raise node.bad(tag, "missing; expected the name of a link")
+    return inner.content
+
+
+def own_pose(node: Node) -> NDArray:
+    """(4, 4) of a pose element by itself; an empty one is no motion.
+
+    Args:
+        node: ``<pose>``.
+
+    Returns:
+        The transform.
+
+    Raises:
+        BadInput: other numbers than it should have.
+    """
+    kind = node.optional("rotation_format") or "euler_rpy"
+    if kind not in {"euler_rpy", "quat_xyzw"}:
+        found = f"found {quoted(kind)}, expected euler_rpy or quat_xyzw"
+        raise node.bad("rotation_format", found)
+    if not node.content:
+        return np.eye(4)
+    if kind == "quat_xyzw":
+        *shift, x, y, z, w = node.numbers("", 7, "m, -")
+        if not any((x, y, z, w)):
+            raise node.bad("", "found a quaternion of zero, expected a rotation")
+        return placed(np.array(shift), from_quaternion([w, x, y, z]))
+    values = node.numbers("", 6, "m, angle")
+    degrees = node.optional("degrees") in {"true", "1"}
+    turn = values[3:] * (math.pi / 180 if degrees else 1.0)
+    return placed(values[:3], from_roll_pitch_yaw(turn))

@@ -1,0 +1,201 @@
+"""A joint of SDF as joints of one freedom; ``<gazebo>`` in a URDF holds such too.
+
+Sources:
+    sdformat.org, specification 1.12, ``<joint>``; until 1.4 an axis is seen from the
+    model's frame, until 1.6 ``use_parent_model_frame`` says so, then ``expressed_in``.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.coupling import Coupling
+from assembly.exchange.mechanism import (
+    Body,
+    Joint,
+    ball,
+    chain,
+)
+from assembly.exchange.orientation import onto
+from assembly.exchange.sdf_frames import MODEL, Frames, Named, word
+from assembly.exchange.xml_file import Node
+from forcefit.inputs.errors import quoted
+
+_KINDS = ("fixed", "revolute", "continuous", "prismatic", "ball", "universal",
+          "revolute2")  # fmt: skip
+_Z = (0.0, 0.0, 1.0)
+
+
+def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
+    """Links of a joint's parent and child, which may name frames attached to them.
+
+    Args:
+        frames: of the model.
+        named: the joint.
+
+    Returns:
+        Names of two different links; ``"world"`` for the world.
+
+    Raises:
+        BadInput: a name that the model lacks, or both are the same link.
+    """
+    node = named.node
+    ends = [
+        frames.link(frames.name(word(node, tag), named.scope, node, tag))
+        for tag in ("parent", "child")
+    ]
+    if ends[0] == ends[1]:
+        raise node.bad(
+            "child", f"found {quoted(ends[1])}, which is also its parent; expected "
+            "another link"
+        )  # fmt: skip
+    return ends[0], ends[1]
+
+
+def joint_parts(
+    frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
+    backwards: bool = False,
+) -> tuple[list[Joint], list[Body]]:  # fmt: skip
+    """A joint as joints of one freedom, from the child to the parent if backwards.
+
+    Args:
+        frames: of the model.
+        name: of the joint.
+        named: its element.
+        ends: links of parent and child.
+        carried: name of the body that stands on it.
+        backwards: whether the tree reaches the child first.
+
+    Returns:
+        The joints and the bodies between them.
+
+    Raises:
+        BadInput: the joint is of no known type, or an axis is no direction.
+    """
+    node = named.node
+    kind = node.choice("type", _KINDS, "")
+    at = frames.pose(name)
+    axes = [_axis(frames, named, tag, at) for tag in ("axis", "axis2")]
+    freedoms = {
+        "fixed": [("", "fixed", np.array(_Z))],
+        "prismatic": [("", "prismatic", axes[0])],
+        "ball": ball(),
+        "universal": [("first", "revolute", axes[0]), ("second", "revolute", axes[1])],
+    }  # fmt: skip
+    freedoms["revolute2"] = freedoms["universal"]
+    parts = freedoms.get(kind, [("", "revolute", axes[0])])
+    if kind in {"universal", "revolute2"} and node.child("axis2") is None:
+        parts[1] = ("second", "revolute", onto(axes[0])[:, 1])
+    parent, child = ends
+    if backwards:
+        parent, child = child, parent
+        parts = [(part, one, -axis) for part, one, axis in reversed(parts)]
+    placement = np.linalg.inv(frames.pose(parent)) @ at
+    after = np.linalg.inv(at) @ frames.pose(child)
+    if len(parts) == 1:
+        ((_, one, axis),) = parts
+        limits = _limits(node) if one != "fixed" else None
+        joint = Joint(name, one, parent, carried, placement, axis, after, limits=limits)
+        return [_with_spring(joint, node)], []
+    return chain(name, parent, carried, placement, after, parts)
+
+
+def _with_spring(joint: Joint, node: Node) -> Joint:
+    """The joint with the spring of its axis."""
+    axis = node.child("axis")
+    dynamics = None if axis is None else axis.child("dynamics")
+    if dynamics is None:
+        return joint
+    return replace(
+        joint,
+        stiffness=_number(dynamics, "spring_stiffness", 0.0),
+        rest=_number(dynamics, "spring_reference", 0.0),
+    )
+
+
+def _limits(node: Node) -> tuple[float, float] | None:
+    """Range of a joint of one freedom."""
+    axis = node.child("axis")
+    limit = None if axis is None else axis.child("limit")
+    if limit is None:
+        return None
+    ends = [limit.child(tag) for tag in ("lower", "upper")]
+    lower, upper = (None if end is None else end.content for end in ends)
+    return limit.limits(lower, upper)
+
+
+def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
+    """(3,) direction in the joint's axes."""
+    axis = named.node.child(tag)
+    if axis is None:
+        return np.array(_Z)
+    xyz, in_model = axis.child("xyz"), axis.child("use_parent_model_frame")
+    seen_from = "" if xyz is None else xyz.optional("expressed_in")
+    if (
+        in_model is None
+        and named.old
+        or in_model
+        and in_model.content.lower() in {"1", "true"}
+    ):
+        seen_from = seen_from or MODEL
+    vector = np.array(_Z) if xyz is None or not xyz.content else xyz.unit_vector("")
+    if not seen_from:
+        return vector
+    full = frames.name(seen_from, named.scope, axis, "expressed_in")
+    return np.asarray(at[:3, :3].T @ frames.pose(full)[:3, :3] @ vector)
+
+
+def joint_couplings(
+    frames: Frames, name: str, named: Named, parts: dict[str, list[str]]
+) -> list[Coupling]:
+    """What a joint's axes follow (``<mimic>``).
+
+    Args:
+        frames: of the model.
+        name: of the joint.
+        named: its element.
+        parts: names of the joints of one freedom by that of the whole.
+
+    Returns:
+        A coupling for each axis that follows another.
+
+    Raises:
+        BadInput: it follows a joint or an axis that is not there.
+    """
+    couplings = []
+    for tag in ("axis", "axis2"):
+        axis = named.node.child(tag)
+        mimic = None if axis is None else axis.child("mimic")
+        if mimic is None:
+            continue
+        leader = frames.name(mimic.text("joint"), named.scope, mimic, "joint")
+        if leader not in parts:
+            raise mimic.bad("joint", f"found {quoted(leader)}, expected a joint")
+        rule = [_number(mimic, key, value) for key, value in
+                (("offset", 0.0), ("multiplier", 1.0), ("reference", 0.0))]  # fmt: skip
+        couplings.append(
+            Coupling(
+                _part(mimic, parts[name], tag),
+                _part(mimic, parts[leader], mimic.optional("axis") or "axis"),
+                (rule[0], rule[1]), leader_rest=rule[2],
+            )
+        )  # fmt: skip
+    return couplings
+
+
+def _part(mimic: Node, parts: list[str], tag: str) -> str:
+    """The joint of one freedom that is an axis of a joint."""
+    if len(parts) == 1 and tag == "axis":
+        return parts[0]
+    ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")
+    for part in parts:
+        if part.endswith(ends):
+            return part
+    raise mimic.bad("axis", f"found {quoted(tag)}, no axis of {quoted(parts[0])}")
+
+
+def _number(node: Node, key: str, default: float) -> float:
+    """A number of an element inside."""
+    inner = node.child(key)
+    return default if inner is None else inner.number("", "-")

@@ -1,0 +1,117 @@
+"""Masses of SDF's links: written, by the format's default, or made of shapes.
+
+Sources:
+    sdformat.org, specification 1.12, ``<inertial>``: a link without it, or without its
+    mass, has 1 kg; with ``auto`` densities of the collisions count, 1000 kg/m^3 where
+    none is given, and a mass beside it is kept.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import Body
+from assembly.exchange.sdf_frames import Frames, Named, own_pose
+from assembly.exchange.shapes import together, volume
+from assembly.exchange.xml_file import Node
+
+_DEFAULT_MASS = 1.0  # [kg]
+_DEFAULT_DENSITY = 1000.0  # [kg/m^3]
+# keys of a shape's sizes, and how many numbers each has
+_SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3},
+          "cylinder": {"radius": 1, "length": 1},
+          "capsule": {"radius": 1, "length": 1},
+          "cone": {"radius": 1, "length": 1}}  # fmt: skip
+
+
+def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
+    """A link's body, and what was taken for its mass where the file does not say it.
+
+    Args:
+        frames: of the model.
+        name: of the link.
+        named: the link.
+
+    Returns:
+        The body, and words; empty where the file has the mass.
+
+    Raises:
+        BadInput: a mass or a size is not above zero.
+    """
+    node = named.node
+    inertial = node.child("inertial")
+    if inertial is None:
+        return Body(name, _DEFAULT_MASS), "no inertial: 1 kg, the format's default"
+    mass, pose = inertial.child("mass"), inertial.child("pose")
+    kilograms = None if mass is None else mass.number("", "kg")
+    if kilograms is not None and kilograms < 0:
+        raise node.bad("inertial.mass", f"found {kilograms:g}, expected >= 0 [kg]")
+    if inertial.optional("auto") in {"true", "1"}:
+        made, centre = _of_shapes(frames, named, inertial)
+        if made:
+            taken = "" if kilograms is not None else "made of its shapes (auto)"
+            return Body(name, made if kilograms is None else kilograms, centre), taken
+    centre = np.zeros(3) if pose is None else own_pose(pose)[:3, 3]
+    if kilograms is None:
+        return Body(name, _DEFAULT_MASS, centre), "no mass: 1 kg, the format's default"
+    return Body(name, kilograms, centre), ""
+
+
+def _of_shapes(
+    frames: Frames, named: Named, inertial: Node
+) -> tuple[float, NDArray]:  # fmt: skip
+    """[kg] and (3,) [m] of all collisions of a link."""
+    density = _density(inertial, _DEFAULT_DENSITY)
+    masses, centres = [], []
+    for collision in named.node.children("collision"):
+        geometry = collision.child("geometry")
+        shape = None if geometry is None else next(geometry.children(), None)
+        if shape is None or shape.tag not in _SIZES:
+            what = "no shape" if shape is None else shape.tag
+            raise collision.bad(
+                "geometry", f"found {what}, of which no automatic inertia is made here;"
+                f" expected {' | '.join(_SIZES)}, or a written mass"
+            )  # fmt: skip
+        T = _placed(frames, named, collision)
+        sizes = _sizes(shape)
+        # a cone's centre lies a quarter of its length above its foot
+        above = -sizes[1] / 4 if shape.tag == "cone" else 0.0
+        centres.append(T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3])
+        masses.append(_density(collision, density) * volume(shape.tag, sizes))
+    return together(masses, centres)
+
+
+def _sizes(shape: Node) -> list[float]:
+    """[m] a shape's sizes, all above zero."""
+    sizes: list[float] = []
+    for key, count in _SIZES[shape.tag].items():
+        inner = shape.child(key)
+        if inner is None:
+            raise shape.bad(key, "missing; expected its size [m]")
+        sizes += inner.numbers("", count, "m").tolist()
+    if min(sizes) <= 0:
+        raise shape.bad("", f"found the size {min(sizes):g}, expected > 0 [m]")
+    return sizes
+
+
+def _density(node: Node, default: float) -> float:
+    """[kg/m^3] of an element that may say it."""
+    inner = node.child("density")
+    if inner is None:
+        return default
+    density = inner.number("", "kg/m^3")
+    if density <= 0:
+        raise node.bad("density", f"found {density:g}, expected > 0 [kg/m^3]")
+    return density
+
+
+def _placed(frames: Frames, named: Named, collision: Node) -> NDArray:
+    """(4, 4) of a collision in its link."""
+    pose = collision.child("pose")
+    if pose is None:
+        return np.eye(4)
+    relative = pose.optional("relative_to") or pose.optional("frame")
+    if not relative:
+        return own_pose(pose)
+    link = frames.name(named.node.text("name"), named.scope, named.node)
+    seen_from = frames.pose(frames.name(relative, named.scope, pose))
+    return np.asarray(np.linalg.inv(frames.pose(link)) @ seen_from @ own_pose(pose))

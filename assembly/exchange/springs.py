@@ -1,0 +1,58 @@
+"""Springs of joints: those at rest at home, and those that would load the robot."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import Joint, Mechanism
+from assembly.exchange.xml_file import counted
+
+_AT_REST = 1e-9  # [rad or m] from home
+_OWN = {"revolute": 2, "prismatic": 5}  # place of a joint's own freedom among six
+
+
+def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
+    """Joint stiffnesses of passive joints whose springs carry nothing at home.
+
+    Args:
+        mechanism: at home.
+
+    Returns:
+        (6, 6) [N m/rad .. N/m] by joint, rigid but for the joint's own freedom.
+    """
+    matrices = {}
+    for joint in mechanism.joints:
+        if _is_spring(joint) and not joint.actuated and _at_rest(joint):
+            diagonal = np.full(6, np.inf)
+            diagonal[_OWN[joint.kind]] = joint.stiffness
+            matrices[joint.name] = np.diag(diagonal)
+    return matrices
+
+
+def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
+    """In words, springs that are not converted.
+
+    Args:
+        mechanism: at home.
+
+    Returns:
+        A line for those beside drives, and one for those under load at home.
+    """
+    springs = [joint for joint in mechanism.joints if _is_spring(joint)]
+    driven = [joint.name for joint in springs if joint.actuated]
+    loaded = [
+        f"{joint.name} by {joint.position - joint.rest:.3g} rad or m"
+        for joint in springs
+        if not joint.actuated and not _at_rest(joint)
+    ]
+    what = "springs wound up at home, not converted, though they may carry load"
+    return counted("springs beside drives", driven) + counted(what, loaded)
+
+
+def _is_spring(joint: Joint) -> bool:
+    """Whether a joint has a spring in its freedom."""
+    return joint.stiffness > 0 and joint.kind in _OWN
+
+
+def _at_rest(joint: Joint) -> bool:
+    """Whether the joint's spring carries nothing at home."""
+    return abs(joint.position - joint.rest) < _AT_REST

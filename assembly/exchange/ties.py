@@ -1,0 +1,48 @@
+"""Elements that nobody here knows, and whether they may tie bodies to one another."""
+
+from collections.abc import Container, Mapping
+
+from assembly.exchange.xml_file import Node
+from forcefit.inputs.errors import quoted
+
+# of a name: what refers to bodies and neither holds nor moves them; a plugin is a
+# program, which the answer names
+_HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
+             "plugin", "gripper", "visual", "group", "state")  # fmt: skip
+
+
+def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
+    """Refuse an unknown element that names two bodies, which it may tie.
+
+    Args:
+        node: an element that is not converted.
+        owners: bodies by their names and by those of frames that stand on them.
+
+    Raises:
+        BadInput: it names two of them, and is of no harmless kind.
+    """
+    if any(part in node.tag.lower() for part in _HARMLESS):
+        return
+    named = node.names_in(owners)
+    if len({owners[name] for name in named}) > 1:
+        raise node.bad(
+            "", f"found it between {quoted(named[0])} and {quoted(named[1])}: it may "
+            "tie them, and is not converted; expected joints, or a file without it"
+        )  # fmt: skip
+
+
+def may_tie(node: Node, names: Container[str]) -> str:
+    """Words for an element left out that may tie joints or bodies, else none.
+
+    Args:
+        node: an element that is not converted.
+        names: of joints and bodies.
+
+    Returns:
+        What is added to its name.
+    """
+    if node.tag == "plugin" and len(node.names_in(names)) > 1:
+        return ", not converted, though it may tie or move what it names"
+    if node.tag == "springStiffness":  # of Gazebo, at a joint of the URDF
+        return ", not converted, though it may carry load"
+    return ""

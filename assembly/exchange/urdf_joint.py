@@ -1,0 +1,75 @@
+"""Freedoms and places of URDF's joints.
+
+Sources:
+    ROS wiki, urdf/XML/joint: an absent axis is x; rpy are turns about fixed axes.
+    Drake, multibody/parsing: of ``drake:joint`` a universal turns about x, then y, a
+    planar lies in x and y.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import ball, slides
+from assembly.exchange.orientation import from_quaternion, from_roll_pitch_yaw, onto
+from assembly.exchange.xml_file import Node, placed
+
+_ONE_FREEDOM = {"revolute": "revolute", "continuous": "revolute",
+                "prismatic": "prismatic", "fixed": "fixed"}  # fmt: skip
+_KINDS = (*_ONE_FREEDOM, "spherical", "ball", "universal", "planar", "floating")
+_KINDS_OF_DRAKE = ("ball", "universal", "planar")
+_ZERO = np.zeros(3)
+
+
+def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
+    """Name, kind and axis of each freedom of a joint; of a fixed one that it is fixed.
+
+    Args:
+        node: a joint; one with a prefix is of Drake, with axes of its own.
+
+    Returns:
+        The freedoms, in the order in which they move what stands on the joint.
+
+    Raises:
+        BadInput: no known type, or an axis is no direction.
+    """
+    own_axes = ":" in node.tag
+    kind = node.choice("type", _KINDS_OF_DRAKE if own_axes else _KINDS, "")
+    x, y, z = np.eye(3)
+    if kind in {"spherical", "ball"}:
+        return ball()
+    if kind == "floating":
+        return slides() + ball()
+    if kind == "fixed":
+        return [("", "fixed", z)]
+    if own_axes and kind in {"universal", "planar"}:
+        turn, second = np.eye(3), y
+        first = x
+    else:
+        first = _axis(node, "axis", x)
+        turn = onto(first)
+        second = turn[:, 1]
+    if kind == "universal":
+        second = _axis(node, "axis2", second)
+        return [("first", "revolute", first), ("second", "revolute", second)]
+    if kind == "planar":
+        return [("tx", "prismatic", turn[:, 0]), ("ty", "prismatic", turn[:, 1]),
+                ("rz", "revolute", turn[:, 2])]  # fmt: skip
+    return [("", _ONE_FREEDOM[kind], first)]
+
+
+def pose_of(origin: Node) -> NDArray:
+    """(4, 4) of an element with ``xyz`` and ``rpy``, or ``quat_xyzw`` (URDF 1.2)."""
+    shift = origin.numbers("xyz", 3, "m", _ZERO)
+    if not origin.has("quat_xyzw"):
+        turn = from_roll_pitch_yaw(origin.numbers("rpy", 3, "rad", _ZERO))
+        return placed(shift, turn)
+    x, y, z, w = origin.numbers("quat_xyzw", 4, "-")
+    if not any((x, y, z, w)):
+        raise origin.bad("quat_xyzw", "found zero, expected a rotation")
+    return placed(shift, from_quaternion([w, x, y, z]))
+
+
+def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
+    """(3,) unit direction of an element inside a joint."""
+    axis = node.child(tag)
+    return default if axis is None else axis.unit_vector("xyz", default)

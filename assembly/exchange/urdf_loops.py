@@ -1,0 +1,125 @@
+"""Loops that a URDF itself holds: ``<loop_joint>``, and joints in ``<gazebo>``.
+
+Sources:
+    Isaac Sim, URDF importer, and Drake before 2018: ``loop_joint`` places a joint at
+    ``link1`` and at ``link2``.  Gazebo: what stands in ``<gazebo>`` is SDF, added to
+    the model whose frame is that of the URDF's root.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.exchange.mechanism import (
+    HERE,
+    WORLD,
+    Body,
+    Joint,
+    Loop,
+    Mechanism,
+    body_poses,
+    chain,
+)
+from assembly.exchange.sdf_frames import MODEL, Frames, Named
+from assembly.exchange.sdf_joint import joint_ends, joint_parts
+from assembly.exchange.urdf_joint import joint_freedoms, pose_of
+from assembly.exchange.xml_file import Node
+from forcefit.inputs.errors import nearest, quoted
+
+Closing = tuple[str, list[Joint], list[Body], Loop]
+
+
+def with_closing_joints(
+    mechanism: Mechanism, root: Node, parts: dict[str, list[str]]
+) -> Mechanism:
+    """The mechanism with the loops of its own file.
+
+    Args:
+        mechanism: of the file's links and joints.
+        root: the file's element.
+        parts: names of the joints of one freedom by that of the whole; those of
+            closing joints are added.
+
+    Returns:
+        The mechanism.
+
+    Raises:
+        BadInput: a closing joint names a link that is not there, or twice the same.
+    """
+    bodies, joints = dict(mechanism.bodies), list(mechanism.joints)
+    loops = list(mechanism.loops)
+    for node, (name, several, between, loop) in _closing(mechanism, root):
+        if name in parts or any(name == one.name for one in loops):
+            raise node.bad("name", "found it twice; expected names that differ")
+        if several:  # a point has no joint whose coordinate could be named
+            parts[name] = [joint.name for joint in several]
+        joints += several
+        bodies |= {body.name: body for body in between}
+        loops.append(loop)
+    return replace(mechanism, bodies=bodies, joints=tuple(joints), loops=tuple(loops))
+
+
+def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]:
+    """Closing joints of both kinds."""
+    for node in root.children():
+        if node.tag.split(":")[-1] == "loop_joint":
+            yield node, _loop_joint(mechanism, node)
+    in_gazebo = [n for g in root.children("gazebo") for n in g.children("joint")]
+    if not in_gazebo:
+        return
+    poses = body_poses(mechanism, np.zeros(len(mechanism.joints)))
+    frames = Frames(root, poses=poses | {MODEL: np.eye(4)})
+    frames.named[MODEL] = Named(root, "")
+    for link in root.children("link"):
+        frames.named[link.text("name")] = Named(link, "")
+    for node in in_gazebo:
+        yield node, _gazebo_joint(mechanism, frames, node)
+
+
+def _loop_joint(mechanism: Mechanism, node: Node) -> Closing:
+    """A joint between two places; a ball joint is a point that both share."""
+    name = node.text("name")
+    (first, A), (second, B) = (_place(mechanism, node, tag) for tag in _ENDS)
+    if first == second:
+        raise node.bad("link2", f"found {quoted(second)} twice, expected another link")
+    if node.optional("type") in {"spherical", "ball"}:
+        return name, [], [], Loop(name, first, second, A, B, point=True)
+    tip = Body(f"{name}.tip")
+    freedoms = joint_freedoms(node)
+    between: list[Body] = []
+    if len(freedoms) > 1:
+        several, between = chain(name, first, tip.name, A, HERE, freedoms)
+    else:
+        ((_, kind, axis),) = freedoms
+        several = [Joint(name, kind, first, tip.name, A, axis)]
+    return name, several, [*between, tip], Loop(name, tip.name, second, HERE, B)
+
+
+_ENDS = ("link1", "link2")
+
+
+def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
+    """A link, and (4, 4) the place in it."""
+    end = node.child(tag)
+    if end is None:
+        raise node.bad(tag, "missing; expected a link and a place in it")
+    name = end.text("link")
+    if name not in mechanism.bodies:
+        hint = nearest(name, mechanism.bodies)
+        raise node.bad(tag, f"found {quoted(name)}, expected the name of a link{hint}")
+    return name, pose_of(end)
+
+
+def _gazebo_joint(mechanism: Mechanism, frames: Frames, node: Node) -> Closing:
+    """A joint of SDF between links of the URDF, in the pose of all coordinates zero."""
+    name = node.text("name")
+    named = frames.named[name] = Named(node, "")
+    parent, child = (
+        mechanism.root if end == WORLD and WORLD not in mechanism.bodies else end
+        for end in joint_ends(frames, named)
+    )
+    tip = Body(f"{name}.tip")
+    several, between = joint_parts(frames, name, named, (parent, child), tip.name)
+    return name, several, [*between, tip], Loop(name, tip.name, child)

@@ -1,0 +1,95 @@
+"""Clearance positions where bounds of passive joints' own motion may be active.
+
+Those bounds are left out of the prepared posture: most are ranges that no clearance
+comes near.  Draws in which one may be reached are positioned one by one, in the set of
+platform screws of problem (27), reading ``frozen``, which has every bound that counts
+as a cone (:mod:`assembly.linear.reach`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.linear.fallback import CannotAssemble
+from assembly.linear.reach import reachable_screws
+from assembly.linear.reduction import FreeMotion
+from assembly.linear.thresholds import UNBOUNDED, rank_tolerance
+from assembly.solvers.conic import SolverFailed
+
+READING = "frozen"  # every spring as in the solution of (22)
+
+
+def draws_at_bounds(prepared: OnePosture, draws: Draws) -> NDArray:
+    """Draws in which a passive joint may reach the bound of its own motion.
+
+    Args:
+        prepared: the posture.
+        draws: its solutions for k draws.
+
+    Returns:
+        (k,) bool: a bound is active in the solution, or the clearances can move a
+        joint up to its bound, or nothing else than the bound holds the joint and with
+        it the platform.
+    """
+    solved = np.isfinite(draws.energy)
+    active = solved & np.isnan(draws.clearances).any(axis=1)
+    limited = np.isfinite(prepared.ranges)
+    if not limited.any():
+        return active
+    if _moves_platform(prepared)[limited].any():
+        return solved
+    nu = prepared.starts[-1]
+    motions = prepared.motions[limited]
+    middle = draws.errors.reshape(len(solved), -1) @ motions[:, nu:].T
+    if prepared.loads is not None:
+        middle += prepared.loads.motions[limited]
+    by_cone = np.add.reduceat(motions[:, :nu] ** 2, prepared.starts[:-1], axis=1)
+    reach = np.abs(middle) + (np.sqrt(by_cone).sum(axis=1) if nu else 0.0)
+    return active | (solved & (reach > prepared.ranges[limited]).any(axis=1))
+
+
+def _moves_platform(prepared: OnePosture) -> NDArray:
+    """(nq,) bool: free motions that the closures do not hold and the platform shows."""
+    mismatch = prepared.posture.mismatch
+    A_q = prepared.closures @ prepared.joints.free
+    P_q = prepared.platform @ prepared.joints.free
+    inverse = np.linalg.pinv(A_q, rcond=rank_tolerance(mismatch))
+    undetermined = P_q - (P_q @ inverse) @ A_q
+    return np.abs(undetermined).max(axis=0) > rank_tolerance(mismatch, UNBOUNDED)
+
+
+def bounded_position(
+    prepared: OnePosture, errors: NDArray, wrench: NDArray | None,
+    rng: np.random.Generator,
+) -> tuple[NDArray, bool]:  # fmt: skip
+    """Platform screw of one draw at contact, or uniform over its set.
+
+    Args:
+        prepared: the posture.
+        errors: (n, 6) [rad, m] of the draw.
+        wrench: (6,) [N m, N] that displaces the platform to contact; None for the
+            uniform distribution.
+        rng: of random numbers, for the uniform distribution.
+
+    Returns:
+        (6,) [rad, m], NaN where the draw has no solution or the solver fails; and
+        whether the walk mixed.  Motions without any bound stay at their least size.
+    """
+    from assembly.statistics.uniform_clearance import sample_uniform_position
+
+    try:
+        assembly = prepared.assembly(errors)
+        reachable = reachable_screws(assembly, READING)
+        if wrench is not None:
+            bounded = replace(reachable, free=np.zeros((6, 0)))
+            return bounded.support(wrench).screw, True
+    except (CannotAssemble, FreeMotion, SolverFailed):
+        return np.full(6, np.nan), True
+    rows, start = reachable.rows, reachable.start
+    Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
+    v, to_screw = start.copy(), np.ascontiguousarray(reachable.map)
+    mixed = sample_uniform_position(Z, reachable.starts, to_screw, v, rng)
+    return reachable.centre + reachable.map @ (v - start), mixed

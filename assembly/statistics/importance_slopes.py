@@ -1,0 +1,74 @@
+"""Exact slopes of the platform's screw with the errors, by groups of errors.
+
+A quotient of sampled deviations is no derivative: its noise is that of the sample.
+Where the same clearances are active the solution of (22) follows the errors linearly,
+and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's
+gain is their root mean square, over the group's errors by their variance and over some
+draws: where the answer is linear each draw has the same.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.draws import Draws
+from assembly.batch.many_draws import OnePosture
+from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.importance import SaltelliDesign
+from assembly.statistics.sensitivity import solution_slopes
+
+DRAWS = 32  # whose slopes are averaged
+
+
+def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
+    """Gains of groups of errors: the platform's motion for a unit of error.
+
+    Args:
+        experiment: distributions and posture.
+        design: whose first draws are taken, and whose groups.
+
+    Returns:
+        (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of
+        angles and lengths, and where none of the draws has a solution.
+    """
+    sources = experiment.sources
+    values = design.A[:DRAWS]
+    squares = np.zeros((2, len(sources)))
+    draws = experiment.energies.solve(sources.errors(values))
+    known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
+    if known.any():
+        slopes = platform_slopes(experiment.energies, draws.taken(known))
+        of_sources = slopes[:, :, sources.frame, sources.component]
+        mean = (of_sources**2).mean(axis=1)
+        squares = np.stack([mean[:3].sum(axis=0), mean[3:].sum(axis=0)])
+    gains = np.full((2, len(design.groups)), np.nan)
+    for g, unit in enumerate(error_units(sources, design)):
+        columns = design.groups[g][1]
+        variance = sources.variance[columns]
+        if unit != "rad, m" and known.any() and variance.any():
+            gains[:, g] = np.sqrt(squares[:, columns] @ variance / variance.sum())
+    return gains
+
+
+def platform_slopes(prepared: OnePosture, draws: Draws) -> NDArray:
+    """Slopes of the platform's screw with every geometric error.
+
+    Args:
+        prepared: the posture.
+        draws: k of its draws, with their clearances in unit cones.
+
+    Returns:
+        (6, k, n, 6) [rad or m for each rad or m].
+    """
+    count, frames = draws.errors.shape[:2]
+    repeated = draws.taken(np.tile(np.arange(count), 6))
+    by_screw = np.repeat(np.eye(6), count, axis=0)
+    by_wrench = np.zeros((6 * count, frames, 6))
+    slopes = solution_slopes(prepared, repeated, by_wrench, by_screw)
+    return slopes.reshape(6, count, frames, 6)
+
+
+def error_units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
+    """Units of the errors of each group."""
+    angles = [sources.component[columns] < 3 for _, columns in design.groups]
+    return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]

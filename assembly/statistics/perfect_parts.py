@@ -1,0 +1,145 @@
+"""What perfect parts reach: clearances and loads alone, with all errors zero.
+
+No tolerance mends a limit that perfect parts break.  Each joint's clearance has a part
+in the pose error of the worst clearance model: without errors the largest error is
+homogeneous in the clearances, so by Euler it is the sum of each clearance times its
+slope, the multiplier of its bound.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.batch.many_draws import OnePosture
+from assembly.model.clearance import BOUND_OF_COMPONENT
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.quantities import POSE_ERRORS, UNITS
+from assembly.statistics.ranking import kind_of
+from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
+
+_DRAWS = 200  # positions of a random clearance model, whose median counts
+_PRECISION = (1e-9, 1e-9)  # [rad, m] of the largest pose errors
+_SHARE = 1e-3  # of the largest pose error: smaller parts are not listed
+_KEYS = ("tilt", "spin", "radial", "axial")
+_EXCEEDED = 1e-9  # relative, above a limit
+
+
+def perfect_parts(experiment: Experiment) -> dict[str, Any]:
+    """Quantities with all errors zero.
+
+    Args:
+        experiment: posture, loads and clearance model.
+
+    Returns:
+        By quantity: ``reached``, of random clearance models the median of 200
+        positions; of pose errors of the worst model without loads also ``clearances``,
+        the part [rad or m] of each kind of clearance, the largest first.  Empty where
+        perfect parts have no solution.
+    """
+    random = experiment.clearance_model in {"uniform", "contact"}
+    count = _DRAWS if random else 1
+    rows = experiment.evaluate(np.zeros((count, len(experiment.sources))), range(count))
+    reached: dict[str, Any] = {}
+    for key in (*POSE_ERRORS, "energy", "force", "moment", "stress"):
+        lower = f"{key}_lower"
+        values = rows[lower if lower in (rows.dtype.names or ()) else key]
+        values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
+        value = float(np.median(values))
+        if np.isfinite(value):
+            reached[key] = {"reached": value, "unit": UNITS[key]}
+    prepared = experiment.energies
+    if experiment.clearance_model == "worst" and prepared.loads is None:
+        for key, parts in _clearance_parts(prepared).items():
+            if key in reached:
+                reached[key]["clearances"] = parts
+    return reached
+
+
+def _clearance_parts(prepared: OnePosture) -> dict[str, dict[str, float]]:
+    """By pose error, the part of each kind of clearance in the largest."""
+    draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
+    if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
+        return {}
+    _, screws = bound_worst_errors(prepared, draws, draws.errors, _PRECISION)
+    names, heads = _clearance_kinds(prepared), prepared.starts[:-1]
+    parts = {}
+    for i, key in enumerate(POSE_ERRORS):
+        _, slopes = worst_error_slopes(prepared, draws, key, screws[:, i])
+        sizes = (
+            np.sqrt(np.add.reduceat(slopes[0] ** 2, heads)) if len(heads) else slopes[0]
+        )
+        by_kind: dict[str, float] = {}
+        for name, size in zip(names, sizes.tolist(), strict=True):
+            by_kind[name] = by_kind.get(name, 0.0) + size
+        least = _SHARE * sum(by_kind.values())
+        listed = {k: v for k, v in by_kind.items() if v > least}
+        parts[key] = dict(sorted(listed.items(), key=lambda item: -item[1]))
+    return parts
+
+
+def _clearance_kinds(prepared: OnePosture) -> list[str]:
+    """Kind of each cone, such as ``hinge.tilt``: of all legs together."""
+    rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
+        axis=0
+    )
+    frames = prepared.posture.robot.frames
+    return [
+        f"{kind_of(frames[row // 6].name)}.{_KEYS[BOUND_OF_COMPONENT[row % 6]]}"
+        for row in rows.tolist()
+    ]
+
+
+def stored_perfect_parts(experiment: Experiment) -> str:
+    """The same as text, an attribute of a data set of draws."""
+    return json.dumps(perfect_parts(experiment))
+
+
+def limits_broken(
+    parts: Mapping[str, Any], limits: Mapping[str, float]
+) -> dict[str, Any]:
+    """Limits that perfect parts break.
+
+    Args:
+        parts: of :func:`perfect_parts`.
+        limits: by quantity.
+
+    Returns:
+        By quantity what is reached, its unit and the limit.
+    """
+    return {
+        key: {**parts[key], "limit": limit}
+        for key, limit in limits.items()
+        if key in parts and parts[key]["reached"] > limit * (1.0 + _EXCEEDED)
+    }
+
+
+def perfect_text(summary: Mapping[str, Any]) -> list[str]:
+    """Lines for people: what perfect parts reach, and the limits that they break."""
+    parts, lines = summary.get("perfect_parts", {}), []
+    alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
+    why = "clearances and loads alone" if summary.get("load") else "clearances alone"
+    if alone:
+        reach = ", ".join(
+            f"{k} {v['reached']:.4g} {v['unit']}{_of_text(v)}" for k, v in alone.items()
+        )
+        lines.append(f"perfect parts, {why}: {reach}")
+    advice = "" if summary.get("load") else ", or give the load of service (--load)"
+    for key, one in summary.get("perfect_parts_break", {}).items():
+        lines.append(
+            f"warning: perfect parts reach a {key} of {one['reached']:.4g} "
+            f"{one['unit']}, limit {one['limit']:.4g} {one['unit']}: no tolerance of "
+            f"the errors meets it; tighten the clearances{advice}"
+        )
+    return lines
+
+
+def _of_text(one: Mapping[str, Any]) -> str:
+    """The two largest parts of clearances, in brackets."""
+    parts = list(one.get("clearances", {}).items())[:2]
+    if not parts:
+        return ""
+    shares = ", ".join(f"{k} {v / one['reached']:.0%}" for k, v in parts)
+    return f" ({shares})"

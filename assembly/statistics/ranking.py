@@ -1,0 +1,79 @@
+"""Ranks of sampled shares, and names of contributors that are not distinguished."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.screws import SCREW
+
+NOT_DISTINGUISHED = (
+    "rank: the ranks that the intervals allow; errors with a rank in common are not "
+    "distinguished by these draws"
+)
+
+
+def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
+    """The first and the last rank that each contributor may have.
+
+    Args:
+        shares: by name (value, lower, upper).
+
+    Returns:
+        By name: 1 + how many are surely larger, and the number of all less how many are
+        surely smaller; none for a share that is not known.
+    """
+    known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
+    lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
+    return {
+        name: (
+            1 + int((lower > v[2]).sum()),
+            len(known) - int((upper < v[1]).sum()),
+        )
+        for name, v in known.items()
+    }
+
+
+def rank_text(rank: Sequence[int] | None) -> str:
+    """Possible ranks such as 1 or 2-4; empty where there are none."""
+    if rank is None:
+        return ""
+    first, last = rank
+    return f"{first}" if first == last else f"{first}-{last}"
+
+
+def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
+    """Names of the contributors that may be the largest."""
+    return [name for name, (first, _) in ranks.items() if first == 1]
+
+
+def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
+    """Names of contributors, those of all legs as one.
+
+    Args:
+        names: such as ``leg1.hinge.RX``, the contributors.
+        among: names of all there are.
+
+    Returns:
+        ``hinge.RX of all legs`` where each leg's is among the names, in the order of
+        the names; the others as they are.
+    """
+    names = list(names)
+    of_kind: dict[str, list[str]] = {}
+    for name in among:
+        of_kind.setdefault(kind_of(name), []).append(name)
+    together = []
+    for name in names:
+        same = of_kind.get(kind_of(name), [name])
+        whole = len(same) > 1 and set(same) <= set(names)
+        together.append(f"{kind_of(name)} of all legs" if whole else name)
+    return list(dict.fromkeys(together))
+
+
+def kind_of(name: str) -> str:
+    """A frame's or an error's name without its leg's: ``hinge.RX``."""
+    frame, dot, component = name.rpartition(".")
+    if component not in SCREW:
+        frame, dot, component = name, "", ""
+    leg, in_leg, rest = frame.partition(".")
+    return f"{rest if in_leg else leg}{dot}{component}"

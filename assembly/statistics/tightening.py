@@ -1,0 +1,114 @@
+"""Which error or clearance governs a result of draws, and what to tighten."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from assembly.statistics.quantities import POSE_ERRORS
+from assembly.statistics.ranking import leaders, named_together
+from forcefit.page.page import Tile
+from forcefit.page.tables import Value
+
+_NAMED = 3  # contributors in a tile
+
+
+def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
+    """Total shares of a quantity's variance by error, the largest first.
+
+    Args:
+        summary: of :func:`assembly.statistics.summary.summarise`.
+        key: the quantity.
+
+    Returns:
+        Names with (value, lower, upper); none without shares.
+    """
+    one = summary.get("importance", {}).get("quantities", {}).get(key, {})
+    if "reason" in one or "total_index" not in one:
+        return []
+    shares = [(name, list(map(float, v))) for name, v in one["total_index"].items()]
+    known = [(name, v) for name, v in shares if np.isfinite(v[0]) and v[0] > 1e-6]
+    return sorted(known, key=lambda item: -item[1][0])
+
+
+def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
+    """What perfect parts reach, what governs the result, and what to tighten.
+
+    Args:
+        summary: of :func:`assembly.statistics.summary.summarise`.
+
+    Returns:
+        The tiles; of errors none without their importance.
+    """
+    tiles = _clearance_tiles(summary)
+    broken, key = summary["perfect_parts_break"], _deciding(summary)
+    shares = ranked(summary, key)
+    names: list[str] = []
+    if shares:
+        ranks = summary["importance"]["quantities"][key]["rank"]
+        names = named_together(
+            sorted(leaders(ranks), key=[name for name, _ in shares].index), ranks
+        )
+        largest, (value, *_) = shares[0]
+        each = "" if names[0] == largest else " each"
+        note = f"share of the {key}'s variance it has a part in."
+        if len(names) > 1:
+            note = f"{note[:-1]}; these draws do not distinguish: {_listed(names)}."
+        answer = f"{names[0]}: {100 * value:.0f} %{each}"
+        tiles.append(Tile("What governs it", [answer], [note]))
+    if broken:
+        tiles.append(_broken_tile(broken))
+    elif summary.get("within_limits", {}).get("probability") == 1.0:
+        note = f"all {summary['draws']} draws keep all limits."
+        tiles.append(Tile("What to tighten", ["nothing"], [note]))
+    elif names:
+        note = "not distinguished by these draws." if len(names) > 1 else ""
+        tiles.append(Tile("What to tighten", [_listed(names)], [note]))
+    return tiles
+
+
+def _deciding(summary: Mapping[str, Any]) -> str:
+    """The quantity whose limit is exceeded most often; else translation, or energy."""
+    exceeds = sorted(
+        summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
+    )
+    order = [k for k in exceeds if summary["exceeds"][k]["probability"] > 0.0]
+    known = (k for k in (*order, "translation", "energy") if ranked(summary, k))
+    return next(known, "translation")
+
+
+def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
+    """The pose error of perfect parts."""
+    parts = summary["perfect_parts"]
+    answer: list[str | Value] = []
+    for key in ("translation", "rotation"):
+        one = parts.get(key, {})
+        if one.get("reached"):
+            answer += [" and ", Value(one["reached"], one["unit"], 3)]
+    if not answer:
+        return []
+    largest = next(iter(parts.get("translation", {}).get("clearances", {})), "")
+    note = f"of perfect parts; most of the translation: {largest}." if largest else ""
+    loads = " and loads" if summary.get("load") else ""
+    return [Tile(f"Clearances{loads} alone", answer[1:], [note or "of perfect parts."])]
+
+
+def _broken_tile(broken: Mapping[str, Any]) -> Tile:
+    """That no error, but the clearances have to be tightened."""
+    key, one = next(iter(broken.items()))
+    largest = next(iter(one.get("clearances", {})), "")
+    note: list[str | Value] = [
+        f"Perfect parts reach a {key} of ", Value(one["reached"], one["unit"], 4),
+        ", limit ", Value(one["limit"], one["unit"], 4),
+        ": no tolerance of the errors meets it.",
+    ]  # fmt: skip
+    if largest:
+        note.append(f" First: {largest}.")
+    what = "the clearances" if key in POSE_ERRORS else "the design or its loads"
+    return Tile("What to tighten", [what], note)
+
+
+def _listed(names: list[str]) -> str:
+    """Names, of many the first ones and how many more."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(names[:_NAMED]) + more

@@ -1,0 +1,263 @@
+"""Page of tolerances: what was asked, the tolerances, and what clearances take."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from assembly.statistics.clearance_positions import play_means
+from assembly.statistics.plot import NAMES
+from assembly.statistics.quantities import UNITS
+from forcefit.page.charts import Axis, bars
+from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
+from forcefit.page.tables import Cell, Column, Value, table
+
+_LISTED = 20  # errors in a table of shares
+_ALIKE = 0.01  # of the largest share: shares as close are equal
+_ASSUMED = (
+    "Limits hold at the postures of the grid; between them nothing is said.",
+    "Errors are independent and keep within their tolerances.",
+    "Small screws: the closures are linear in the errors.",
+)
+_COST_LAWS = {
+    "reciprocal": "sum of cost / tolerance [rad or m]",
+    "logarithm": "minus the sum of cost times log tolerance [rad or m]",
+}
+_GOVERNED = {
+    "reciprocal": "of the price",
+    "logarithm": "of what looser tolerances would save",
+}
+
+
+def tolerances_page(
+    results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
+) -> str:
+    """The page of ``assembly tolerances``.
+
+    Args:
+        results: with ``present``, ``allocation`` or both, number of ``postures`` and
+            their ``grid``.
+        provenance: command and files.
+        pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
+
+    Returns:
+        HTML, which needs no other file.
+    """
+    present, allocation = (results.get(key) for key in ("present", "allocation"))
+    tiles, body, sentences = [], [], []
+    good = True
+    if present is not None:
+        share = 100 * present["assemblable_share"]
+        sentences.append(
+            f"{share:.1f} % of {present['postures']} postures go together by "
+            "clearances alone; all of them with the errors times "
+            f"{present['factor_on_errors']:.4g}."
+        )
+        tiles += _present_tiles(present)
+        body.append(_present_section(present))
+        body += [section("Where it is tight", *pictures)] if any(pictures) else []
+    if allocation is not None:
+        check = allocation["verification"]
+        good = (check or {}).get("verdict") != "contradicted"
+        sentences.append(_allocation_sentence(allocation))
+        tiles += _allocation_tiles(allocation)
+        body += [_asked_section(results, allocation), _allocation_section(allocation)]
+        body += _clearance_sections(allocation)
+    return page(
+        Page(
+            title=f"{results['robot']}: tolerances",
+            verdict=" ".join(sentences),
+            good=good and (present is None or present["assemblable_share"] == 1.0),
+            tiles=tiles,
+            about=f"{results['postures']} postures: {results['grid']}.",
+            body=body,
+            assumed=_ASSUMED,
+            provenance=provenance,
+            results=results,
+        )
+    )
+
+
+def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
+    """The largest margin, and the error it is owed to."""
+    at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
+    note = f"at {at or 'the origin'} [m, rad]; 1 and less goes together."
+    tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
+    if present["slopes"]:
+        first = present["slopes"][0]
+        share = f"{100 * first['share_of_margin']:.0f} %"
+        tiles.append(Tile("What governs it", [first["error"]], [f"{share} of it."]))
+    factor = present["factor_on_errors"]
+    answer, note = f"all errors times {factor:.3g}", "then all postures fit."
+    if factor >= 1.0:
+        answer, note = "nothing", "all postures fit with the errors there are."
+    return [*tiles, Tile("What to tighten", [answer], [note])]
+
+
+def _present_section(present: Mapping[str, Any]) -> str:
+    """Shares of the errors there are in the largest margin."""
+    rows: list[list[Cell]] = [
+        [one["error"], Value(one["value"], _error_unit(one["error"])),
+         one["share_of_margin"]]
+        for one in present["slopes"][:_LISTED]
+    ]  # fmt: skip
+    shares = {one["error"]: one["share_of_margin"] for one in present["slopes"]}
+    most = dict(list(shares.items())[:_LISTED])
+    return section(
+        "The errors there are",
+        bars(most, Axis("share of the largest margin"), "The steepest first.", np.nan),
+        table(["error", "size", Column("share of the margin")], rows, "errors"),
+    )
+
+
+def _error_unit(name: str) -> str:
+    """SI unit of an error such as ``leg1.link_a.TX``."""
+    return "rad" if name.rpartition(".")[2].startswith("R") else "m"
+
+
+def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
+    """Whether the tolerances hold, by proof and by fresh draws."""
+    text = f"Tolerances for a yield of {allocation['yield']:g}"
+    proven = allocation["proven_scale"]
+    if np.isfinite(proven):
+        text += f", proven when scaled by {proven:.4f}"
+    check = allocation["verification"]
+    if check:
+        text += f"; {check['draws']} fresh draws at all postures: {check['verdict']}"
+    return text + "."
+
+
+def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
+    """Yield, what clearances take, and the tolerances that govern the price."""
+    tiles = []
+    check = allocation["verification"]
+    if check:
+        one = check["yield"]
+        low, high = (100 * one[end] for end in ("lower", "upper"))
+        tiles.append(Tile("Yield", [f"{100 * one['probability']:.4g} %"],
+                          [f"{low:.4g} to {high:.4g} %, fresh draws."]))  # fmt: skip
+    for key, one in allocation["perfect_parts"].items():
+        if one["reached"] > 0.0:
+            answer = f"{100 * one['reached'] / one['limit']:.0f} %"
+            tiles.append(Tile("Clearances take", [answer], [f"of the limit of {key}."]))
+    return [*tiles, _tighten_tile(allocation)]
+
+
+def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
+    """The tolerances with the largest share of the price, if any is to be tight."""
+    tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
+    if not tight:
+        why = "every tolerance may be the loosest allowed."
+        return Tile("What to tighten", ["nothing"], [why])
+    most = max(one["share"] for one in tight)
+    first = [one for one in tight if one["share"] >= (1.0 - _ALIKE) * most]
+    share = f"{100 * most:.0f} % {_GOVERNED[allocation['cost']]}"
+    if len(first) > 1:
+        names = ", ".join(one["name"] for one in first)
+        return Tile("What to tighten", [names], [f"{share} each."])
+    (one,) = first
+    size = Value(one["tolerance"], one["unit"])
+    return Tile(
+        "What to tighten", [one["name"]], [share, ", to plus or minus ", size, "."]
+    )
+
+
+def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
+    """Limits, yield, clearances, distribution, cost law and postures."""
+    rows: list[list[Cell]] = [
+        [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
+        for key, limit in allocation["limits"].items()
+    ]
+    asked = allocation["yield"]
+    play = allocation["play"]
+    errors = "uniform within plus or minus their tolerance"
+    if allocation["distribution"] == "truncated":
+        errors = (
+            f"normal, the tolerance at {allocation['deviations']:g} standard "
+            "deviations, where it is cut"
+        )
+    clearances = "no pose error is limited: their position does not matter"
+    if play is not None:
+        clearances = f"play {play}: {play_means(play, allocation['contact_length'])}"
+    check = allocation["verification"]
+    fresh = f"; {check['draws']} fresh ones verify" if check else ""
+    rows += [
+        ["yield", "1: every robot within tolerance" if asked == 1.0 else f"{asked:g}"],
+        ["clearances", clearances],
+        ["errors", errors],
+        ["price", _COST_LAWS[allocation["cost"]]],
+        ["postures", f"{results['postures']}: {results['grid']}"],
+        ["draws", f"{allocation['draws']}, seed {allocation['seed']}{fresh}"],
+    ]
+    return section("What was asked", table(["asked", ""], rows, "what was asked"))
+
+
+def _allocation_section(allocation: Mapping[str, Any]) -> str:
+    """Tolerances by class, price and worst cases."""
+    classes = allocation["tolerances"]
+    rows: list[list[Cell]] = [
+        [one["name"], *(Value(one[k], one["unit"]) for k in
+                        ("tolerance", "loosest_allowed")),
+         float(one["cost"]), float(one["share"])]
+        for one in classes
+    ]  # fmt: skip
+    worst: list[list[Cell]] = [
+        [NAMES[key], *(Value(v, UNITS[key], 6) for v in
+                       (allocation["limits"][key], one["found"], one["proven"]))]
+        for key, one in allocation["worst"].items()
+    ]  # fmt: skip
+    charts = "".join(
+        # from zero: a bar's length on a logarithmic axis means nothing
+        bars(some, Axis("tolerance, plus or minus", unit), "", np.nan)
+        for unit in ("rad", "m")
+        if (some := {one["name"]: one["tolerance"] for one in classes
+                     if one["unit"] == unit})
+    )  # fmt: skip
+    share = Column(f"share {_GOVERNED[allocation['cost']]}")
+    head: list[str | Column] = ["class", "tolerance, plus or minus", "loosest allowed"]
+    pieces = [
+        f"<div class=grid>{charts}</div>",
+        table([*head, Column("cost"), share], rows, "tolerances"),
+        _price_paragraph(allocation),
+    ]
+    if worst:
+        columns = ["quantity", "limit", "worst found", "proven at most"]
+        pieces.append(table(columns, worst, "limits"))
+    return section("The tolerances there may be", *pieces)
+
+
+def _price_paragraph(allocation: Mapping[str, Any]) -> str:
+    """The price, and whether nothing cheaper is proved."""
+    price, bound = (allocation[key] for key in ("price", "price_bound"))
+    if np.isfinite(bound):
+        return paragraph(
+            "Price ", Value(price, "", 5), "; no tolerances that meet the limits cost "
+            "less than ", Value(bound, "", 5), ".",
+        )  # fmt: skip
+    return paragraph(
+        "Price ", Value(price, "", 5), ". It is least in a neighbourhood; that nothing "
+        "cheaper lies elsewhere is not proved, for the limits are not convex in the "
+        "tolerances.",
+    )  # fmt: skip
+
+
+def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
+    """What clearances alone take of the limits on the pose, without errors."""
+    taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
+    if not taken:
+        return []
+    rows: list[list[Cell]] = [
+        [NAMES[key], *(Value(v, one["unit"], 4) for v in
+                       (one["limit"], one["reached"], one["limit"] - one["reached"])),
+         one["at"]]
+        for key, one in taken.items()
+    ]  # fmt: skip
+    one = max(taken.values(), key=lambda v: v["reached"] / v["limit"])
+    head = ["quantity", "limit", "clearances take", "left for errors", "at [m, rad]"]
+    looser, price = Value(one["looser_without"], "", 3), Value(one["price_without"])
+    text = paragraph(
+        "Without clearances all tolerances could be about ", looser, " times looser, "
+        "at a price of about ", price, ": pose errors by clearances and by errors add "
+        "up, nearly.",
+    )  # fmt: skip
+    return [section("What clearances take", table(head, rows, "clearances"), text)]

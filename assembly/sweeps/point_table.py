@@ -1,0 +1,95 @@
+"""Data sets as tables: one row for each point or draw, one column for each component.
+
+``xarray.Dataset.to_dataframe`` multiplies all axes of all variables: a sweep of some
+megabytes becomes tens of millions of rows.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from assembly.model.tables import component_unit, frame_table
+from assembly.sweeps.dataset import open_dataset
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from forcefit.inputs.writing import TABLE, check_writable, whole_file
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+# whose axes are those of the points: of sweeps and draws, and of tolerances
+_OF_POINTS = ("status", "tolerance")
+
+
+def point_table(
+    data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
+) -> "pandas.DataFrame":
+    """A data set as a table, one row for each point, draw or tolerance.
+
+    Args:
+        data: of a sweep, of draws or of tolerances; or the path of its file.
+        rows: axes whose points are the rows, such as ``["quantity", "group"]`` for the
+            importance of errors; those of the sweep's points, the draws or the
+            tolerances' classes if empty.
+
+    Returns:
+        Table whose columns are (variable, component), component empty for plain
+        numbers; ``table["platform_screw", "TX"]`` is one.  Its index has the axes.
+        Units by variable and axis are in its ``attrs["units"]``.
+
+    Raises:
+        BadInput: the file cannot be read; an axis is unknown; or ``rows`` is empty and
+            the data set is of none of these kinds.
+    """
+    whose = "table"
+    if isinstance(data, str | Path):
+        whose, data = str(data), open_dataset(data)
+    axes = [str(name) for name in data.dims]
+    for name in rows:
+        if name not in axes:
+            raise BadInput(f"{whose}: no axis {quoted(name)}{nearest(name, axes)}")
+    first = next((name for name in _OF_POINTS if name in data), None)
+    if not rows and first is not None:
+        rows = [str(name) for name in data[first].dims]
+    if not rows and first is None:
+        raise BadInput(
+            f"{whose}: found axes {', '.join(axes) or 'none'} and no status; expected "
+            "a data set of a sweep, of draws or of tolerances, or the axes of its rows"
+        )
+    return frame_table(data, *rows)
+
+
+def write_point_table(
+    data: "xarray.Dataset | Path | str", path: Path | str, rows: Sequence[str] = ()
+) -> None:
+    """Write the table of :func:`point_table` as a CSV file, whole or not at all.
+
+    The first column is ``id``, the number of the row from 0; then come the axes and the
+    columns, ``variable.component [unit]``.  A missing number is an empty cell.
+
+    Args:
+        data: as for :func:`point_table`.
+        path: of the file.
+        rows: likewise.
+
+    Raises:
+        BadInput: as :func:`point_table`; or the file cannot be written.
+    """
+    check_writable(path, TABLE)
+    table = point_table(data, rows)
+    units = table.attrs["units"]
+    heads = [
+        _head(f"{name}.{one}" if one else name, component_unit(units[name], one))
+        for name, one in table.columns
+    ]
+    axes = [_head(str(name), units[name]) for name in table.index.names]
+    table = table.set_axis(heads, axis=1).rename_axis(axes).reset_index()
+    table.index.name = "id"
+    with whole_file(path) as part:
+        table.to_csv(part, encoding="utf-8", errors="backslashreplace",
+                     lineterminator="\n")  # fmt: skip
+
+
+def _head(name: str, unit: str) -> str:
+    """Head of a column."""
+    return f"{name} [{unit}]" if unit else name

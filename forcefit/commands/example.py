@@ -1,0 +1,160 @@
+"""The command ``forcefit example``: writes the files of the examples."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import typer
+
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from forcefit.inputs.writing import check_writable, write_bytes
+
+
+class _Example(NamedTuple):
+    """One example.
+
+    Attributes:
+        about: what it shows.
+        files: its files and folders, from the folder that has ``examples``.
+        first: a command to begin with.
+    """
+
+    about: str
+    files: tuple[str, ...]
+    first: str
+
+
+_MESH = "meshes/distal_plain.stl"
+EXAMPLES = {
+    "irsbot2": _Example(
+        "the paper's robot: a study, and errors for other commands",
+        ("examples/irsbot2.toml", "examples/irsbot2_errors.toml", _MESH),
+        "forcefit study examples/irsbot2.toml",
+    ),
+    "tolerance_allocation": _Example(
+        "how loose the tolerances of the paper's robot may be",
+        ("examples/tolerance_allocation",),
+        'forcefit assembly tolerances irsbot2 --grid "tx=-0.2:0.2:0.2,tz=-0.5" '
+        "--plan examples/tolerance_allocation/mostly.toml",
+    ),
+    "campaign": _Example(
+        "measurements of an arm that lacks an effect in its model",
+        ("examples/campaign",),
+        "forcefit validation diagnose examples/campaign",
+    ),
+    "figure5": _Example(
+        "the paper's figure 5, in Python",
+        ("examples/paper_figure5.py",),
+        "python examples/paper_figure5.py",
+    ),
+    "hexapod": _Example(
+        "what half the clearance gains in a hexapod, in Python",
+        ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
+        "python examples/hexapod_accuracy.py",
+    ),
+    "link_library": _Example(
+        "stiffness of links for a grid of dimensions",
+        ("examples/link_library.toml",),
+        "forcefit stiffness library build examples/link_library.toml",
+    ),
+    "part_library": _Example(
+        "stiffness of parts by their surface",
+        ("examples/part_library.toml", _MESH, "meshes/l_bracket.stl"),
+        "forcefit stiffness library build examples/part_library.toml",
+    ),
+    "stiffness_library": _Example(
+        "bars, tubes, boxes and cones by finite elements",
+        ("examples/stiffness_library",),
+        "forcefit stiffness library look-up examples/stiffness_library/tube "
+        "--at length=0.37",
+    ),
+    "surfaces": _Example(
+        "surfaces of parts for finite elements",
+        ("meshes",),
+        'forcefit stiffness fea meshes/distal_plain.stl --base "z=0" --tip "z=0.452" '
+        "--young 6e10 --poisson 0.3",
+    ),
+    **{
+        name: _Example(
+            f"campaign of measured data: {about}",
+            (f"examples/{name}", "examples/campaign_folder.py", "examples/data.toml"),
+            f"python examples/{name}/convert.py --help",
+        )
+        for name, about in (
+            ("hangprinter", "a cable-driven printer's motor forces"),
+            ("hilti", "a construction robot"),
+            ("ipa_ur10", "a UR10 by a tracker"),
+            ("serial_robots", "a UR5 and a WAM"),
+            ("voron", "a printer's gantry"),
+        )
+    },
+}
+
+
+def example(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Of examples; none lists them."),
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder that exists.")
+    ] = Path(),
+) -> None:
+    """Write the files of examples, as they stand in the repository.
+
+    The commands of the README and of the documentation then work in that folder.  A
+    file that is there already with another content is kept, and nothing is written.
+    """
+    if not names:
+        for name, one in EXAMPLES.items():
+            print(f"{name:<22}{one.about}")
+        return
+    for name in names:
+        if name not in EXAMPLES:
+            raise BadInput(f"example: no {quoted(name)}{nearest(name, EXAMPLES)}")
+    if not output.is_dir():
+        raise BadInput(f"{output}: no such folder; expected one that exists")
+    root = _root()
+    files = dict.fromkeys(
+        path for name in names for part in EXAMPLES[name].files
+        for path in _files(root, part)
+    )  # fmt: skip
+    absent = [path for path in files if _is_absent(output / path, root / path)]
+    for path in absent:
+        (output / path).parent.mkdir(parents=True, exist_ok=True)
+        write_bytes((root / path).read_bytes(), output / path)
+    print(f"{len(absent)} files written to {output.resolve()}; begin there with")
+    for name in names:
+        print(f"  {EXAMPLES[name].first}")
+
+
+def _root() -> Path:
+    """The folder that has the examples: of the package installed, or of a checkout."""
+    package = Path(__file__).parents[1]
+    for folder in (package, package.parent):
+        if (folder / "examples" / "irsbot2.toml").is_file():
+            return folder
+    raise BadInput(f"{package}: found no examples; expected them to be installed")
+
+
+def _files(root: Path, part: str) -> Iterator[Path]:
+    """A file, or all files of a folder, relative to the root."""
+    if (root / part).is_file():
+        yield Path(part)
+        return
+    for path in sorted((root / part).rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path.relative_to(root)
+
+
+def _is_absent(target: Path, source: Path) -> bool:
+    """Whether an example's file is not there yet; another content is refused."""
+    if not target.exists():
+        check_writable(next(p for p in target.parents if p.exists()) / target.name)
+        return True
+    if not target.is_file() or target.read_bytes() != source.read_bytes():
+        raise BadInput(
+            f"{target}: found another content than the example's; expected the same, "
+            "or nothing there: it is not overwritten"
+        )
+    return False

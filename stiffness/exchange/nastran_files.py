@@ -1,0 +1,147 @@
+"""Nastran's bulk data: fields of a line, and matrices by ``DMIG``.
+
+Fields are eight characters wide, sixteen where the first ends in ``*``, between commas,
+or between blanks; between commas a line may have more than the eight of a card.
+
+Sources:
+    MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
+    gives one half); EXTSEOUT, whose punch file has KAAX, K4AAX (structural damping),
+    BAAX (viscous damping) and MAAX side by side.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from forcefit.inputs.errors import BadInput, describe
+from stiffness.exchange.real_numbers import real, whole
+
+Freedom = tuple[int, int]
+Entries = dict[tuple[Freedom, Freedom], float]
+DMIG = re.compile(r"^DMIG[*\s,]", re.M | re.I)
+# what names of Nastran's own say, whatever else the file holds
+_OWN_NAME = re.compile(r"(K4|K|B|M)2?(AAX?|GG|PP|LL|FF)")
+_WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
+         "B": "viscous damping"}  # fmt: skip
+
+
+def bulk_fields(line: str) -> tuple[str, list[str]]:
+    """The fields of a line of bulk data.
+
+    Args:
+        line: with fields of fixed width, or between commas or blanks.
+
+    Returns:
+        The first field in capitals, with its ``*``, and the others; of fixed width four
+        or eight, else as many as there are.
+    """
+    if "," in line:
+        head, *fields = [word.strip() for word in line.split(",")]
+        return head.upper(), fields
+    head = line[:8].strip()
+    width = 16 if "*" in head else 8
+    fields = [line[k : k + width].strip() for k in range(8, 72, width)]
+    if any(re.search(r"\s", field) for field in (head, *fields)):
+        # a field of fixed width has no blank inside
+        head, *fields = line.split()
+    return head.upper(), fields
+
+
+def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
+    """Entries of the stiffness or mass matrix among those of a file.
+
+    Args:
+        path: for messages.
+        text: of the file.
+        which: ``"stiffness"`` or ``"mass"``.
+
+    Returns:
+        Values by the freedoms of row and column, of one half or both.
+
+    Raises:
+        BadInput: no matrix or several are of this kind, or it is not square and real.
+    """
+    matrices: dict[str, Entries] = {}
+    forms: dict[str, str] = {}
+    entries: Entries | None = None
+    for line in text.split("\n"):
+        if not line.strip() or line.startswith("$"):
+            continue
+        head, fields = bulk_fields(line)
+        packed = "," not in line and "" not in fields
+        if head.rstrip("*") == "DMIG":
+            name, node, direction = (fields + [""] * 3)[:3]
+            entries = matrices.setdefault(name.upper(), {})
+            if node in {"0", ""}:  # the header: form, types
+                forms[name.upper()], entries = direction, None
+                continue
+            column = whole(path, node), max(1, whole(path, direction or "0"))
+            fields = fields[3:]
+        elif entries is None or (head and head[0] not in "*+"):
+            entries = None
+            continue
+        for row, value in _terms(path, fields, packed):
+            entries[row, column] = value
+    return matrices[_chosen(path, matrices, forms, which)]
+
+
+def _terms(
+    path: Path | str, fields: list[str], packed: bool
+) -> list[tuple[Freedom, float]]:
+    """Rows and values of a column: node, direction, real part, imaginary part.
+
+    Args:
+        path: for messages.
+        fields: of one line, after those that name the column.
+        packed: between blanks, where no field is empty: no imaginary part.
+
+    Returns:
+        Row and value of each term.
+
+    Raises:
+        BadInput: the line ends within a term, or a number is none.
+    """
+    terms, waiting = [], list(fields)
+    while waiting:
+        if not waiting[0] or waiting[0].startswith(("+", "*")):  # goes on in a line
+            waiting.pop(0)
+            continue
+        if len(waiting) < 3:
+            found = describe(" ".join(waiting).strip())
+            raise BadInput(
+                f"{path}: found {found} at a line's end, expected node, direction, "
+                "value"
+            )
+        node, direction, value = waiting[:3]
+        row = whole(path, node), max(1, whole(path, direction or "0"))
+        terms.append((row, real(path, value)))
+        del waiting[: 3 if packed else 4]
+    return terms
+
+
+def _chosen(
+    path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
+) -> str:
+    """The name of the one stiffness or mass matrix."""
+    names = list(names)
+    initial = {kind: letter for letter, kind in _WHAT.items()}[which]
+    found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
+    found = [name for name in found or names if _kind(name) in {which, None}]
+    if len(found) > 1:
+        found = [name for name in found if name.startswith(initial)]
+    if len(found) != 1:
+        listed = [f"{n} ({k})" if (k := _kind(n)) else n for n in sorted(names)]
+        raise BadInput(
+            f"{path}: found the matrices {', '.join(listed) or 'none'}, expected one "
+            f"of {which}, or one whose name begins with {initial}"
+        )
+    form = forms.get(found[0], "")
+    if form not in {"1", "6", ""}:
+        raise BadInput(f"{path}: form {describe(form)}, expected 6 or 1, real")
+    return found[0]
+
+
+def _kind(name: str) -> str | None:
+    """What a matrix is by a name that Nastran itself gives, else None."""
+    match = _OWN_NAME.fullmatch(name)
+    return _WHAT[match[1]] if match else None

@@ -1,0 +1,105 @@
+"""A mesh cut along the smooth outline of an interface.
+
+The mesher knows sharp edges only.  Where an interface goes over into a rounding, mesh
+triangles lie across the outline, and the interface would be wider or narrower by parts
+of them.  Corners near the outline are taken for corners on it, and the edges that still
+cross it are split there.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.refine import edge_code
+from stiffness.mesh.solid import Solid
+from stiffness.mesh.split_crossing import split_crossing
+from stiffness.surface.smooth_outline import SmoothOutline
+
+_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the outline
+_REACH = 0.005  # of the part's size: a corner is moved by no more
+
+
+def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
+    """Split a mesh so that no boundary triangle lies across an outline.
+
+    Args:
+        solid: boundary corners near the surface, on its shapes or not yet.
+        outline: of an interface.
+
+    Returns:
+        The solid; its triangles at the outline belong to the side on which they lie.
+    """
+
+    def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
+        return _crossing_edges(finer, outline, on, ends)
+
+    solid, on = split_crossing(solid, _corners_on(solid, outline), crossing)
+    return replace(solid, patch=_sides(solid, outline, on))
+
+
+def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
+    """(f,) boundary triangles of the two patches."""
+    return np.isin(solid.patch, outline.patches)
+
+
+def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
+    """(k, 2) edges of the two patches' triangles, in order."""
+    faces = solid.faces[_members(solid, outline)]
+    pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    return np.unique(pairs, axis=0)
+
+
+def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
+    """(n,) whether a corner is so near the outline that it is taken to be on it."""
+    pairs = _boundary_edges(solid, outline)
+    length = np.linalg.norm(
+        solid.points[pairs[:, 0]] - solid.points[pairs[:, 1]], axis=1
+    )
+    shortest = np.full(len(solid.points), np.inf)
+    for k in (0, 1):
+        np.minimum.at(shortest, pairs[:, k], length)
+    corners = np.unique(pairs)
+    points = solid.points[corners]
+    size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    reach = np.minimum(_NEAR * shortest[corners], _REACH * size)
+    near = np.abs(outline.outside(points)) < reach
+    near &= outline.distance(points) < shortest[corners]
+    on = np.zeros(len(solid.points), dtype=bool)
+    on[corners[near]] = True
+    return on
+
+
+def _crossing_edges(
+    solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
+) -> tuple[NDArray, NDArray]:
+    """(e,) whether an edge crosses the outline, and at which share of it."""
+    pairs = _boundary_edges(solid, outline)
+    index = np.searchsorted(
+        edge_code(ends, len(on)), edge_code(pairs, len(on))
+    )  # both in order
+    start, end = solid.points[pairs].swapaxes(0, 1)
+    low, high = outline.outside(start), outline.outside(end)
+    across = (low * high < 0) & ~on[pairs].any(axis=1)
+    share = np.zeros(len(ends))
+    part = np.divide(low, low - high, out=np.zeros_like(low), where=across)
+    place = start + part[:, None] * (end - start)
+    length = np.linalg.norm(end - start, axis=1)
+    across[across] = outline.distance(place[across]) < _NEAR * length[across]
+    crossing = np.zeros(len(ends), dtype=bool)
+    crossing[index[across]] = True
+    share[index] = part
+    return crossing, share
+
+
+def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
+    """(f,) patches, those of triangles at the outline by the side they lie on."""
+    patch = solid.patch.copy()
+    near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
+    corners = solid.points[solid.faces[near]]
+    away = outline.outside(corners.reshape(-1, 3)).reshape(-1, 3)
+    # a corner on the outline has no side
+    mean = np.where(on[solid.faces[near]], 0.0, away).sum(axis=1)
+    mean = np.where(on[solid.faces[near]].all(axis=1), away.sum(axis=1), mean)
+    patch[near] = np.where(mean > 0, outline.patches[1], outline.patches[0])
+    return patch

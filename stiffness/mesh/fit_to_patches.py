@@ -1,0 +1,102 @@
+"""A mesh of the surface's envelope, fitted to the surface's patches."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput
+from stiffness.mesh.cut_along import cut_along
+from stiffness.mesh.improve import fitted
+from stiffness.mesh.solid import Solid, boundary_faces, element_quality
+from stiffness.surface.decimate import euler_characteristic
+from stiffness.surface.patches import Patches
+from stiffness.surface.surface import Surface
+from stiffness.surface.true_surface import TrueSurface
+
+
+class MeshFailed(BadInput):
+    """The mesher gave nothing usable for a surface that is in order."""
+
+
+def fit_to_patches(
+    points: NDArray, cells: NDArray, surface: Surface, patches: Patches
+) -> Solid:
+    """Assign boundary triangles to patches; project corners onto the exact shapes.
+
+    Args:
+        points: (n, 3) [m].
+        cells: (t, 4) tetrahedra of either orientation.
+        surface: what they were made from.
+        patches: its patches and shapes.
+
+    Returns:
+        The solid; moves of corners that would invert a tetrahedron are shortened.
+
+    Raises:
+        MeshFailed: the mesh is not the part: its volume is off by more than 2 %, it has
+            other holes, or an interface has no face.
+    """
+    points, cells = _positive_cells(points, cells)
+    faces = boundary_faces(cells)
+    patch = _nearest_patch(points, faces, surface, patches)
+    walls = {outline.patches: outline.wall for outline in patches.outlines}
+    true = TrueSurface(surface, patches)
+    solid = Solid(points, cells, faces, patch, patches.shapes, walls, true)
+    for outline in patches.outlines:
+        solid = cut_along(solid, outline)
+    solid = fitted(solid)
+    volume = float(solid.volumes().sum())
+    if abs(volume / surface.volume - 1) > 0.02:
+        raise MeshFailed(
+            f"{surface.name}: the mesh has {volume:.6g} m^3, the surface encloses "
+            f"{surface.volume:.6g}"
+        )
+    if (least := float(element_quality(solid).min())) <= 0:
+        raise MeshFailed(f"{surface.name}: an element is inverted, quality {least:.2g}")
+    # a hole in a thin wall changes the volume little and the stiffness much
+    holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
+    if holes != expected:
+        raise MeshFailed(
+            f"{surface.name}: the mesh has other holes than the surface: Euler "
+            f"characteristic {holes}, expected {expected}"
+        )
+    for number, name in enumerate(("base", "tip")):
+        if not (solid.patch == number).any():
+            raise MeshFailed(f"{surface.name}: no face of the mesh on the {name}")
+    return solid
+
+
+def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
+    """Points that are used, and cells turned to positive volume."""
+    used, cells = np.unique(cells, return_inverse=True)
+    points, cells = points[used], cells.reshape(-1, 4)
+    a, b, c, d = np.moveaxis(points[cells], 1, 0)
+    turned = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) < 0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    return points, cells
+
+
+def _nearest_patch(
+    points: NDArray, faces: NDArray, surface: Surface, patches: Patches
+) -> NDArray:
+    """Patch of each boundary face: the nearest one of about the same normal."""
+    import pyvista
+
+    mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
+    corners = points[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    outward = surface.normals()
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+    center = corners.mean(axis=1)
+    size = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    best, patch = np.full(len(faces), np.inf), np.zeros(len(faces), dtype=int)
+    for weight in (0.0, 0.4, 0.8):
+        for k in range(3 if weight else 1):
+            sample = center + weight * (corners[:, k] - center)
+            cell, near = mesh.find_closest_cell(sample, return_closest_point=True)
+            apart = np.linalg.norm(near - sample, axis=1) / size
+            bend = 1 - np.einsum("ij,ij->i", normals, outward[cell])
+            score = bend + apart + 0.05 * weight
+            better = score < best
+            best[better], patch[better] = score[better], patches.patch[cell[better]]
+    return patch

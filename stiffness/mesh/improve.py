@@ -1,0 +1,127 @@
+"""Badly shaped tetrahedra mended: corners moved, edges inside split.
+
+Corners that were moved onto the part's shapes may flatten tetrahedra, most of all where
+two shapes meet tangentially and all corners of one lie on the boundary.  An edge of
+such a one that runs inside the part is split, and corners are moved, on their shapes or
+inside, to where the worst tetrahedron around them is best.
+
+Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.lagrange import EDGES
+from stiffness.mesh.refine import edge_code, edges_of, split_edges
+from stiffness.mesh.solid import (
+    Solid,
+    corners_on_shapes,
+    element_quality,
+    meeting_shapes,
+    moved_onto_shapes,
+    node_patches,
+    tetrahedra_quality,
+)
+from stiffness.mesh.split_crossing import one_of_each
+from stiffness.surface.primitives import project
+
+POOR = 0.08  # quality below which a tetrahedron is to be mended; pytetwild's are better
+_ROUNDS = 4
+_STEPS = 10  # of a corner's search, each half as long as the last that did not help
+_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+
+
+def fitted(solid: Solid) -> Solid:
+    """Corners on their shapes, and tetrahedra mended that this flattened.
+
+    Args:
+        solid: whose corners may be off the shapes of their patches.
+
+    Returns:
+        The solid, with more tetrahedra where some had to be split; where mending fails,
+        corners that stay off their shapes, as :func:`moved_onto_shapes` leaves them.
+    """
+    least = float(element_quality(solid).min())
+    # elements of a structured bar are long on purpose
+    good = solid.surface is None or least > POOR / 4
+    poor = min(POOR, least / 2) if good else POOR
+    target = corners_on_shapes(solid)
+    if np.allclose(target, solid.points, rtol=0, atol=1e-12 * np.abs(target).max()):
+        moved = solid
+    else:
+        moved = replace(solid, points=target)
+    for _ in range(_ROUNDS):
+        if (element_quality(moved) > poor).all():
+            return moved
+        moved = _relaxed(_split_inside(moved, poor), poor)
+    safe = moved_onto_shapes(solid)
+    better = element_quality(moved).min() > min(poor / 8, element_quality(safe).min())
+    return moved if better else safe
+
+
+def _split_inside(solid: Solid, limit: float) -> Solid:
+    """Split an edge inside the part of each poor tetrahedron with no corner inside."""
+    boundary = np.zeros(len(solid.points), dtype=bool)
+    boundary[solid.faces] = True
+    ends, of_cell = edges_of(solid.cells, len(solid.points))
+    code = edge_code(ends, len(boundary))
+    outer = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    inner = ~np.isin(code, edge_code(outer, len(boundary)))
+    poor = (element_quality(solid) < limit) & boundary[solid.cells].all(axis=1)
+    if not (poor & inner[of_cell].any(axis=1)).any():
+        return solid
+    length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
+    longest = np.where(inner, length, 0.0)[of_cell].argmax(axis=1)
+    wanted = np.zeros(len(ends), dtype=bool)
+    wanted[of_cell[poor, longest[poor]]] = True
+    wanted &= inner
+    split = one_of_each(wanted, of_cell)
+    return split_edges(solid, ends, of_cell, split)[0]
+
+
+def _relaxed(solid: Solid, limit: float) -> Solid:
+    """Move the corners of poor tetrahedra, those inside the part first."""
+    points = solid.points.copy()
+    shapes_of: dict[int, tuple[int, ...]] = {}
+    for key, group in node_patches(len(points), solid.faces, solid.patch):
+        shapes_of |= dict.fromkeys(group.tolist(), key)
+    corners = np.unique(solid.cells[element_quality(solid) < limit])
+    for corner in sorted(corners.tolist(), key=lambda c: c in shapes_of):
+        star = solid.cells[(solid.cells == corner).any(axis=1)]
+        key = shapes_of.get(corner, ())
+        points[corner] = _best_place(solid, points, star, corner, key)
+    return replace(solid, points=points)
+
+
+def _best_place(
+    solid: Solid, points: NDArray, star: NDArray, corner: int, key: tuple[int, ...]
+) -> NDArray:
+    """(3,) [m] where the worst tetrahedron around a corner is best."""
+    place = points[corner]
+    around = points[star]
+    mine = star == corner
+    best = float(tetrahedra_quality(around).min())
+    i, j = EDGES.T
+    step = 0.3 * float(np.linalg.norm(around[:, i] - around[:, j], axis=2).mean())
+    known = meeting_shapes(solid, key, place[None])
+    fixed = any(solid.shapes[p] is None for p in key) or len(known) > 2
+    for _ in range(0 if fixed else _STEPS):
+        tries = place + step * _DIRECTIONS
+        if known:
+            near = project(tries, known)
+            tries = near[np.linalg.norm(near - tries, axis=1) <= step]
+        if len(tries) == 0:
+            step /= 2
+            continue
+        moved = np.broadcast_to(around, (len(tries), *around.shape)).copy()
+        moved[:, mine] = tries[:, None]
+        worst = tetrahedra_quality(moved.reshape(-1, 4, 3)).reshape(len(tries), -1)
+        least = worst.min(axis=1)
+        if least.max() > best:
+            best, place = float(least.max()), tries[int(least.argmax())]
+        else:
+            step /= 2
+    return place

@@ -1,0 +1,165 @@
+"""Slender and thin-walled straight bars recognised in their surfaces.
+
+The mesher makes elements as wide as they are long: a rod a thousand times as long as
+thick, or a tube with a wall of a hundredth of its radius, takes it minutes, or never
+ends.  Drawn out from their sections such bars take a few thousand elements.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.solid import Solid
+from stiffness.mesh.straight_bar import straight_bar
+from stiffness.surface.interface import Interface
+from stiffness.surface.patches import find_patches
+from stiffness.surface.primitives import Cone, Plane, Shape
+from stiffness.surface.surface import Surface
+from stiffness.surface.true_surface import TrueSurface
+
+_SLENDER = 50.0  # length over the section's width
+_THIN = 0.04  # wall over the section's width: a tube's over its diameter
+_LAYERS = 60.0  # of elements along a bar, but for those that are thin at its ends
+_LONGEST = 2.0  # a layer in widths of the section, of a bar that is not slender
+_PARALLEL = 1e-6  # [rad]
+_SAME = 1e-6  # of the length: two places that agree
+_SAME_VOLUME = 1e-3
+
+
+def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | None:
+    """The mesh of a slender or thin-walled straight bar.
+
+    Args:
+        surface: of the link.
+        base: the held interface.
+        tip: the loaded interface.
+
+    Returns:
+        A mesh to refine from, in the surface's axes; None if the link is no round bar,
+        tube, rectangle or box between base and tip, or neither slender nor thin.
+
+    Raises:
+        BadInput: an interface has no part of the surface.
+    """
+    if base.kind == "bore" or tip.kind == "bore":
+        return None
+    axis = base.direction
+    length = float((tip.point - base.point) @ axis)
+    axis, length = (axis, length) if length > 0 else (-axis, -length)
+    if length == 0 or np.linalg.norm(np.cross(axis, tip.direction)) > _PARALLEL:
+        return None
+    along = (surface.points - base.point) @ axis
+    off = np.minimum(np.abs(along), np.abs(along - length))
+    # a bar has all its corners at its ends: cheaper than looking for its shapes
+    if off.max() > 10 * _SAME * length:
+        return None
+    patches = find_patches(surface, base, tip)
+    section = _section(patches.shapes[2:], axis)
+    if section is None:
+        return None
+    lengths, center, up = section
+    width = lengths.get("height", 2 * lengths.get("radius", 0.0))
+    if length < _SLENDER * width and _wall(lengths) > _THIN * width:
+        return None
+    scaled = {name: value / length for name, value in lengths.items()}
+    bar = straight_bar(scaled, max(_LONGEST, length / width / _LAYERS))
+    frame = np.column_stack([up, np.cross(axis, up), axis])
+    foot = center + ((base.point - center) @ axis) * axis
+    volume = TrueSurface(surface, patches).volume
+    same = abs(_area(lengths) * length / volume - 1) < _SAME_VOLUME
+    return _placed(bar, frame, foot, length) if same else None
+
+
+def _section(
+    shapes: tuple[Shape, ...], axis: NDArray
+) -> tuple[dict[str, float], NDArray, NDArray] | None:
+    """Lengths of a bar's section, a point on its axis, and its first direction."""
+    if all(isinstance(shape, Cone) for shape in shapes):
+        return _round_section([s for s in shapes if isinstance(s, Cone)], axis)
+    if all(isinstance(shape, Plane) for shape in shapes) and len(shapes) in (4, 8):
+        return _angular_section([s for s in shapes if isinstance(s, Plane)], axis)
+    return None
+
+
+def _round_section(
+    cones: list[Cone], axis: NDArray
+) -> tuple[dict[str, float], NDArray, NDArray] | None:
+    """Of a disc or a ring."""
+    if len(cones) > 2 or not cones:
+        return None
+    largest = max(cones, key=lambda cone: cone.radius)
+    near = _SAME * largest.radius * 1e2
+    for cone in cones:
+        off = np.cross(cone.point - largest.point, axis)
+        tilt = np.linalg.norm(np.cross(cone.axis, axis))
+        if tilt > _PARALLEL or abs(cone.slope) > _PARALLEL:
+            return None
+        if np.linalg.norm(off) > near:
+            return None
+    lengths = {"radius": largest.radius}
+    if len(cones) == 2:
+        lengths["inner_radius"] = min(cone.radius for cone in cones)
+    up = np.linalg.svd(axis[None])[2][1]
+    return lengths, largest.point, up
+
+
+def _angular_section(
+    planes: list[Plane], axis: NDArray
+) -> tuple[dict[str, float], NDArray, NDArray] | None:
+    """Of a rectangle, or a box whose walls are equally thick."""
+    first = planes[0].normal
+    second = np.cross(axis, first)
+    middle = np.mean([plane.point for plane in planes], axis=0)
+    sizes = []
+    for direction in (first, second):
+        along = [p for p in planes if abs(p.normal @ direction) > 1 - _PARALLEL]
+        places = np.sort([(p.point - middle) @ direction for p in along])
+        if len(places) != len(planes) // 2:
+            return None
+        middle = middle + (places[0] + places[-1]) / 2 * direction
+        sizes.append((places[-1] - places[0], np.diff(places)))
+    narrow, wide = (0, 1) if sizes[0][0] <= sizes[1][0] else (1, 0)
+    lengths = {"width": float(sizes[narrow][0]), "height": float(sizes[wide][0])}
+    up = (first, second)[narrow]
+    if len(planes) == 8:
+        walls = np.array([gaps[k] for _, gaps in sizes for k in (0, 2)])
+        if np.ptp(walls) > 1e-4 * walls.max():
+            return None
+        lengths["wall"] = float(walls.mean())
+    return lengths, middle, up
+
+
+def _wall(lengths: dict[str, float]) -> float:
+    """[m] the thinnest wall; infinite in a solid section."""
+    if "radius" in lengths:
+        inner = lengths.get("inner_radius")
+        return math.inf if inner is None else lengths["radius"] - inner
+    return lengths.get("wall", math.inf)
+
+
+def _area(lengths: dict[str, float]) -> float:
+    """[m^2] of a section."""
+    if "radius" in lengths:
+        return math.pi * (
+            lengths["radius"] ** 2 - lengths.get("inner_radius", 0.0) ** 2
+        )
+    width, height = lengths["width"], lengths["height"]
+    wall = lengths.get("wall", width / 2)
+    return width * height - (width - 2 * wall) * (height - 2 * wall)
+
+
+def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
+    """A bar of unit length along z, turned, scaled and moved."""
+
+    def moved(shape: Shape | None) -> Shape | None:
+        if isinstance(shape, Plane):
+            point = foot + length * frame @ shape.point
+            return Plane(point, frame @ shape.normal)
+        if isinstance(shape, Cone):
+            return Cone(foot, frame @ shape.axis, length * shape.radius)
+        return shape
+
+    points = foot + length * bar.points @ frame.T
+    return replace(bar, points=points, shapes=tuple(moved(s) for s in bar.shapes))

@@ -1,0 +1,240 @@
+"""A link as straight tetrahedra, and its corners moved onto the exact shapes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.display import html_table, short_repr
+from stiffness.mesh.lagrange import EDGES
+from stiffness.surface.primitives import Plane, Shape, project
+from stiffness.surface.true_surface import TrueSurface
+
+_ON_KEPT = 1e-9  # of the part's size: a corner on a kept plane
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A link as tetrahedra with straight edges, and what its boundary stands for.
+
+    Attributes:
+        points: (n, 3) [m] corners, on the exact shapes where those are known.
+        cells: (t, 4) corners of tetrahedra, of positive volume.
+        faces: (f, 3) corners of boundary triangles, outward.
+        patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
+        shapes: of the patches; None leaves a patch's nodes where they are.
+        walls: of pairs of an interface and a patch that it goes over into smoothly,
+            the wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
+        surface: that the boundary is to have; None if its patches' shapes are all.
+        kept: planes inside the link; corners on them stay there.
+    """
+
+    points: NDArray
+    cells: NDArray
+    faces: NDArray
+    patch: NDArray
+    shapes: tuple[Shape | None, ...]
+    walls: Mapping[tuple[int, int], Shape] = field(default_factory=dict)
+    surface: TrueSurface | None = None
+    kept: tuple[Plane, ...] = ()
+
+    __repr__, _repr_html_ = short_repr, html_table
+
+    def volumes(self) -> NDArray:
+        """(t,) [m^3] of the straight tetrahedra."""
+        a, b, c, d = np.moveaxis(self.points[self.cells], 1, 0)
+        return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
+
+
+def meeting_shapes(
+    solid: Solid, key: tuple[int, ...], points: NDArray
+) -> tuple[Shape, ...]:
+    """Shapes that corners are to lie on.
+
+    Args:
+        solid: any.
+        key: the patches they lie on; none for corners inside.
+        points: (n, 3) [m] the corners' places, all on the same kept planes.
+
+    Returns:
+        The patches' shapes, or what takes their place where two meet smoothly, and the
+        kept planes.
+    """
+    known = _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
+    near = _ON_KEPT * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    kept = [p for p in solid.kept if (np.abs(p.signed(points)[0]) < near).all()]
+    return (*known, *kept)
+
+
+def _meeting_shapes(
+    key: tuple[int, ...],
+    shapes: tuple[Shape | None, ...],
+    walls: Mapping[tuple[int, int], Shape],
+    points: NDArray,
+) -> tuple[Shape, ...]:
+    """Shapes whose intersection points with some patches are to lie on."""
+    # tangent shapes do not determine their common line: the wall on it does
+    standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
+    replaced = {other for _, other in standing}
+    known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
+    if standing:
+        facing = shapes[min(standing)[0]]
+        known = [s for s in known if s is facing or not _tangent(facing, s, points)]
+    return (*known, *standing.values())
+
+
+def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
+    """Whether two shapes have the same normal near some points."""
+    if one is None:
+        return False
+    along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
+    return bool(np.abs(along).min() > 0.95)
+
+
+def element_quality(solid: Solid) -> NDArray:
+    """How well shaped tetrahedra are.
+
+    Args:
+        solid: straight tetrahedra.
+
+    Returns:
+        (t,) [1] 1 for a regular one, 0 for a flat one, negative for an inverted one.
+    """
+    return tetrahedra_quality(solid.points[solid.cells])
+
+
+def tetrahedra_quality(corners: NDArray) -> NDArray:
+    """Shape of tetrahedra: 6 sqrt(2) volume over the cube of the rms edge.
+
+    Args:
+        corners: (t, 4, 3) [m].
+
+    Returns:
+        (t,) [1].
+    """
+    i, j = EDGES.T
+    mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
+    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    return np.asarray(6 * np.sqrt(2) * volume / np.maximum(mean_square, 1e-300) ** 1.5)
+
+
+def boundary_faces(cells: NDArray) -> NDArray:
+    """Faces that belong to one tetrahedron only.
+
+    Args:
+        cells: (t, 4) of positive volume.
+
+    Returns:
+        (f, 3) outward.
+    """
+    faces = cells[:, FACES].reshape(-1, 3)
+    key = np.sort(faces, axis=1)
+    order = np.lexsort(key.T)
+    same = (key[order][1:] == key[order][:-1]).all(axis=1)
+    alone = np.ones(len(faces), dtype=bool)
+    alone[order[1:][same]] = alone[order[:-1][same]] = False
+    return faces[alone]
+
+
+def node_patches(
+    nodes: int, members: NDArray, patch: NDArray
+) -> list[tuple[tuple[int, ...], NDArray]]:
+    """Nodes grouped by the set of patches they lie on.
+
+    Args:
+        nodes: how many there are.
+        members: (f, k) nodes of each boundary face.
+        patch: (f,) the faces' patches.
+
+    Returns:
+        Pairs of a set of patches and the nodes that lie on exactly those.
+    """
+    pairs = np.column_stack([members.ravel(), np.repeat(patch, members.shape[1])])
+    pairs = np.unique(pairs, axis=0)
+    starts = np.flatnonzero(np.r_[True, pairs[1:, 0] != pairs[:-1, 0]])
+    groups: dict[tuple[int, ...], list[int]] = {}
+    for low, high in zip(starts, np.r_[starts[1:], len(pairs)], strict=True):
+        key = tuple(int(p) for p in pairs[low:high, 1])
+        groups.setdefault(key, []).append(int(pairs[low, 0]))
+    return [(key, np.array(group)) for key, group in groups.items()]
+
+
+def on_shapes(
+    points: NDArray,
+    groups: list[tuple[tuple[int, ...], NDArray]],
+    shapes: tuple[Shape | None, ...],
+    reach: float,
+    walls: Mapping[tuple[int, int], Shape] | None = None,
+) -> NDArray:
+    """Points moved onto the shapes of their patches.
+
+    Args:
+        points: (n, 3) [m].
+        groups: which points lie on which patches.
+        shapes: of the patches.
+        reach: [m] a point is never moved further than this.
+        walls: of a :class:`Solid`; none if absent.
+
+    Returns:
+        (n, 3) [m].
+    """
+    moved = points.copy()
+    for key, group in groups:
+        known = _meeting_shapes(key, shapes, walls or {}, points[group])
+        if known:
+            target = project(points[group], known)
+            near = np.linalg.norm(target - points[group], axis=1) <= reach
+            moved[group[near]] = target[near]
+    return moved
+
+
+def corners_on_shapes(solid: Solid) -> NDArray:
+    """Where a solid's corners are to be.
+
+    Args:
+        solid: whose corners may be off the shapes of their patches.
+
+    Returns:
+        (n, 3) [m] those on the boundary projected, unless it is a hundredth of the
+        part's size away.
+    """
+    groups = node_patches(len(solid.points), solid.faces, solid.patch)
+    size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    target = on_shapes(solid.points, groups, solid.shapes, 0.01 * size, solid.walls)
+    for plane in solid.kept:
+        on = np.abs(plane.signed(solid.points)[0]) < _ON_KEPT * size
+        for key, group in groups:
+            some = group[on[group]]
+            if len(some):
+                known = meeting_shapes(solid, key, solid.points[some])
+                target[some] = project(solid.points[some], known)
+    return target
+
+
+def moved_onto_shapes(solid: Solid) -> Solid:
+    """Corners projected onto their shapes; moves that invert tetrahedra are shortened.
+
+    Args:
+        solid: whose corners may be off the shapes of their patches.
+
+    Returns:
+        The solid with its corners moved.
+    """
+    target = corners_on_shapes(solid)
+    share = np.ones(len(target))
+    before = solid.volumes()
+    for _ in range(12):
+        points = solid.points + share[:, None] * (target - solid.points)
+        moved = replace(solid, points=points)
+        bad = moved.volumes() < 0.1 * before
+        if not bad.any():
+            break
+        share[np.unique(solid.cells[bad])] *= 0.5
+    while (bad := moved.volumes() <= 0).any() and (share[solid.cells[bad]] > 0).any():
+        share[np.unique(solid.cells[bad])] = 0.0
+        points = solid.points + share[:, None] * (target - solid.points)
+        moved = replace(solid, points=points)
+    return moved

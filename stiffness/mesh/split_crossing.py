@@ -1,0 +1,55 @@
+"""Edges split where they cross a surface, until no edge does."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.refine import chosen_by_all, edges_of, split_edges
+from stiffness.mesh.solid import Solid
+
+_PASSES = 200
+Crossing = Callable[[Solid, NDArray, NDArray], tuple[NDArray, NDArray]]
+
+
+def split_crossing(
+    solid: Solid, on: NDArray, crossing: Crossing
+) -> tuple[Solid, NDArray]:
+    """Split edges of a mesh where they cross a surface.
+
+    Args:
+        solid: to split.
+        on: (n,) whether a corner is on the surface.
+        crossing: of a solid, its corners on the surface and its edges (e, 2): which of
+            the edges cross it, and at which share of their length.
+
+    Returns:
+        The solid, and which of its corners are on the surface.
+    """
+    for _ in range(_PASSES):
+        ends, of_cell = edges_of(solid.cells, len(solid.points))
+        wanted, share = crossing(solid, on, ends)
+        if not wanted.any():
+            break
+        split = one_of_each(wanted, of_cell)
+        start, end = solid.points[ends[split]].swapaxes(0, 1)
+        places = start + share[split, None] * (end - start)
+        solid, _ = split_edges(solid, ends, of_cell, split, places)
+        on = np.r_[on, np.ones(len(places), dtype=bool)]
+    return solid, on
+
+
+def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
+    """Edges to split at once: at most one of each tetrahedron.
+
+    Args:
+        wanted: (e,) edges that are to be split.
+        of_cell: (t, 6) edges of each tetrahedron.
+
+    Returns:
+        (e,) some of them, at least one if any is wanted.
+    """
+    order = np.where(wanted, np.arange(len(wanted), 0, -1), 0)
+    first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]
+    touched = wanted[of_cell].any(axis=1)
+    return wanted & chosen_by_all(of_cell, first[touched], len(wanted))

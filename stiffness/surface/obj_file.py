@@ -1,0 +1,73 @@
+"""Reader of Wavefront OBJ files: points and polygons.
+
+Texture coordinates, normals, groups and materials say nothing of the shape and are not
+read, so that faces may name some that are absent.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, describe
+
+
+def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
+    """Points and polygons of an OBJ file.
+
+    Args:
+        path: of an existing file.
+
+    Returns:
+        (n, 3) points in the file's unit, and of each polygon the indices of its
+        corners.
+
+    Raises:
+        BadInput: a line is not proper, or a face has a corner that is not among the
+            points.
+    """
+    points: list[list[float]] = []
+    faces: list[list[int]] = []
+    lines: list[int] = []
+    for number, (kind, *words) in _statements(path):
+        try:
+            if kind.lower() == "v":
+                points.append([float(words[k]) for k in range(3)])
+            elif kind.lower() in {"f", "fo"}:
+                faces.append([_corner(word, len(points)) for word in words])
+                lines.append(number)
+        except (ValueError, IndexError):
+            what = "v X Y Z" if kind.lower() == "v" else "f with numbers of points"
+            raise BadInput(
+                f"{path}:{number}: found {describe(' '.join([kind, *words]))}, "
+                f"expected {what}"
+            ) from None
+    for face, number in zip(faces, lines, strict=True):
+        wrong = [k for k in face if not 0 <= k < len(points)]
+        if wrong:
+            raise BadInput(
+                f"{path}:{number}: found a face of point {wrong[0] + 1}, expected 1 "
+                f"to {len(points)}"
+            )
+        if len(face) < 3:
+            raise BadInput(f"{path}:{number}: found a face of {len(face)} points")
+    return np.array(points, dtype=float).reshape(-1, 3), faces
+
+
+def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Numbers of lines and their words; a line that ends in a backslash goes on."""
+    text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+    words: list[str] = []
+    for number, line in enumerate(text.split("\n"), 1):
+        told = line.partition("#")[0].rstrip()
+        words += told.removesuffix("\\").split()
+        if words and not told.endswith("\\"):
+            yield number, words
+            words = []
+
+
+def _corner(word: str, points: int) -> int:
+    """Index of a corner: from 1, or below zero from the last point so far."""
+    index = int(word.partition("/")[0])
+    return index - 1 if index >= 0 else points + index

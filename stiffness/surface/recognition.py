@@ -1,0 +1,317 @@
+"""Smooth parts of a faceted surface as planes, cones, spheres and tori.
+
+A part between sharp edges is one shape, or several that meet tangentially.  Candidates
+are fitted to a few facets around a seed; one is accepted if connected facets lie on it
+and if these are the facets of a curved shape: corners of a few flat faces of different
+widths may lie on a circle as well.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.surface.primitives import (
+    Cone,
+    Shape,
+    Torus,
+    fit_cone,
+    fit_plane,
+    fit_sphere,
+    fit_torus,
+)
+from stiffness.surface.triangle_graph import SHARP, TriangleGraph
+
+_MISSES = (60, 20)  # seeds of a part without a shape of strips, of any
+_CONE = 10  # points that tell a cone; fewer lie on one that is not there
+_CYLINDER = 1e-4  # slope below which a cone is a cylinder, which seven points tell
+_FEW = 12  # flat faces; a part of fewer is no faceted curve
+_STEP = 2e-3  # [rad] between two angles that count as different
+_MANY = 5  # steps between angles; more are on one circle by no coincidence
+_EVEN = 0.75  # facets this share of the widest are as wide
+_LIFT = 4.0  # times the usual lift of a part's facets: a face or edge is straight
+_NO_LIFT = 0.01  # times it: straight as well
+
+
+def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
+    """Shapes of a smooth part.
+
+    Args:
+        graph: of the surface.
+        part: (k,) triangles between sharp edges.
+
+    Returns:
+        Triangles and shape of each patch: one shape for all of the part, else those
+        that were found in it; what is left is flat, or lifted facets.
+    """
+    shape = fitted_shape(graph, part)
+    if shape is not None and graph.fits(shape, part).all():
+        return [(part, shape)]
+    found: list[tuple[NDArray, Shape]] = []
+    lifts = _Lifts(graph, part)
+    for strips, most in zip((True, False), _MISSES, strict=True):
+        found += _pieces(graph, lifts, part, strips, most)
+        part = np.setdiff1d(part, np.concatenate([part[:0], *(p for p, _ in found)]))
+    inside = np.zeros(len(graph.triangles), dtype=bool)
+    inside[part] = True
+    for piece in graph.smooth_parts(inside):
+        shape = fitted_shape(graph, piece)
+        if shape is not None and graph.fits(shape, piece).all():
+            found.append((piece, shape))
+        else:
+            found += _flat_or_lifted(graph, piece)
+    return found
+
+
+class _Lifts:
+    """By how much the edges of a part would be lifted if it were one curved shape."""
+
+    def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
+        self._facets = graph.lifted(part)
+        self._place = np.zeros(len(graph.points), dtype=int)
+        corners = np.unique(graph.triangles[part])
+        self._place[corners] = np.arange(len(corners))
+        self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
+
+    def share(self, edges: NDArray) -> float:
+        """Median lift of edges (e, 2) over the part's usual one."""
+        own = self._facets.edge_lifts(self._place[edges])
+        return float(np.median(own)) / self._usual
+
+
+def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
+    """The simplest shape all corners of a part lie on, as facets of it would.
+
+    Args:
+        graph: of the surface.
+        part: (k,) triangles.
+        kinds: how many of plane, cone, sphere and torus are tried.
+
+    Returns:
+        The shape; None if there is none, or the corners cannot tell.
+    """
+    points = graph.points[np.unique(graph.triangles[part])]
+    normals = graph.normals[part]
+    # a few corners decide whether a shape is fitted to all of them
+    few = points[:: max(1, len(points) // 50)]
+    tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
+        (fit_plane, 3),
+        (fit_cone, 7),
+        (fit_sphere, 9),  # a frustum of four sides has eight on one
+        (fit_torus, 12),
+    ]
+    for fit, least in tries[:kinds]:
+        if len(points) < least:
+            break
+        if len(few) < len(points) and not _lies_on(fit(few, normals), few, graph):
+            continue
+        shape = fit(points, normals)
+        if _lies_on(shape, points, graph):
+            if len(points) < _CONE and isinstance(shape, Cone):
+                return shape if abs(shape.slope) < _CYLINDER else None
+            return shape if _is_faceted(shape, points) else None
+    return None
+
+
+def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
+    """Whether points are on a shape, to the tolerance of the surface."""
+    return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
+
+
+def _is_faceted(shape: Shape, points: NDArray) -> bool:
+    """Whether points on a shape are corners of facets that follow its curvature."""
+    # a circle goes through the corners of any two flat faces that meet, and of three in
+    # symmetry: three facets as wide as the widest are needed, or many
+    if not isinstance(shape, Cone | Torus):
+        return True
+    offset = points - shape.point
+    along = offset @ shape.axis
+    across = offset - along[:, None] * shape.axis
+    distance = np.linalg.norm(across, axis=1)
+    first = across[int(np.argmax(distance))]
+    first = first / max(float(np.linalg.norm(first)), 1e-300)
+    second = np.cross(shape.axis, first)
+    around = np.arctan2(across @ second, across @ first)
+    if not _even(around):
+        return False
+    if isinstance(shape, Cone):
+        return True
+    return _even(np.arctan2(along, distance - shape.radius))
+
+
+def _even(angles: NDArray) -> bool:
+    """Whether there are many different angles, or three steps as wide as the widest."""
+    angles = np.sort(angles)
+    gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
+    if gaps[-1] > _STEP:  # the longest gap lies outside an arc that is not closed
+        widest = int(np.argmax(gaps))
+        outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
+        gaps = np.delete(gaps, widest) if outside else gaps
+    gaps = gaps[gaps > _STEP]
+    if len(gaps) >= _MANY:
+        return True
+    return len(gaps) >= 3 and int((gaps > _EVEN * gaps.max()).sum()) >= 3
+
+
+def _pieces(
+    graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
+) -> list[tuple[NDArray, Shape]]:
+    """Pieces of a part that are shapes; with ``strips`` planes and cones alone."""
+    inside = np.zeros(len(graph.triangles), dtype=bool)
+    inside[part] = True
+    waiting, flat = inside.copy(), graph.flat_faces(part)
+    area = np.bincount(flat, weights=np.where(inside, graph.areas, 0.0))[flat]
+    order = area if strips else _evenness(graph, inside, flat, area)
+    found: list[tuple[NDArray, Shape]] = []
+    misses = 0
+    while waiting.any() and misses < most and graph.tries > 0:
+        graph.tries -= 1
+        seed = int(np.argmax(np.where(waiting, order, -1.0)))
+        waiting[inside & (flat == flat[seed])] = False
+        shapes = _shapes_around(graph, inside, flat, seed, strips)
+        for piece, _ in shapes:
+            waiting[piece] = False
+        shapes = [s for s in shapes if _is_proper(graph, lifts, *s)]
+        misses += not shapes
+        if shapes:
+            best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
+            found.append(best)
+            inside[best[0]] = False
+    return found
+
+
+def _evenness(
+    graph: TriangleGraph, inside: NDArray, flat: NDArray, area: NDArray
+) -> NDArray:
+    """(m,) least ratio of a face's area to those around: 1 far from other shapes."""
+    touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
+    left, right = graph.left[touch], graph.right[touch]
+    ratio = np.minimum(area[left], area[right]) / np.maximum(area[left], area[right])
+    for _ in range(2):
+        least = np.ones(len(flat))
+        for side in (left, right):
+            np.minimum.at(least, flat[side], ratio)
+        even = least[flat]
+        ratio = np.minimum(even[left], even[right])
+    return even
+
+
+def _shapes_around(
+    graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
+) -> list[tuple[NDArray, Shape]]:
+    """Shapes of facets around a seed, with all connected facets that lie on them."""
+    part = np.flatnonzero(inside)
+    if strips:
+        near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
+    else:
+        near = [ring(graph, inside, flat, seed, count) for count in (2, 4)]
+    found = []
+    for members in near:
+        shape = fitted_shape(graph, members, 2 if strips else 4)
+        if shape is None:
+            continue
+        on = np.zeros_like(inside)
+        on[part] = graph.fits(shape, part)
+        label = graph.connected_parts(on, SHARP)
+        found.append((np.flatnonzero(on & on[seed] & (label == label[seed])), shape))
+    return found
+
+
+def _is_proper(
+    graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
+) -> bool:
+    """Whether a piece is a shape of its own, no facets of another curved one."""
+    # two coplanar triangles may be a facet
+    straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
+    return len(piece) > 2 and straight
+
+
+def _is_straight(
+    graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
+) -> bool:
+    """Whether a cone's rulings are straight, not facets of a shape bent there."""
+    # two rings of corners on any surface of revolution are on a cone
+    inside = np.zeros(len(graph.triangles), dtype=bool)
+    inside[piece] = True
+    both = np.flatnonzero(inside[graph.left] & inside[graph.right])
+    middles = graph.points[graph.ends[both]].mean(axis=1)
+    rulings = both[np.abs(shape.signed(middles)[0]) < graph.tolerance]
+    along = (graph.points[np.unique(graph.ends[rulings])] - shape.point) @ shape.axis
+    along = np.sort(along)
+    rings = 1 + int((np.diff(along) > 10 * graph.tolerance).sum())
+    if rings > 2:
+        return True
+    share = lifts.share(graph.ends[rulings]) if len(rulings) else 0.0
+    return not _NO_LIFT < share < _LIFT
+
+
+def ring(
+    graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
+) -> NDArray:
+    """A seed's flat face, grown by rings of faces that meet it smoothly.
+
+    Args:
+        graph: of the surface.
+        inside: (m,) triangles that may be taken.
+        flat: (m,) number of each triangle's flat face.
+        seed: a triangle.
+        rings: how many times it is grown.
+
+    Returns:
+        (k,) triangles.
+    """
+    members = inside & (flat == flat[seed])
+    touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
+    left, right = graph.left[touch], graph.right[touch]
+    for _ in range(rings):
+        grown = np.r_[right[members[left]], left[members[right]]]
+        members = members | (inside & np.isin(flat, flat[grown]))
+    return np.flatnonzero(members)
+
+
+def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
+    """A seed's flat face and two to each side, across the longest common edges."""
+    # strips of a cylinder or a cone follow each other so, whatever meets their ends
+    touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
+    left, right = flat[graph.left[touch]], flat[graph.right[touch]]
+    length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
+    length = length[:, 0]
+    chain = [int(flat[seed])]
+    for side in (0, 1):
+        face = int(flat[seed])
+        for _ in range(2):
+            other = np.where(left == face, right, np.where(right == face, left, -1))
+            common = np.bincount(other[other >= 0], weights=length[other >= 0])
+            common[[f for f in chain if f < len(common)]] = 0.0
+            if not common.any():
+                break
+            face = int(np.argmax(common))
+            chain = [*chain, face] if side == 0 else [face, *chain]
+    return np.flatnonzero(inside & np.isin(flat, chain))
+
+
+def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
+    """A part of no known shape: flat faces by themselves, the rest lifted."""
+    # facets of a curved surface have lifts of one order, since programs that make them
+    # keep a tolerance; one that would be lifted by many times as much is a flat face
+    # that meets a rounding
+    flat = graph.flat_faces(part)
+    faces = np.unique(flat[part])
+    if len(faces) < _FEW:
+        chosen = faces
+    else:
+        lifts = graph.lifted(part).lifts()
+        highest = np.array([lifts[flat[part] == face].max() for face in faces])
+        chosen = faces[highest > _LIFT * np.median(highest)]
+    found: list[tuple[NDArray, Shape]] = []
+    for face in chosen:
+        members = part[flat[part] == face]
+        corners = graph.points[np.unique(graph.triangles[members])]
+        found.append((members, fit_plane(corners, graph.normals[members])))
+    inside = np.zeros(len(graph.triangles), dtype=bool)
+    inside[part[~np.isin(flat[part], chosen)]] = True
+    for piece in graph.smooth_parts(inside):
+        shape = fitted_shape(graph, piece)
+        whole = shape is not None and graph.fits(shape, piece).all()
+        found.append((piece, shape if shape and whole else graph.lifted(piece)))
+    return found

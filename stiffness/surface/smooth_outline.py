@@ -1,0 +1,110 @@
+"""Outline of an interface where the surface goes on without a sharp edge.
+
+Where a held face ends in a rounding, the two shapes touch along a line that their
+equations do not determine well.  The wall that stands on the outline across the face
+does: face and wall meet at a right angle.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.surface.facets import Facets
+from stiffness.surface.primitives import Shape, fit_cone, fit_plane
+
+_CORNER = np.cos(np.radians(35.0))  # of an outline; a sharper one is kept
+_ON_WALL = 1e-5  # of the outline's size
+_CIRCLE = 10  # corners; fewer do not tell a circle from a polygon
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothOutline:
+    """Part of an interface's outline at which one other patch begins smoothly.
+
+    Attributes:
+        patches: numbers of the interface and of the other patch.
+        wall: through the outline, across the interface.
+        ends: (e, 2, 3) [m] the outline's edges.
+        side: 1 where the wall's signed distance is positive outside the interface,
+            else -1.
+    """
+
+    patches: tuple[int, int]
+    wall: Shape
+    ends: NDArray
+    side: float
+
+    def outside(self, points: NDArray) -> NDArray:
+        """(n,) [m] distance of points (n, 3) from the wall, negative inside."""
+        return self.side * self.wall.signed(points)[0]
+
+    def distance(self, points: NDArray) -> NDArray:
+        """(n,) [m] distance of points (n, 3) from the nearest of the edges."""
+        start, along = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
+        square = np.maximum(np.einsum("ei,ei->e", along, along), 1e-300)
+        nearest = np.full(len(points), np.inf)
+        for first in range(0, len(points), 4096):
+            offset = points[first : first + 4096, None] - start
+            share = np.clip(np.einsum("pei,ei->pe", offset, along) / square, 0, 1)
+            gap = np.linalg.norm(offset - share[..., None] * along, axis=2)
+            nearest[first : first + 4096] = gap.min(axis=1)
+        return nearest
+
+
+def smooth_outline(
+    points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
+) -> SmoothOutline:
+    """The outline of some edges, with its wall.
+
+    Args:
+        points: (n, 3) [m].
+        edges: (e, 2) points, counterclockwise around the interface.
+        normals: (e, 3) unit normals of the interface's triangles at the edges.
+        patches: numbers of the interface and of the other patch.
+
+    Returns:
+        The outline; its wall is a plane or a cone where one fits, else as faceted as
+        the outline.
+    """
+    ends = points[edges]
+    along = ends[:, 1] - ends[:, 0]
+    outward = np.cross(along, normals)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-300)[:, None]
+    wall = _wall(points, edges, normals, outward)
+    step = 0.01 * np.linalg.norm(along, axis=1)[:, None] * outward
+    middle = ends.mean(axis=1)
+    rise = wall.signed(middle + step)[0] - wall.signed(middle - step)[0]
+    return SmoothOutline(patches, wall, ends, 1.0 if rise.sum() > 0 else -1.0)
+
+
+def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
+    """Plane or cone through the edges and across the face, else facets."""
+    size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
+    across = size * normals[:, None]  # at both ends of an edge
+    standing = np.concatenate([points[edges] + across, points[edges] - across])
+    corners = standing.reshape(-1, 3)
+    for fit, least in ((fit_plane, 1), (fit_cone, _CIRCLE)):
+        if len(np.unique(edges)) < least:
+            continue
+        shape: Shape = fit(corners, outward)
+        if np.abs(shape.signed(corners)[0]).max() < _ON_WALL * size:
+            return shape
+    return _faceted_wall(points[edges], edges, across, outward)
+
+
+def _faceted_wall(
+    ends: NDArray, edges: NDArray, across: NDArray, outward: NDArray
+) -> Facets:
+    """Two triangles at each edge; edges at a corner do not share their points."""
+    corners = np.concatenate([ends - across, ends + across], axis=1)
+    label = np.arange(4 * len(ends)).reshape(-1, 4)
+    begins = {int(start): k for k, start in enumerate(edges[:, 0])}
+    for k, end in enumerate(edges[:, 1]):
+        after = begins.get(int(end))
+        if after is not None and outward[k] @ outward[after] > _CORNER:
+            label[after, [0, 2]] = label[k, [1, 3]]
+    used, label = np.unique(label, return_inverse=True)
+    label = label.reshape(-1, 4)
+    triangles = np.concatenate([label[:, [0, 1, 3]], label[:, [0, 3, 2]]])
+    return Facets(corners.reshape(-1, 3)[used], triangles)

@@ -1,0 +1,100 @@
+"""Reader of STL files, text and binary, in NumPy alone.
+
+What other programs read is read too: keywords in capitals, a last line that is cut or
+missing, bytes after the last triangle, a count of triangles that was never filled in.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, describe
+
+_HEAD = 84  # bytes of a binary file before its triangles: text and their count
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
+_UNKNOWN_COUNTS = (0, 2**32 - 1)  # of writers that never return to the count
+# the name of a solid: up to its first facet or the end of the line
+_NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
+
+
+def read_stl(path: Path) -> tuple[NDArray, NDArray]:
+    """Points and triangles of an STL file; no points are merged.
+
+    Args:
+        path: of an existing file.
+
+    Returns:
+        (3 m, 3) points in the file's unit and (m, 3) indices of them.
+
+    Raises:
+        BadInput: the file is not STL, or ends within a triangle.
+    """
+    content = path.read_bytes()
+    corners = _text(path, content) if _is_text(content) else _binary(path, content)
+    if len(corners) == 0:
+        raise BadInput(f"{path}: holds no triangles, or is not STL")
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+def _count(content: bytes) -> int:
+    """Number of triangles that a binary file states."""
+    return int.from_bytes(content[_HEAD - 4 : _HEAD], "little")
+
+
+def _is_text(content: bytes) -> bool:
+    """Whether a file is of words; the head of a binary one may begin with solid too."""
+    size = _HEAD + _TRIANGLE.itemsize * _count(content)
+    if len(content) >= _HEAD and len(content) == size:
+        return False
+    start = content[:1000].removeprefix(b"\xef\xbb\xbf").lstrip().lower()
+    return start.startswith((b"solid", b"facet")) and b"\0" not in content
+
+
+def _binary(path: Path, content: bytes) -> NDArray:
+    """(m, 3, 3) corners of a binary file's triangles."""
+    stated, size = _count(content), _TRIANGLE.itemsize
+    body = content[_HEAD:]
+    if len(content) < _HEAD:
+        raise BadInput(f"{path}: not a readable STL file")
+    if stated in _UNKNOWN_COUNTS:
+        stated = len(body) // size
+    if len(body) < size * stated - 2:  # the last two bytes are a tag
+        raise BadInput(
+            f"{path}: found {len(body) // size} whole triangles, expected {stated}, "
+            "the number in the file's head; the file is cut, or is not STL"
+        )
+    body = body[: size * stated].ljust(size * stated, b"\0")
+    return np.frombuffer(body, dtype=_TRIANGLE)["corners"].astype(float)
+
+
+def _text(path: Path, content: bytes) -> NDArray:
+    """(m, 3, 3) corners of a text file's triangles."""
+    words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
+    found = np.array(words, dtype=object)  # as text, one long word would widen them all
+    facets = np.flatnonzero(found == b"facet")
+    vertices = np.flatnonzero(found == b"vertex")
+    owner = np.searchsorted(facets, vertices)  # 0: before the first facet
+    corners = np.bincount(owner, minlength=len(facets) + 1)
+    wrong = np.flatnonzero(corners[1:] != 3)
+    if corners[0] or len(wrong):
+        place = f"facet {wrong[0] + 1}" if len(wrong) else "before the first facet"
+        many = corners[wrong[0] + 1] if len(wrong) else corners[0]
+        ends = len(wrong) and wrong[0] + 1 == len(facets)
+        end = "; the file is cut there" if ends and many < 3 else ""
+        raise BadInput(f"{path}: {place}: found {many} vertices, expected 3{end}")
+    if len(vertices) and vertices[-1] + 3 >= len(found):
+        raise BadInput(f"{path}: facet {len(facets)}: the file is cut there")
+    numbers = found[vertices[:, None] + [1, 2, 3]]
+    points = np.empty(numbers.shape)
+    for row, three in enumerate(numbers):
+        for k, word in enumerate(three):
+            try:
+                points[row, k] = float(word)
+            except ValueError:
+                text = describe(word.decode(errors="replace"))
+                raise BadInput(
+                    f"{path}: facet {row // 3 + 1}: found {text}, expected a coordinate"
+                ) from None
+    return points.reshape(-1, 3, 3)

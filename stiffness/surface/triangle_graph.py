@@ -1,0 +1,77 @@
+"""A surface's triangles with their neighbours, and its smooth and flat parts."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.surface.facets import Facets
+from stiffness.surface.primitives import Shape
+from stiffness.surface.surface import Surface, directed_edges
+
+SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
+_ON_SHAPE = 2e-6  # of the part's size: STL's single precision leaves 1e-7
+_TRIES = 500  # seeds on one surface; what is left then keeps its facets
+
+
+class TriangleGraph:
+    """Triangles, their neighbours and the angles between them."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.points, self.triangles = surface.points, surface.triangles
+        normals = surface.normals()
+        self.areas = np.linalg.norm(normals, axis=1)
+        self.normals = normals / np.maximum(self.areas, 1e-300)[:, None]
+        self.tolerance = _ON_SHAPE * surface.diagonal
+        self.tries = _TRIES
+        edges = np.sort(directed_edges(self.triangles), axis=1)
+        owner = np.repeat(np.arange(len(self.triangles)), 3)
+        order = np.lexsort(edges.T)
+        self.left, self.right = owner[order[::2]], owner[order[1::2]]
+        self.ends = edges[order[::2]]
+        self.cosine = np.einsum(
+            "ij,ij->i", self.normals[self.left], self.normals[self.right]
+        )
+
+    def connected_parts(self, members: NDArray, bend: float) -> NDArray:
+        """Component of each member; cut where the cosine is below ``bend``."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        keep = members[self.left] & members[self.right] & (self.cosine > bend)
+        size = len(self.triangles)
+        graph = coo_array(
+            (np.ones(keep.sum()), (self.left[keep], self.right[keep])), (size, size)
+        )
+        return connected_components(graph, directed=False)[1]
+
+    def smooth_parts(self, members: NDArray) -> list[NDArray]:
+        """Indices of the triangles of each part between sharp edges."""
+        label = self.connected_parts(members, SHARP)
+        return [
+            np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
+        ]
+
+    def directed(self, edges: NDArray, owner: NDArray) -> NDArray:
+        """(e, 2) ends of edges, in the direction in which a triangle has them."""
+        ends = self.ends[edges]
+        first = (self.triangles[owner] == ends[:, :1]).argmax(axis=1)
+        follows = self.triangles[owner, (first + 1) % 3] == ends[:, 1]
+        return np.where(follows[:, None], ends, ends[:, ::-1])
+
+    def flat_faces(self, part: NDArray) -> NDArray:
+        """Number of the coplanar face of each triangle; meaningless outside a part."""
+        inside = np.zeros(len(self.triangles), dtype=bool)
+        inside[part] = True
+        return self.connected_parts(inside, 1 - 1e-10)
+
+    def lifted(self, part: NDArray) -> Facets:
+        """A part of no known shape."""
+        used, index = np.unique(self.triangles[part], return_inverse=True)
+        return Facets(self.points[used], index.reshape(-1, 3))
+
+    def fits(self, shape: Shape, part: NDArray) -> NDArray:
+        """Which triangles of a part lie on a shape, corners and direction."""
+        corners = self.points[self.triangles[part]].reshape(-1, 3)
+        distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
+        centers = corners.reshape(-1, 3, 3).mean(axis=1)
+        along = np.einsum("ij,ij->i", shape.signed(centers)[1], self.normals[part])
+        return (distances < self.tolerance) & (np.abs(along) > SHARP)

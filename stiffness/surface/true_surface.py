@@ -1,0 +1,94 @@
+"""The surface that the facets of a file stand for, and what a mesh misses of it.
+
+The shape of a patch goes on beyond its border, where it meets the next one smoothly.
+What a place of a mesh's boundary is compared with is the patch of the nearest facet.
+"""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.surface.facets import Facets
+from stiffness.surface.patches import Patches
+from stiffness.surface.surface import Surface
+from stiffness.surface.triangle_graph import SHARP, TriangleGraph
+
+_UNSURE = 0.3  # share of the lift of facets of no known shape that may be wrong
+# on a triangle, exact to degree 4 (Dunavant 1985): two triples of places
+_NEAR, _FAR = 0.445948490915965, 0.091576213509771
+_PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
+                          for a in (_NEAR, _FAR)])  # fmt: skip
+_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
+
+
+class TrueSurface:
+    """Facets with the shapes they were recognised as.
+
+    Attributes:
+        volume: [m^3] inside the shapes.
+        unsure_volume: [m^3] of it that depends on how facets of no known shape are
+            smoothed.
+    """
+
+    def __init__(self, surface: Surface, patches: Patches) -> None:
+        self._surface, self._patches = surface, patches
+        between = self._volumes_between()
+        unknown = np.array([isinstance(s, Facets) for s in patches.shapes])
+        self.volume = surface.volume + float(between.sum())
+        self.unsure_volume = _UNSURE * float(np.abs(between[unknown]).sum())
+
+    @cached_property
+    def tangent(self) -> NDArray:
+        """(p,) whether a patch meets another one without a sharp edge."""
+        graph, patch = TriangleGraph(self._surface), self._patches.patch
+        one, other = patch[graph.left], patch[graph.right]
+        smooth = (graph.cosine > SHARP) & (one != other)
+        return np.isin(
+            np.arange(len(self._patches.shapes)), [one[smooth], other[smooth]]
+        )
+
+    @cached_property
+    def _mesh(self) -> Any:
+        import pyvista
+
+        surface = self._surface
+        return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
+
+    def outside(self, points: NDArray, normals: NDArray) -> NDArray:
+        """How far places of a mesh's boundary are outside the surface.
+
+        Args:
+            points: (n, 3) [m].
+            normals: (n, 3) outward normals of the mesh there.
+
+        Returns:
+            (n,) [m], negative inside.
+        """
+        cell = np.atleast_1d(self._mesh.find_closest_cell(points))
+        patch = self._patches.patch[cell]
+        away = np.zeros(len(points))
+        for number in np.unique(patch):
+            some = patch == number
+            distance, slope = self._patches.shapes[number].signed(points[some])
+            facing = np.einsum("ni,ni->n", slope, normals[some])
+            away[some] = distance * np.sign(facing)
+        return away
+
+    def _volumes_between(self) -> NDArray:
+        """(p,) [m^3] between the facets of each patch and its shape."""
+        surface, patches = self._surface, self._patches
+        areas = surface.normals()
+        volumes = np.zeros(len(patches.shapes))
+        for number, shape in enumerate(patches.shapes):
+            members = np.flatnonzero(patches.patch == number)
+            corners = surface.points[surface.triangles[members]]
+            places = np.einsum("qk,mkx->mqx", _PLACES, corners)
+            distance, slope = shape.signed(places.reshape(-1, 3))
+            slope = slope.reshape(places.shape)
+            # along the facet's normal: (distance) times the slope's component there
+            flux = np.einsum("mqx,mx->mq", slope, areas[members])
+            gap = -distance.reshape(flux.shape) * flux
+            volumes[number] = float((gap @ _WEIGHTS).sum())
+        return volumes

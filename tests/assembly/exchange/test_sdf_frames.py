@@ -1,0 +1,243 @@
+"""SDF: frames, nested models, old versions, masses by default; worked by hand."""
+
+import numpy as np
+import pytest
+
+from assembly.exchange.mechanism import WORLD, body_poses
+from assembly.exchange.sdf import read_sdf
+from forcefit.inputs.errors import BadInput
+
+ARM = """<link name="base"/><joint name="fix" type="fixed"><parent>world</parent>
+<child>base</child></joint>"""
+
+
+def model(folder, text, version="1.9", attributes=""):
+    path = folder / "robot.sdf"
+    path.write_text(
+        f'<sdf version="{version}"><model name="m" {attributes}>{text}</model></sdf>'
+    )
+    return read_sdf(path)
+
+
+def joint(name, parent, child, inside="", kind="revolute"):
+    return f"""<joint name="{name}" type="{kind}"><parent>{parent}</parent>
+        <child>{child}</child>{inside}</joint>"""
+
+
+def axis_in_world(mechanism, name):
+    """Direction of a joint with all coordinates at home."""
+    one = next(joint for joint in mechanism.joints if joint.name == name)
+    poses = body_poses(mechanism, mechanism.home)
+    return (poses[one.parent] @ one.placement)[:3, :3] @ one.axis
+
+
+TILTED = '<link name="arm"><pose>0.3 0 0 0 1.5707963267948966 0</pose></link>'
+Z_UP = "<axis><xyz>0 0 1</xyz>{}</axis>"
+
+
+@pytest.mark.parametrize(
+    ("version", "inside", "expected"),
+    [
+        # a quarter turn about y takes the joint's z to x
+        ("1.4", Z_UP.format(""), [0, 0, 1]),
+        ("1.4", Z_UP.format(
+            "<use_parent_model_frame>0</use_parent_model_frame>"), [1, 0, 0]),
+        ("1.5", Z_UP.format(""), [1, 0, 0]),
+        ("1.6", Z_UP.format(
+            "<use_parent_model_frame>true</use_parent_model_frame>"), [0, 0, 1]),
+        ("1.9", '<axis><xyz expressed_in="__model__">0 0 1</xyz></axis>', [0, 0, 1]),
+        ("1.9", '<axis><xyz expressed_in="">0 0 1</xyz></axis>', [1, 0, 0]),
+    ],
+)  # fmt: skip
+def test_an_axis_is_seen_from_what_its_version_says(
+    version, inside, expected, tmp_path
+):
+    text = ARM + TILTED + joint("turn", "base", "arm", inside)
+    found = axis_in_world(model(tmp_path, text, version), "turn")
+    assert found == pytest.approx(expected, abs=1e-15)
+
+
+def test_poses_lead_through_models_and_frames(tmp_path):
+    """A model at (1, 2, 3) turned by 90 degrees about z; inside it, 1 m on, another
+    whose frame "grip" is placed, half a metre above its own origin."""
+    text = """<pose degrees="true">1 2 3 0 0 90</pose>
+        <frame name="shelf"><pose>1 0 0 0 0 0</pose></frame><link name="base"/>
+        <model name="hand" placement_frame="grip"><pose relative_to="shelf"/>
+        <frame name="grip"><pose>0 0 0.5 0 0 0</pose></frame>
+        <link name="palm"><pose relative_to="">0.2 0 0 0 0 0</pose></link>
+        <link name="tip"><pose relative_to="grip"/></link>
+        <joint name="finger" type="prismatic"><parent>palm</parent><child>tip</child>
+        <axis><xyz expressed_in="__model__">1 0 0</xyz></axis></joint></model>"""
+    text += joint("wrist", "shelf", "hand::grip", Z_UP.format(""))
+    mechanism = model(tmp_path, text)
+    poses = body_poses(mechanism, mechanism.home)
+    assert poses["base"][:3, 3] == pytest.approx([1, 2, 3])
+    # grip stands on the shelf, at (1, 2, 3) + turned (1, 0, 0)
+    assert poses["hand::tip"][:3, 3] == pytest.approx([1, 3, 3])
+    assert poses["hand::palm"][:3, 3] == pytest.approx([1, 3.2, 2.5])
+    assert axis_in_world(mechanism, "hand::finger") == pytest.approx([0, 1, 0])
+    wrist = next(one for one in mechanism.joints if one.name == "wrist")
+    # the shelf is of base; grip of the hand's first link
+    assert (wrist.parent, wrist.child) == ("base", "hand::palm")
+    assert mechanism.root == WORLD
+
+
+def test_a_model_of_another_file_keeps_its_own_version(tmp_path):
+    """A hand of version 1.4, whose axis is seen from the hand, turned by 90 degrees
+    about x; the same robot written out, in which the axis says so itself."""
+    hand = (
+        f"""<link name="palm"/>{TILTED}{joint("j", "palm", "arm", Z_UP.format(""))}"""
+    )
+    folder = tmp_path / "hand"
+    folder.mkdir()
+    (folder / "model.sdf").write_text(
+        f'<sdf version="1.4"><model name="any"><pose>9 9 9 0 0 0</pose>{hand}'
+        "</model></sdf>"
+    )
+    pose = '<pose degrees="true">0 0 1 90 0 0</pose>'
+    text = f"""{ARM}<include><uri>model://hand</uri><name>grip</name>{pose}</include>
+        {joint("w", "base", "grip::palm", "", "fixed")}"""
+    mechanism = model(tmp_path, text)
+    assert axis_in_world(mechanism, "grip::j") == pytest.approx([0, -1, 0])
+    poses = body_poses(mechanism, mechanism.home)
+    assert poses["grip::arm"][:3, 3] == pytest.approx([0.3, 0, 1])
+
+
+def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
+    path = tmp_path / "robot.sdf"
+    path.write_text(
+        f"""<sdf version="1.9"><world name="w"><frame name="table">
+        <pose>0 0 0.7 0 0 0</pose></frame><frame name="spot" attached_to="table">
+        <pose>1 0 0 0 0 0</pose></frame><model name="m"><pose relative_to="spot"/>
+        <link name="base"/><link name="arm"/>{joint("j", "base", "arm")}</model>
+        <joint name="bolt" type="fixed"><parent>world</parent><child>m::base</child>
+        </joint></world></sdf>"""
+    )
+    mechanism = read_sdf(path)
+    poses = body_poses(mechanism, mechanism.home)
+    assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
+
+
+def test_a_joint_may_share_a_link_s_name(tmp_path):
+    mechanism = model(
+        tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
+    )
+    assert {one.name for one in mechanism.joints} == {"fix", "arm_joint"}
+
+
+def test_joints_stand_on_frames_and_close_loops(tmp_path):
+    """Grashof's four-bar, as a parallelogram: its coupler only shifts."""
+    text = (
+        ARM
+        + """
+        <frame name="A" attached_to="base"><pose>0 0 0 0 0 0</pose></frame>
+        <frame name="B" attached_to="A"><pose>2 0 0 0 0 0</pose></frame>
+        <link name="left"/><link name="right"><pose relative_to="B"/></link>
+        <frame name="top" attached_to="left"><pose>0 1 0 0 0 0</pose></frame>
+        <link name="bar"><pose relative_to="top"/></link>
+        <frame name="end" attached_to="bar"><pose>2 0 0 0 0 0</pose></frame>
+        <frame name="other" attached_to="right"><pose>0 1 0 0 0 0</pose></frame>"""
+    )
+    for name, ends in {"a": ("A", "left"), "b": ("B", "right"), "c": ("top", "bar"),
+                       "d": ("end", "other")}.items():  # fmt: skip
+        text += joint(name, *ends, Z_UP.format(""))
+    mechanism = model(tmp_path, text)
+    (loop,) = mechanism.loops
+    q = {"a": 0.3, "b": 0.3, "c": -0.3, "d": 0.3}
+    poses = body_poses(
+        mechanism, np.array([q.get(one.name, 0.0) for one in mechanism.joints])
+    )
+    first, second = poses[loop.first] @ loop.at_first, poses[loop.second]
+    assert first == pytest.approx(second @ loop.at_second, abs=1e-15)
+
+
+SHAPES = {
+    "<box><size>0.4 0.05 0.02</size></box>": 4e-4,
+    "<sphere><radius>0.1</radius></sphere>": 4 / 3 * np.pi * 1e-3,
+    "<cylinder><radius>0.1</radius><length>0.3</length></cylinder>": np.pi * 3e-3,
+    "<capsule><radius>0.1</radius><length>0.3</length></capsule>": np.pi * 13e-3 / 3,
+    "<ellipsoid><radii>0.1 0.2 0.3</radii></ellipsoid>": np.pi * 8e-3,
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_automatic_inertia_is_volume_times_density(shape, tmp_path):
+    """Of steel; and beside a sphere of 1 litre's density it is the weighted mean."""
+    collision = """<collision name="c"><pose>0.2 0 0 0 0 0</pose>{}<geometry>{}
+        </geometry></collision>"""
+    steel = collision.format("<density>7850</density>", shape)
+    text = ARM + f'<link name="arm"><inertial auto="true"/>{steel}</link>'
+    text += f"""<link name="two"><inertial auto="1"><density>7850</density></inertial>
+        {collision.format("", shape)}<collision name="d"><density>1000</density>
+        <geometry><sphere><radius>0.2</radius></sphere></geometry></collision></link>"""
+    text += joint("j", "base", "arm") + joint("k", "base", "two")
+    bodies = model(tmp_path, text).bodies
+    mass = 7850 * SHAPES[shape]
+    ball = 1000 * 4 / 3 * np.pi * 8e-3
+    assert bodies["arm"].mass == pytest.approx(mass, rel=1e-12)
+    assert bodies["arm"].centre == pytest.approx([0.2, 0, 0])
+    assert bodies["two"].mass == pytest.approx(mass + ball, rel=1e-12)
+    assert bodies["two"].centre[0] == pytest.approx(0.2 * mass / (mass + ball))
+
+
+def test_masses_that_are_not_written_are_the_format_s_default(tmp_path):
+    """1 kg; a mass beside auto is kept, with the centre of the shapes."""
+    text = (
+        ARM
+        + """<link name="a"><inertial><pose>0 0 1 0 0 0</pose></inertial></link>
+        <link name="b"><inertial auto="true"><mass>5</mass></inertial><collision
+        name="c"><pose>0 0 2 0 0 0</pose><geometry><sphere><radius>1</radius></sphere>
+        </geometry></collision></link>"""
+    )
+    text += joint("j", "base", "a") + joint("k", "base", "b")
+    mechanism = model(tmp_path, text)
+    bodies = mechanism.bodies
+    assert [bodies[name].mass for name in ("base", "a", "b")] == [1, 1, 5]
+    assert [bodies[name].centre[2] for name in ("base", "a", "b")] == [0, 1, 2]
+    assert any("no inertial: 1 kg" in line for line in mechanism.taken)
+
+
+def test_axes_follow_axes(tmp_path):
+    """k = 2 (j - 0.1) + 0.5; the second axis of a universal joint leads, at zero."""
+    mimic = """<mimic joint="{}" axis="{}"><multiplier>2</multiplier><offset>0.5
+        </offset><reference>0.1</reference></mimic>"""
+    text = ARM + '<link name="a"/><link name="b"/><link name="c"/>'
+    text += joint("k", "a", "b", Z_UP.format(mimic.format("u", "axis2")))
+    text += joint("u", "base", "a", Z_UP.format("") + "<axis2><xyz>1 0 0</xyz></axis2>",
+                  "universal")  # fmt: skip
+    text += joint("l", "b", "c", Z_UP.format(mimic.format("k", "axis")))
+    mechanism = model(tmp_path, text)
+    home = {one.name: one.position for one in mechanism.joints}
+    assert (home["k"], home["l"]) == pytest.approx((0.3, 0.9))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            '<frame name="f" attached_to="base"/>' + joint("j", "f", "base"),
+            'joint "j".child: found "base", which is also its parent',
+        ),
+        (
+            '<link name="a"/>' + joint("j", "base", "a")
+            + "<drake:linear_bushing_rpy><drake:bushing_frameA name='base'/>"
+            "<drake:bushing_frameC name='a'/></drake:linear_bushing_rpy>",
+            'drake:linear_bushing_rpy: found it between "base" and "a": it may tie',
+        ),
+        (joint("j", "base", "frme") + '<frame name="frame"/>', 'did you mean "frame"?'),
+        (
+            "<include><uri>model://x</uri></include>",
+            'include.uri: found "model://x", no file or folder near this',
+        ),
+        (
+            '<link name="a"><inertial auto="true"/><collision name="c"><geometry>'
+            "<mesh/></geometry></collision></link>" + joint("j", "base", "a"),
+            "geometry: found mesh, of which no automatic inertia is made here",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_converted_is_refused_by_name(text, message, tmp_path):
+    with pytest.raises(BadInput) as error:
+        model(tmp_path, ARM + text)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)

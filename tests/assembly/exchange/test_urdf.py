@@ -1,0 +1,270 @@
+"""URDF: XML as others write it, loops of its own, joints that follow; by hand."""
+
+import json
+
+import numpy as np
+import pytest
+
+from assembly.exchange.convert import convert
+from assembly.exchange.mechanism import body_poses
+from assembly.exchange.urdf import read_urdf
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.posture import place_robot
+from forcefit.inputs.errors import BadInput
+from stiffness.screws import rotation_matrix
+
+
+def joint(name, parent, child, inside="", kind="continuous", tag="joint"):
+    return f"""<{tag} name="{name}" type="{kind}"><parent link="{parent}"/>
+        <child link="{child}"/>{inside}</{tag}>"""
+
+
+def file_of(folder, text, links="", attributes=""):
+    """A URDF of links named by single letters."""
+    path = folder / "robot.urdf"
+    given = "".join(f'<link name="{name}"/>' for name in links)
+    path.write_text(f'<robot name="r" {attributes}>{given}{text}</robot>')
+    return path
+
+
+Z = '<axis xyz="0 0 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("before", "attributes", "inside"),
+    [
+        ('\n\n<?xml version="1.0"?>\n', "", ""),
+        ('<!-- of -- mine --><?xml version="1.0"?>', "", "<!-- a -- b --- -->"),
+        ("", 'xmlns="http://drake.mit.edu" xmlns:x="a" x:schemaLocation="b c"', ""),
+        ("", "", "<gazebo><lost:thing lost:key='1'/></gazebo>"),
+        ("\ufeff", 'xmlns="urn:other"', ""),
+    ],
+)
+def test_xml_is_taken_as_tolerant_readers_take_it(before, attributes, inside, tmp_path):
+    path = file_of(tmp_path, joint("j", "a", "b", Z) + inside, "ab", attributes)
+    path.write_text(before + path.read_text())
+    assert [one.name for one in read_urdf(path).joints] == ["j"]
+
+
+@pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
+def test_a_joint_may_have_any_name(name, tmp_path):
+    """Its frame is of that name, and "base", which stands still, of another."""
+    text = joint("base", "a", "b", '<origin xyz="0 0 0.1"/>' + Z)
+    text += joint("base.joint", "b", "c", '<origin xyz="0 0 0.2"/>' + Z)
+    text = text.replace('name="base.joint"', f'name="{name}.x"')
+    path = file_of(tmp_path, text, "abc")
+    (tmp_path / "robot.yaml").write_text("closed_loop: []\nname_mot: [base]\n")
+    answer = convert(path, tmp_path / "out.toml")
+    robot = read_robot(tmp_path / "out.toml")
+    (drive,) = [frame.name for frame in robot.frames if frame.actuated]
+    assert drive == "base.joint"
+    assert any('"base" is frame "base.joint"' in line for line in answer.taken)
+    end = place_robot(robot).transforms[robot.index("c")]
+    assert end[:3, 3] == pytest.approx([0, 0, 0.3])
+
+
+def four_bar(closing, folder):
+    """Parallelogram of cranks of 0.2 m, 0.4 m apart, its coupler closed by a joint."""
+    text = joint("p", "a", "b", Z) + joint("r", "a", "d", f'<origin xyz="0.4 0 0"/>{Z}')
+    text += joint("q", "b", "c", f'<origin xyz="0 0.2 0"/>{Z}')
+    return file_of(folder, text + closing, "abcd")
+
+
+LINKS = '<link1 link="c" xyz="0.4 0 0"/><link2 link="d" xyz="0 0.2 0" rpy="0 0 0"/>'
+CLOSING = {
+    # redundant constraints by Gruebler's count: 1 - (18 - 3 x 5) + what it takes
+    "spherical": (f'<loop_joint name="l" type="spherical">{LINKS}</loop_joint>', 1),
+    "ball": (f'<drake:loop_joint name="l" type="ball">{LINKS}</drake:loop_joint>', 1),
+    "continuous": (
+        f'<loop_joint name="l" type="continuous">{LINKS}{Z}</loop_joint>', 3,
+    ),
+    "gazebo": (
+        '<gazebo><joint name="l" type="revolute"><pose>0 0.2 0 0 0 0</pose>'
+        "<parent>c</parent><child>d</child><axis><xyz>0 0 1</xyz></axis></joint>"
+        "</gazebo>", 3,
+    ),
+    "gazebo universal": (
+        '<gazebo><joint name="l" type="universal"><pose>0 0.2 0 0 0 0</pose>'
+        "<parent>c</parent><child>d</child><axis><xyz>0 0 1</xyz></axis>"
+        "<axis2><xyz>1 0 0</xyz></axis2></joint></gazebo>", 2,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", CLOSING)
+def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
+    """One freedom, whatever closes it; and the coupler only shifts."""
+    closing, redundant = CLOSING[kind]
+    path = four_bar(closing, tmp_path)
+    loops = "closed_loop: []\nname_mot: [p]\nplatform: c\n"
+    (tmp_path / "robot.yaml").write_text(loops)
+    answer = convert(path, tmp_path / "out.toml")
+    assert answer.open_before < 1e-12
+    status, _, _ = run("assembly", "solve", tmp_path / "out.toml",
+                       "--json", tmp_path / "o.json")  # fmt: skip
+    assert status == 0
+    mobility = json.loads((tmp_path / "o.json").read_text())["mobility"]
+    assert (mobility["freedoms"], mobility["overconstraint"]) == (1, redundant)
+    robot = read_robot(tmp_path / "out.toml")
+    coupler = place_robot(robot, joints={"p": 0.5}).transforms[robot.index("c")]
+    assert coupler[:3, :3] == pytest.approx(np.eye(3), abs=1e-9)
+    crank = [-0.2 * np.sin(0.5), 0.2 * np.cos(0.5), 0]
+    assert coupler[:3, 3] == pytest.approx(crank, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", CLOSING)
+def test_no_part_of_a_closing_joint_is_taken_for_the_platform(kind, tmp_path):
+    """The coupler is the end of the longest chain, whatever closes its loop."""
+    answer = convert(four_bar(CLOSING[kind][0], tmp_path), tmp_path / "out.toml")
+    assert answer.robot.platform == "c"
+
+
+def test_joints_of_drake_have_axes_of_their_own(tmp_path):
+    """A universal turns about x, then y; a planar slides in x and y."""
+    text = joint("u", "a", "b", "", "universal", "drake:joint")
+    text += joint("s", "b", "c", "", "planar", "d:joint")
+    text += joint("w", "c", "d", "", "ball", "drake:joint")
+    mechanism = read_urdf(file_of(tmp_path, text, "abcd"))
+    axes = {one.name: one.axis.tolist() for one in mechanism.joints}
+    x, y, z = np.eye(3).tolist()
+    assert axes == {"u.first": x, "u.second": y, "s.tx": x, "s.ty": y, "s.rz": z,
+                    "w.rx": x, "w.ry": y, "w.rz": z}  # fmt: skip
+
+
+def test_an_origin_may_be_a_quaternion(tmp_path):
+    """90 degrees about z, in URDF 1.2's order x y z w."""
+    h = np.sqrt(0.5)
+    text = joint("j", "a", "b", f'<origin xyz="1 0 0" quat_xyzw="0 0 {h} {h}"/>')
+    mechanism = read_urdf(file_of(tmp_path, text, "ab"))
+    turned = body_poses(mechanism, mechanism.home)["b"][:3, :3] @ [1, 0, 0]
+    assert turned == pytest.approx([0, 1, 0])
+
+
+def follower(name, parent, child, leader, factor, offset):
+    inside = f'{Z}<mimic joint="{leader}" multiplier="{factor}" offset="{offset}"/>'
+    return joint(name, parent, child, inside)
+
+
+def test_followers_of_followers_stand_where_their_leaders_take_them(tmp_path):
+    """z = 2 y + 0.1, y = x + 0.5, written before their leaders; x = 0.3 at home."""
+    text = follower("z", "c", "d", "y", 2, 0.1) + follower("y", "b", "c", "x", 1, 0.5)
+    path = file_of(tmp_path, text + joint("x", "a", "b", Z), "abcd")
+    (tmp_path / "robot.yaml").write_text("closed_loop: []\nhome: {x: 0.3}\n")
+    convert(path, tmp_path / "out.toml")
+    robot = read_robot(tmp_path / "out.toml")
+    home = [robot.frame(name).position for name in "xyz"]
+    assert home == pytest.approx([0.3, 0.8, 1.7])
+    (tmp_path / "robot.yaml").write_text("closed_loop: []\nhome: {y: 0.3}\n")
+    with pytest.raises(BadInput, match=r"home.y: found 0.3, but it follows .* 0.5 or"):
+        convert(path, tmp_path / "out.toml")
+
+
+def test_followers_follow_while_a_home_is_looked_for(tmp_path):
+    """A crank and a follower of minus its angle: their tips meet where x is equal.
+
+    Crank 1 m about (0, 0), follower 1 m about (1, 0) at -q + offset; with offset pi
+    the tips (cos q, sin q) and (1 - cos q, sin q) meet at q = 60 degrees.
+    """
+    text = joint("x", "a", "b", Z) + follower("y", "a", "c", "x", -1, np.pi)
+    text = text.replace('<child link="c"/>', '<child link="c"/><origin xyz="1 0 0"/>')
+    text += "".join(
+        joint(f"{one}tip", one, f"{one}"[0] + "t", '<origin xyz="1 0 0"/>', "fixed")
+        for one in "bc"
+    )
+    links = "".join(f'<link name="{name}"/>' for name in ("bt", "ct"))
+    path = file_of(tmp_path, links + text, "abc")
+    (tmp_path / "robot.yaml").write_text(
+        "closed_loop: [[bt, ct]]\ntype: [3d]\nname_mot: [x]\nhome: {x: 0.9}\n"
+    )
+    answer = convert(path, tmp_path / "out.toml")
+    assert not answer.drives_held
+    robot = read_robot(tmp_path / "out.toml")
+    x, y = (robot.frame(name).position for name in "xy")
+    assert x == pytest.approx(np.pi / 3, abs=1e-9)
+    assert y == pytest.approx(np.pi - np.pi / 3, abs=1e-9)
+
+
+@pytest.mark.parametrize("axes", ["XY", "YX", "YZ", "ZY", "ZX", "XZ"])
+def test_universal_joints_of_every_order_of_axes(axes, tmp_path):
+    path = file_of(tmp_path, joint("j", "a", "b", Z), "ab")
+    (tmp_path / "robot.yaml").write_text(
+        f"closed_loop: []\njoint_name: [j]\njoint_type: [UJOINT_{axes}]\n"
+    )
+    convert(path, tmp_path / "out.toml")
+    robot = read_robot(tmp_path / "out.toml")
+    turns = [frame.name for frame in robot.frames if frame.joint == "revolute"]
+    assert turns == [f"j.r{axis.lower()}" for axis in axes]
+    # the second axis is carried by the first
+    turned = place_robot(robot, joints={turns[0]: 0.5, turns[1]: 0.8})
+    first, second = (np.eye(3)["XYZ".index(axis)] for axis in axes)
+    expected = rotation_matrix(0.5 * first) @ rotation_matrix(0.8 * second)
+    found = turned.transforms[robot.index("b")][:3, :3]
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+TIE = '<constraint type="rod"><from body="a"/><to body="c"/></constraint>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (joint("k", "b", "c", Z) + TIE, 'constraint: found it between "a" and "c"'),
+        (
+            joint("k", "b", "c", Z) + '<frame name="fa" link="a"/><frame name="fc" '
+            'link="c"/><drake:linear_bushing_rpy><drake:bushing_frameA name="fa"/>'
+            '<drake:bushing_frameC name="fc"/></drake:linear_bushing_rpy>',
+            'linear_bushing_rpy: found it between "fa" and "fc": it may tie them',
+        ),
+        (
+            joint("k", "b", "c", Z) + f"<gazebo>{TIE}</gazebo>",
+            'constraint: found it between "a" and "c"',
+        ),
+        (
+            joint("k", "b", "c", Z)
+            + '<gazebo><joint name="l" type="screw"><parent>a</parent><child>c</child>'
+            "</joint></gazebo>",
+            "joint \"l\".type: found 'screw'",
+        ),
+        (
+            joint("k", "b", "c", Z)
+            + '<loop_joint name="l" type="spherical"><link1 link="c"/><link2 link="c"/>'
+            "</loop_joint>",
+            'loop_joint "l".link2: found "c" twice',
+        ),
+        (
+            joint("k", "b", "c", "", "screw", "drake:joint"),
+            "drake:joint \"k\".type: found 'screw', expected ball",
+        ),
+        (follower("k", "b", "c", "k", 1, 0), 'joint "k": found that it follows itself'),
+        (
+            follower("k", "b", "c", "l", 1, 0) + follower("l", "b", "d", "k", 1, 0)
+            + '<link name="d"/>',
+            'follows itself ("k" -> "l")',
+        ),
+        (joint("k", "c", "c", Z), "found a ring of parents"),
+        ('<xacro:macro name="m"/>' + joint("k", "b", "c"), "found a macro, expected"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_converted_is_refused_by_name(text, message, tmp_path):
+    path = file_of(tmp_path, joint("j", "a", "b", Z) + text, "abc")
+    with pytest.raises(BadInput) as error:
+        read_urdf(path)
+    assert message in str(error.value)
+
+
+def test_what_a_plugin_or_a_spring_of_gazebo_may_tie_is_said(tmp_path):
+    text = joint("j", "a", "b", Z) + joint("k", "b", "c", Z)
+    text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
+        </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>
+        <gazebo reference="k"><springStiffness>5</springStiffness></gazebo>"""
+    left_out = read_urdf(file_of(tmp_path, text, "abc")).left_out
+    tie = "plugin, not converted, though it may tie or move what it names: 1 (p)"
+    assert tie in left_out
+    assert "springStiffness, not converted, though it may carry load: 1 (k)" in left_out
+
+
+def test_a_loop_between_a_joint_and_its_own_link_is_refused(tmp_path):
+    path = file_of(tmp_path, joint("j", "a", "b", Z), "ab")
+    (tmp_path / "robot.yaml").write_text("closed_loop: [[j, b]]\n")
+    with pytest.raises(BadInput, match=r'found "j" and "b", both of which end at "b"'):
+        convert(path, tmp_path / "out.toml")

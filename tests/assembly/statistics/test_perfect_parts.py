@@ -1,0 +1,123 @@
+"""Perfect parts: clearances by hand, and limits that no tolerance of errors mends."""
+
+import json
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import load_robot
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.perfect_parts import limits_broken, perfect_parts
+from tests.pages_for_tests import tiles
+
+ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
+ERRORS = """
+[[errors]]
+frames = ["tip"]
+distribution = "uniform"
+most = [0, 0, 0, 1e-6, 1e-6, 1e-6]
+"""
+
+
+def arm(tilt=TILT):
+    """A driven pin with radial clearance and tilt, and a tip 0.4 m across its axis."""
+    clearance = Clearance(radial=RADIAL, tilt=tilt)
+    frames = (
+        Frame("pin", joint="revolute", actuated=True, clearance=clearance),
+        Frame("tip", "pin", [ARM, 0, 0]),
+    )
+    return Robot("arm", "tip", frames)
+
+
+def experiment(robot, **options):
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 1e-6, 1e-6], ("tip",))
+    return Experiment(home_posture(robot), sources, margins=False, **options)
+
+
+def test_the_parts_of_two_clearances_add_up_to_the_largest_error():
+    """The disc r is across the shift L t: hypot(r, L t), of parts r^2 and (L t)^2."""
+    parts = perfect_parts(experiment(arm()))
+    largest = np.hypot(RADIAL, ARM * TILT)
+    translation = parts["translation"]
+    assert translation["reached"] == pytest.approx(largest, abs=2e-6)
+    by_kind = translation["clearances"]
+    assert by_kind["pin.radial"] == pytest.approx(RADIAL**2 / largest, rel=1e-3)
+    assert by_kind["pin.tilt"] == pytest.approx((ARM * TILT) ** 2 / largest, rel=1e-3)
+    assert list(by_kind) == ["pin.tilt", "pin.radial"]
+    assert parts["rotation"]["clearances"] == pytest.approx({"pin.tilt": TILT})
+
+
+@pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod"])
+def test_the_parts_of_all_clearances_are_the_largest_error_of_a_loop_too(name):
+    """Euler's sum for a homogeneous function, whatever the closures are."""
+    robot = load_robot(name)
+    pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
+    posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
+    sources = tolerance_sources(robot, [1e-6] * 6)
+    parts = perfect_parts(Experiment(posture, sources, precision=(1e-8, 1e-8)))
+    for key in ("rotation", "translation"):
+        total = sum(parts[key]["clearances"].values())
+        assert total == pytest.approx(parts[key]["reached"], rel=5e-3)
+
+
+def test_limits_that_perfect_parts_meet_are_not_broken():
+    parts = perfect_parts(experiment(arm()))
+    largest = np.hypot(RADIAL, ARM * TILT)
+    assert not limits_broken(parts, {"translation": 1.01 * largest, "energy": 1.0})
+    broken = limits_broken(parts, {"translation": 0.9 * largest, "rotation": 1.0})
+    assert list(broken) == ["translation"]
+    assert broken["translation"]["limit"] == 0.9 * largest
+
+
+def test_a_load_is_part_of_what_perfect_parts_reach():
+    """5 N along y press the pin to its rim: its radius, by the force of 5 N."""
+    parts = perfect_parts(experiment(arm(0.0), load=(0, 0, 0, 0, 5.0, 0)))
+    assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)
+    assert parts["force"]["reached"] == pytest.approx(5.0)
+    assert "clearances" not in parts["translation"]
+
+
+@pytest.mark.parametrize("limit", [5e-4, 2e-3])
+def test_the_advice_is_the_clearances_where_these_alone_break_the_limit(
+    tmp_path, run, limit
+):
+    """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""
+    write_robot(arm(), tmp_path / "arm.toml")
+    (tmp_path / "errors.toml").write_text(ERRORS)
+    page = tmp_path / "page.html"
+    status, text, err = run(
+        "assembly", "statistics", tmp_path / "arm.toml", "--errors",
+        tmp_path / "errors.toml", "--draws", 40, "--importance", 16, "--limit",
+        f"translation={limit}", "--report", page,
+    )  # fmt: skip
+    assert status == 0, err
+    answer, _ = tiles(page.read_text("utf-8"))["What to tighten"]
+    broken = limit < np.hypot(RADIAL, ARM * TILT)
+    assert ("no tolerance of the errors meets it" in text) == broken
+    assert answer == ("the clearances" if broken else "nothing")
+    assert "perfect parts, clearances alone: rotation 0.002 rad (pin.tilt 100%)" in text
+
+
+def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
+    """Three equal errors by symmetry: no leg governs the result, all do."""
+    (tmp_path / "errors.toml").write_text(
+        ERRORS.replace("tip", "elbow").replace(
+            "0, 0, 0, 1e-6, 1e-6, 1e-6", "0, 1e-3, 0, 0, 0, 0"
+        )
+    )
+    page, written = tmp_path / "page.html", tmp_path / "s.json"
+    status, _, err = run(
+        "assembly", "statistics", "delta", "--errors", tmp_path / "errors.toml",
+        "--draws", 40, "--importance", 256, "--by", "source", "--play", "least",
+        "--report", page, "--json", written,
+    )  # fmt: skip
+    assert status == 0, err
+    quantities = json.loads(written.read_text())["importance"]["quantities"]
+    ranks = quantities["translation"]["rank"]
+    assert {tuple(rank) for rank in ranks.values()} == {(1, 3)}
+    answer, _ = tiles(page.read_text("utf-8"))["What to tighten"]
+    assert answer == "elbow.RY of all legs"

@@ -1,0 +1,110 @@
+"""Figures of quantities by name: what a panel shows is what the file holds."""
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+from assembly.statistics.plot import figure_of_draws
+from assembly.sweeps.dataset import save_dataset
+
+
+@pytest.fixture(scope="module")
+def data():
+    return ff.sweep_in_memory(ff.ask_sweep("five_bar", ff.SweepOptions(
+        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", stiffness=True, reading="none",
+        wrench=("left.elbow",), load=(0, 0, 0, 10, 0, 0),
+    )))  # fmt: skip
+
+
+def shown(panel):
+    """(y, x) numbers of a map."""
+    return np.asarray(panel.collections[0].get_array()).reshape(2, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "scale", "title"),
+    [
+        ("stiffness.FX", {"wrench_component": "FX"}, 1e-6, "stiffness.FX [N/um]"),
+        ("compliance.TY.MZ", {"screw": "TY", "wrench_component": "MZ"}, 1.0,
+         "compliance.TY.MZ [m/(N m)]"),
+        ("platform_screw.TX", {"screw": "TX"}, 1e3, "platform_screw.TX [mm]"),
+        ("wrench.left.elbow.FX", {"frame": "left.elbow", "wrench_component": "FX"},
+         1.0, "wrench.left.elbow.FX [N]"),
+        ("singular_distance.parallel", {"kind": "parallel"}, 1.0,
+         "singular_distance.parallel [-]"),
+    ],
+)  # fmt: skip
+def test_a_map_shows_the_component_that_is_named(data, name, at, scale, title):
+    (panel, *_) = ff.figure_of(data, quantities=[name]).axes
+    expected = data[name.partition(".")[0]].sel(at).transpose("ty", "tx").values
+    np.testing.assert_allclose(shown(panel), scale * expected, rtol=1e-12)
+    assert panel.get_title().startswith(title)
+
+
+def test_the_shift_is_the_length_of_the_platforms_translation(data):
+    (panel, *_) = ff.figure_of(data, quantities=["translation"]).axes
+    parts = data["platform_screw"].sel(screw=["TX", "TY", "TZ"])
+    expected = np.linalg.norm(parts.transpose("ty", "tx", "screw").values, axis=2)
+    np.testing.assert_allclose(shown(panel), 1e3 * expected, rtol=1e-12)
+
+
+def test_a_variable_alone_means_all_its_components_along_a_line_too(data):
+    figure = ff.figure_of(data.isel(ty=[0]), quantities=["stiffness", "energy"])
+    lines = [panel for panel in figure.axes if panel.lines]
+    titles = [panel.get_title() for panel in lines]
+    assert [t.partition(" ")[0] for t in titles] == [
+        *(f"stiffness.{one}" for one in ("MX", "MY", "MZ", "FX", "FY", "FZ")), "energy"
+    ]  # fmt: skip
+    expected = data["stiffness"].isel(ty=0).sel(wrench_component="FY") * 1e-6
+    np.testing.assert_allclose(lines[4].lines[0].get_ydata(), expected, rtol=1e-12)
+
+
+def test_a_single_natural_frequency_is_plotted(data):
+    """The axis of the modes has one value, and stays."""
+    one = data.assign(
+        frequency=(("tx", "ty", "mode"), np.ones((3, 2, 1)))
+    ).assign_coords(mode=["1"])
+    for quantities in ([], ["frequency.1"], ["frequency"]):
+        titles = [p.get_title() for p in ff.figure_of(one, None, quantities).axes]
+        assert any("frequency" in title for title in titles)
+
+
+def test_unknown_and_too_many_quantities_are_one_line(run, data, tmp_path):
+    save_dataset(data, tmp_path / "s.nc")
+    for name, said in (
+        ("stifness", 'no "stifness"; did you mean "stiffness"?'),
+        ("stiffness.FQ", 'no "stiffness.FQ"; did you mean "stiffness.F'),
+        ("compliance", "found 36 components, expected at most 12"),
+    ):
+        status, _, err = run("assembly", "plot", tmp_path / "s.nc", "--quantity", name,
+                             "-o", tmp_path / "p.png")  # fmt: skip
+        assert (status, err.count("\n")) == (2, 1)
+        assert said in err
+    assert not (tmp_path / "p.png").exists()
+
+
+def test_histograms_of_signed_components_have_their_mode_below_zero(arm_draws):
+    figure = figure_of_draws(arm_draws, None, ["platform_screw.TX"])
+    panel = figure.axes[0]
+    assert panel.get_xlabel() == "platform_screw.TX [mm]"
+    (mode,) = [line for line in panel.lines if "most probable" in line.get_label()]
+    assert mode.get_xdata()[0] == pytest.approx(-1.0, abs=0.05)
+    with pytest.raises(ff.BadInput, match="expected with a histogram"):
+        figure_of_draws(arm_draws, "tornado", ["energy"])
+
+
+@pytest.fixture
+def arm_draws(rng):
+    """Draws whose platform is 1 mm off against x, normally with 0.05 mm."""
+    import xarray
+
+    screw = np.zeros((4000, 6))
+    screw[:, 3] = rng.normal(-1e-3, 5e-5, 4000)
+    return xarray.Dataset(
+        {
+            "status": ("draw", np.zeros(4000)), "energy": ("draw", np.ones(4000)),
+            "platform_screw": (("draw", "screw"), screw, {"units": "rad, m"}),
+        },
+        {"screw": ["RX", "RY", "RZ", "TX", "TY", "TZ"]},
+        {"play": "least", "sources_and_posture_sha256": "0"},
+    )  # fmt: skip

@@ -1,0 +1,94 @@
+"""The files of the examples, as `pip install` alone gives them."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from forcefit.commands.example import EXAMPLES
+
+ROOT = Path(__file__).parents[3]
+
+
+def files_of(folder):
+    return {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+
+
+def test_every_file_of_the_examples_belongs_to_one(run, tmp_path):
+    status, out, err = run("example", *EXAMPLES, "-o", tmp_path)
+    assert (status, err) == (0, "")
+    assert files_of(tmp_path / "examples") == files_of(ROOT / "examples")
+    for path in files_of(tmp_path):
+        assert (tmp_path / path).read_bytes() == (ROOT / path).read_bytes(), path
+    for one in EXAMPLES.values():
+        assert one.first in out
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_what_an_example_refers_to_is_written_with_it(run, tmp_path, name):
+    """Surfaces, robots and measurements that its TOML files name."""
+    run("example", name, "-o", tmp_path)
+    for path in tmp_path.rglob("*.toml"):
+        if path.name == "data.toml":  # whose files are fetched
+            continue
+        for value in strings(tomllib.loads(path.read_text(encoding="utf-8"))):
+            if value.endswith((".stl", ".csv", ".toml")):
+                assert (path.parent / value).is_file(), f"{path}: {value}"
+
+
+def strings(value):
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for one in value:
+            yield from strings(one)
+    elif isinstance(value, str):
+        yield value
+
+
+def test_examples_are_listed_without_a_name(run):
+    status, out, _ = run("example")
+    assert status == 0
+    assert [line.split()[0] for line in out.splitlines()] == list(EXAMPLES)
+
+
+def test_written_again_nothing_changes_and_another_content_is_kept(run, tmp_path):
+    assert run("example", "irsbot2", "-o", tmp_path)[0] == 0
+    before = files_of(tmp_path)
+    status, out, _ = run("example", "irsbot2", "-o", tmp_path)
+    assert (status, files_of(tmp_path)) == (0, before)
+    assert out.startswith("0 files written")
+    mine = tmp_path / "examples" / "irsbot2.toml"
+    mine.write_text("mine")
+    status, out, err = run("example", "campaign", "irsbot2", "-o", tmp_path)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert f"{mine}: found another content" in err
+    assert files_of(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["irsbot"], 'example: no "irsbot"; did you mean "irsbot2"?'),
+        (["irsbot2", "-o", "nowhere"], "nowhere: no such folder"),
+    ],
+)
+def test_a_wrong_name_or_folder_is_one_message(
+    run, tmp_path, monkeypatch, words, message
+):
+    monkeypatch.chdir(tmp_path)
+    status, _, err = run("example", *words)
+    assert (status, err.count("\n")) == (2, 1)
+    assert message in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_wheel_holds_what_the_command_writes():
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    included = table["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    tops = {part.split("/")[0] for one in EXAMPLES.values() for part in one.files}
+    assert included == {top: f"forcefit/{top}" for top in tops}

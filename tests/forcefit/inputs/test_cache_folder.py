@@ -1,0 +1,114 @@
+"""Where meshes and compiled code are kept, and what happens where nothing can be."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forcefit.inputs import cache_folder as module
+from forcefit.inputs.cache_folder import cache_folder
+from forcefit.native import libraries
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def nothing(monkeypatch, tmp_path):
+    """No variable, a home that is a file, temporary files in a folder of the test's."""
+    for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    (tmp_path / "home").write_text("a file: nothing can be made in it")
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setattr(module.Path, "home", lambda: tmp_path / "home")
+    monkeypatch.setattr(module.tempfile, "gettempdir", lambda: str(tmp_path / "tmp"))
+    return tmp_path
+
+
+def test_the_cache_is_where_the_user_says(nothing, monkeypatch):
+    monkeypatch.setenv("FORCEFIT_CACHE", str(nothing / "mine"))
+    assert cache_folder() == nothing / "mine"
+    # one that cannot be made is passed over
+    monkeypatch.setenv("FORCEFIT_CACHE", str(nothing / "home" / "mine"))
+    assert cache_folder().parent == nothing / "tmp"
+
+
+@pytest.mark.parametrize(
+    ("system", "variable", "within"),
+    [
+        ("win32", "LOCALAPPDATA", ""),
+        ("darwin", "", "Library/Caches"),
+        ("linux", "XDG_CACHE_HOME", ".cache"),
+    ],
+)
+def test_the_cache_is_where_each_system_keeps_them(
+    system, variable, within, nothing, monkeypatch
+):
+    monkeypatch.setattr(module.sys, "platform", system)
+    monkeypatch.setattr(module.Path, "home", lambda: nothing / "me")
+    assert cache_folder() == nothing / "me" / within / "forcefit"
+    if variable:
+        monkeypatch.setenv(variable, str(nothing / "other"))
+        assert cache_folder() == nothing / "other" / "forcefit"
+
+
+def test_without_a_home_the_cache_is_the_users_own_temporary_folder(
+    nothing, monkeypatch
+):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(module.Path, "home", homeless)
+    folder = cache_folder()
+    assert folder.parent == nothing / "tmp"
+    assert folder.stat().st_mode & 0o077 == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no users of POSIX")
+def test_a_temporary_folder_that_others_may_write_is_not_taken(nothing):
+    """Code is loaded from there."""
+    folder = cache_folder()
+    folder.chmod(0o777)
+    assert cache_folder() is None
+    shutil.rmtree(folder)
+    (nothing / "elsewhere").mkdir()
+    folder.symlink_to(nothing / "elsewhere")
+    assert cache_folder() is None
+
+
+def test_nothing_is_kept_where_no_folder_can_be_written(nothing, monkeypatch):
+    shutil.rmtree(nothing / "tmp")
+    assert cache_folder() is None
+    monkeypatch.setattr(libraries, "_BESIDE", nothing / "home" / "__pycache__")
+    assert libraries.folder_of_compiled() is None
+    assert libraries._kept_at("assembly/linear/lanes.cpp")[1] is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("temporary", [True, False])
+def test_a_read_only_installation_without_a_home_works(tmp_path, temporary):
+    """Every __pycache__ is a file, so that not even root can write beside a source."""
+    for package in ("forcefit", "stiffness", "assembly", "validation"):
+        shutil.copytree(ROOT / package, tmp_path / package,
+                        ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip
+        for folder in [tmp_path / package, *(tmp_path / package).rglob("*/")]:
+            (folder / "__pycache__").write_text("a file")
+    (tmp_path / "tmp").mkdir()
+    given = {k: v for k, v in os.environ.items() if not k.endswith("CACHE_DIR")}
+    given |= {"PYTHONPATH": str(tmp_path), "HOME": "/dev/null", "OMP_NUM_THREADS": "1",
+              "XDG_CACHE_HOME": "/dev/null/x", "FORCEFIT_CACHE": "/dev/null/x",
+              "TMPDIR": str(tmp_path / "tmp")}  # fmt: skip
+    code = "from forcefit.commands.app import main; main()"
+    if not temporary:
+        code = f"import tempfile; tempfile.tempdir = '/dev/null'; {code}"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "assembly", "zone", "five_bar"], env=given,
+        capture_output=True, text=True, cwd=tmp_path, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("zone margin: ")
+    assert "Traceback" not in done.stderr
+    kept = [path.suffix for path in (tmp_path / "tmp").rglob("*")]
+    assert (".nbc" in kept or ".so" in kept) == temporary

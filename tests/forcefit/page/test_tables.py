@@ -1,0 +1,57 @@
+"""Cells, heads and colours of a page as a browser is told of them."""
+
+import re
+
+import pytest
+
+from forcefit.page.comparison import compare, comparison_page
+from forcefit.page.page import Page, Provenance, page
+from forcefit.page.tables import Column, Value, table
+
+
+def test_heads_take_the_focus_of_the_keyboard():
+    text = table(["part", Column("shift", "m")], [["a", 1e-3]])
+    heads = re.findall(r"<th( [^>]*)>", text)
+    assert len(heads) == 2
+    assert all("tabindex=0" in head and "scope=col" in head for head in heads)
+
+
+def test_sentences_wrap_in_their_cells_and_numbers_and_names_do_not():
+    sentence = "anywhere, and compliant joints turn about their own axis"
+    text = table(["", "", ""], [["leg1.loop2_platform", Value(1.0, "m"), sentence]])
+    cells = re.findall(r"<td([^>]*)>([^<]*)", text)
+    assert [" class=long" in attributes for attributes, _ in cells] == [
+        False, False, True
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("good", "kind"), [(True, "good"), (None, "mixed"), (False, "bad")]
+)
+def test_a_verdict_has_the_colour_of_what_it_says(good, kind):
+    text = page(Page("t", "v", good, [], "", [], [], Provenance(), {}))
+    assert f"<p class='verdict {kind}'>v</p>" in text
+
+
+def test_no_line_ends_between_a_number_and_its_unit():
+    """A number of things is not one with a unit: 12 poses, 3 N m of 2 modes."""
+    verdict = "At most 0.794 mm and 13 mrad, 1.926 J, over 12 poses of 2 modes: 5 %."
+    text = page(Page("t", verdict, True, [], "", [], [], Provenance(), {}))
+    (shown,) = re.findall(r"<p class='verdict good'>(.*?)</p>", text)
+    assert shown == (
+        "At most 0.794&nbsp;mm and 13&nbsp;mrad, 1.926&nbsp;J, over 12 poses of "
+        "2 modes: 5&nbsp;%."
+    )
+
+
+def test_a_long_comparison_prints_its_largest_changes_and_folds_the_others():
+    """Folded parts are not printed; 1000 changes took dozens of sheets."""
+    first = {"robot": "r", "values": {f"v{k}": 1.0 for k in range(1000)}}
+    second = {"robot": "r", "values": {f"v{k}": 1.0 + k / 1e3 for k in range(1000)}}
+    text = comparison_page(compare(first, second, ("a", "b")), Provenance())
+    at_once, _, folded = text.partition("<details>")
+    rows = at_once.count("<tr>") - 1
+    assert 20 <= rows <= 100
+    assert "v999" in at_once
+    assert f"<summary>{999 - rows} more changes</summary>" in folded
+    assert folded.partition("</details>")[0].count("<tr>") == 999 - rows + 1

@@ -1,0 +1,72 @@
+"""Public names as editors and type checkers see them."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import forcefit as ff
+from tests.test_readme import python_example
+
+ROOT = Path(__file__).parents[2]
+STUB = ROOT / "forcefit/__init__.pyi"
+
+
+def stub_of(owners):
+    """The stub that says what the table of public names says."""
+    imports = [
+        f"from {owner} import {', '.join(names)}\n" for owner, names in owners.items()
+    ]
+    public = "".join(f'    "{name}",\n' for name in ff.__all__)
+    return (
+        '"""Public names for editors and type checkers, as in ``__init__.py``."""\n'
+        "\n" + "".join(sorted(imports)) + f"\n__all__ = [\n{public}]\n\n"
+        "__version__: str\n"
+    )
+
+
+def test_the_stub_says_what_the_table_says():
+    """Write it anew: python -m tests.forcefit.test_public_names."""
+    assert STUB.read_text(encoding="utf-8") == stub_of(ff._OWNERS)
+
+
+def checked(checker, folder, code):
+    """Exit status and what a type checker prints of a user's lines."""
+    file = folder / "users_lines.py"
+    file.write_text(code, encoding="utf-8")
+    command = {
+        "mypy": ["mypy", "--config-file=", "--python-executable", sys.executable],
+        "pyright": ["pyright", "--pythonpath", sys.executable],
+    }[checker]
+    found = {"PYTHONPATH": str(ROOT), "MYPYPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-m", *command, str(file)], capture_output=True, text=True,
+        env=os.environ | found, cwd=folder, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("checker", ["mypy", "pyright"])
+def test_the_readme_passes_type_checkers_and_a_misspelt_name_does_not(
+    checker, tmp_path
+):
+    if find_spec(checker) is None:
+        pytest.skip(f"no {checker}")
+    code = python_example()
+    status, said = checked(checker, tmp_path, code)
+    assert status == 0, said
+    status, said = checked(checker, tmp_path, code.replace("zone_margin", "zone_marg"))
+    assert status == 1
+    assert "zone_marg" in said
+    # types too, not names alone: an energy is a number
+    status, said = checked(checker, tmp_path, code + "forced.energy.upper()\n")
+    assert status == 1
+    assert "upper" in said
+
+
+if __name__ == "__main__":
+    STUB.write_text(stub_of(ff._OWNERS), encoding="utf-8")

@@ -1,0 +1,128 @@
+"""DMIG in every layout of its lines, and which of a file's matrices is taken."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.errors import BadInput
+from stiffness.exchange.import_link import import_link
+from stiffness.exchange.matrix_file import read_matrix
+from tests.stiffness.exchange.test_links_of_others import (
+    LENGTH,
+    RADIUS,
+    RHO,
+    assert_same,
+    beam_mass,
+    expected_stiffness,
+    textbook_beam,
+    user_element,
+)
+
+
+def columns(K, first=1):
+    """Each column's node and direction, with the rows of its lower half."""
+    for j in range(len(K)):
+        rows = [i for i in range(j, len(K)) if K[i, j]]
+        terms = [(i // 6 + first, i % 6 + 1, K[i, j]) for i in rows]
+        if terms:
+            yield j // 6 + first, j % 6 + 1, terms
+
+
+def between_commas(K, name):
+    """Free fields: as many terms in a line as a column has."""
+    text = f"DMIG,{name},0,6,2,0\n"
+    for node, direction, terms in columns(K):
+        text += f"DMIG,{name},{node},{direction}," + "".join(
+            f",{n},{d},{v:.12E}," for n, d, v in terms
+        )
+        text += "\n"
+    return text
+
+
+def cards_between_commas(K, name):
+    """Free fields: eight a card, the others on lines that begin with a comma."""
+    text = f"DMIG,{name},0,6,2,0\n"
+    for node, direction, terms in columns(K):
+        words = [f"{n},{d},{v:.12E}," for n, d, v in terms]
+        text += f"DMIG,{name},{node},{direction},,{words[0]},+\n"
+        for k in range(1, len(words), 2):
+            text += "+," + ",".join(words[k : k + 2]) + "\n"
+    return text
+
+
+def between_blanks(K, name, first=1):
+    """Free fields between blanks, in which no field can be empty."""
+    text = f"DMIG {name} 0 6 2 0\n"
+    for node, direction, terms in columns(K, first):
+        text += f"DMIG {name} {node} {direction}"
+        text += "".join(f" {n} {d} {v:.12E}" for n, d, v in terms) + "\n"
+    return text
+
+
+def large_fields(K, name):
+    """Sixteen characters a field, one term on a line."""
+    text = f"DMIG    {name:8}       0       6       2       0\n"
+    for node, direction, terms in columns(K):
+        text += f"DMIG*   {name:16}{node:16}{direction:16}\n"
+        for n, d, v in terms:
+            text += f"*       {n:16}{d:16}{v:16.9E}\n".replace("E", "D")
+    return text
+
+
+LAYOUTS = [between_commas, cards_between_commas, between_blanks, large_fields]
+
+
+@pytest.mark.parametrize("write", LAYOUTS)
+def test_every_layout_holds_the_textbook_s_beam_and_its_mass(write, tmp_path):
+    """In mm and tonnes; the closed forms of the beam, and rho A L of its mass."""
+    path = tmp_path / "beam.dmig"
+    path.write_text(
+        write(textbook_beam(), "KAAX")
+        + write(0.02 * textbook_beam(), "K4AAX")
+        + write(beam_mass(), "MAAX")
+    )
+    link = import_link(path, mass=path, unit="mm")
+    assert_same(link.stiffness, expected_stiffness(), 1e-8)
+    mass = RHO * 1e3 * np.pi * RADIUS**2 * LENGTH
+    assert link.mass == pytest.approx(mass, rel=1e-9)
+
+
+def test_damping_alone_is_no_stiffness_and_stiffness_is_no_mass(tmp_path):
+    path = tmp_path / "k.pch"
+    path.write_text(large_fields(textbook_beam(), "K4AAX"))
+    with pytest.raises(BadInput, match=r"K4AAX \(structural damping\), expected one"):
+        read_matrix(path)
+    path.write_text(large_fields(textbook_beam(), "KAAX"))
+    with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):
+        read_matrix(path, "mass")
+    path.write_text(large_fields(textbook_beam(), "MINE"))  # a user's own name
+    assert read_matrix(path, "mass").matrix.shape == (12, 12)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        (
+            "one.mtx",
+            lambda K: user_element(K, head="** 12\n1, 2, 3, 4, 5, 6\n"),
+        ),
+        ("one.dmig", lambda K: between_blanks(K, "KAAX", first=12)),
+        (
+            "five.mtx",
+            lambda K: "".join(
+                f"7,{i + 1},7,{j + 1},{K[i, j]:.15e}\n"
+                for i in range(6) for j in range(6) if K[i, j]
+            ),
+        ),
+    ],
+)  # fmt: skip
+def test_one_node_retained_of_a_held_body_is_the_tip(name, write, tmp_path):
+    path = tmp_path / name
+    path.write_text(write(textbook_beam()[6:, 6:]))
+    assert_same(import_link(path, unit="mm").stiffness, expected_stiffness(), 1e-9)
+
+
+def test_a_dmig_line_that_ends_within_a_term_is_refused(tmp_path):
+    path = tmp_path / "k.dmig"
+    path.write_text("DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n")
+    with pytest.raises(BadInput, match="'1 2' at a line's end, expected node"):
+        read_matrix(path)

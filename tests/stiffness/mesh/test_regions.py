@@ -1,0 +1,84 @@
+"""Regions of another material: the mesh is cut along their faces, errors are told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from forcefit.commands.parts import parse_part
+from stiffness.fem.adaptive_step import estimated_error, middle_stiffness, solve_level
+from stiffness.fem.material import Material, regions_of
+from stiffness.link import scaled
+from stiffness.mesh.regions import cut_by_regions, material_edges, region_of_cells
+from tests.solids_for_tests import box_solid, with_plane_sides
+
+E = 2e11
+SIZE = np.array([0.03, 0.03, 0.05])
+CENTERS = np.array([[0.015, 0.015, 0.0], [0.015, 0.015, 0.05]])
+
+
+def block():
+    """30 x 30 x 50 mm in elements whose corners are not on the layer's faces."""
+    return with_plane_sides(box_solid((3, 3, 4), SIZE))
+
+
+def layer(contrast):
+    return parse_part("--part", f"z=0.02..0.027/young={E / contrast},poisson=0")
+
+
+@pytest.mark.parametrize(
+    ("region", "size"),
+    [
+        ("z=0.02..0.027", (0.03, 0.03, 0.007)),
+        ("x=0.011..0.02,z=0.02..0.0271", (0.009, 0.03, 0.0071)),
+        ("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371", (0.0187, 0.0113, 0.0241)),
+    ],
+)
+def test_a_mesh_is_cut_along_the_faces_of_a_box(region, size):
+    """The elements of the region fill its own volume, and no other is changed."""
+    regions = regions_of([
+        Material(E, 0.3),
+        parse_part("--part", f"{region}/young=1e9,poisson=0.3"),
+    ])
+    cut = cut_by_regions(block(), regions)
+    volumes, inside = cut.volumes(), region_of_cells(cut, regions) == 1
+    assert (volumes > 0).all()
+    assert volumes.sum() == pytest.approx(np.prod(SIZE), rel=1e-9)
+    assert volumes[inside].sum() == pytest.approx(np.prod(size), rel=1e-9)
+
+
+def test_edges_of_a_layer_on_the_boundary_go_around_the_block():
+    """Two squares of 30 mm at the layer's faces."""
+    regions = regions_of([Material(E, 0.3), layer(10)])
+    cut = cut_by_regions(block(), regions)
+    start, end = cut.points[material_edges(cut, regions)].swapaxes(0, 1)
+    assert np.linalg.norm(end - start, axis=1).sum() == pytest.approx(2 * 4 * 0.03)
+    assert set(np.round(start[:, 2], 12)) == {0.02, 0.027}
+
+
+@pytest.mark.parametrize("contrast", [0.01, 10, 1e4])
+def test_layers_in_series_stretch_as_springs_do(contrast):
+    """Without Poisson's ratio the stress is uniform: L / E A of the layers add up."""
+    materials = [Material(E, 0.0), layer(contrast)]
+    solid = cut_by_regions(block(), regions_of(materials))
+    K = solve_level(solid, materials, CENTERS, "rigid").solution.stiffness
+    expected = 0.03**2 / (0.043 / E + 0.007 * contrast / E)
+    assert K[5, 5] == pytest.approx(expected, rel=1e-7)
+
+
+@pytest.mark.parametrize("contrast", [0.1, 10, 100])
+def test_a_face_through_elements_is_part_of_the_error(contrast):
+    """A layer that is given as a function of the points alone: the mesh is not cut, and
+    the stated error covers what the uniform stress shows."""
+    jagged = replace(layer(contrast), planes=())
+    materials = [Material(E, 0.0), jagged]
+    level = solve_level(block(), materials, CENTERS, "rigid")
+    history = [level.totals()]
+    K, error = middle_stiffness(
+        history[0][0], estimated_error(history)[0], history[0][2]
+    )
+    expected = 0.03**2 / (0.043 / E + 0.007 * contrast / E)
+    off = abs(K[5, 5] / expected - 1)
+    told = float(np.abs(scaled(error, K))[5, 5])
+    assert off > 0.005
+    assert told > off

@@ -1,0 +1,103 @@
+"""Slender and thin-walled bars, which a mesher of equal edges never finishes."""
+
+import numpy as np
+import pytest
+
+from stiffness.fem.fea import FemOptions, solve_link
+from stiffness.fem.material import Material
+from stiffness.mesh.slender_bar import slender_bar
+from stiffness.screws import rotation_matrix
+from stiffness.surface.interface import Interface, parse_interface
+from stiffness.surface.surface import check_surface
+from tests.solids_for_tests import cylinder
+
+E, NU = 70e9, 0.3
+G = E / (2 + 2 * NU)
+
+
+def tube(outer, inner, length, facets=48):
+    """A tube along z."""
+    angle = 2 * np.pi * np.arange(facets) / facets
+    circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    corners = ((outer, 0), (outer, length), (inner, length), (inner, 0))
+    points = np.concatenate([r * circle + [0, 0, z] for r, z in corners])
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    triangles = []
+    for k in range(4):
+        a, b = k * facets, (k + 1) % 4 * facets
+        triangles += [np.column_stack([i + a, j + a, j + b])]
+        triangles += [np.column_stack([i + a, j + b, i + b])]
+    return check_surface(points, np.concatenate(triangles), "tube")
+
+
+def box(width, height, length):
+    """A solid bar along z."""
+    x, y = width / 2, height / 2
+    points = np.array([
+        [i, j, k] for i in (-x, x) for j in (-y, y) for k in (0, length)
+    ])
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
+             [1, 5, 7, 3]]  # fmt: skip
+    triangles = [[s[i] for i in turn] for s in sides for turn in ([0, 1, 2], [0, 2, 3])]
+    return check_surface(points, np.array(triangles), "strip")
+
+
+def ends(length):
+    return parse_interface("z=0"), parse_interface(f"z={length}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("surface", "length", "J", "A"),
+    [
+        (check_surface(*cylinder(0.75e-3, 1.0, 32), "rod"), 1.0,
+         np.pi / 2 * 0.75e-3**4, np.pi * 0.75e-3**2),
+        (tube(0.01, 0.0097, 0.2), 0.2,
+         np.pi / 2 * (0.01**4 - 0.0097**4), np.pi * (0.01**2 - 0.0097**2)),
+    ],
+)  # fmt: skip
+def test_a_rod_and_a_thin_tube_are_as_stiff_as_their_closed_forms(
+    surface, length, J, A, tmp_path
+):
+    """Torsion is exact between rigid ends; tension but for the ends, which may not
+    contract: no softer than E A / L, and by less than a width of the length stiffer."""
+    options = FemOptions(0.01, cache=tmp_path)
+    link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
+    error = link.relative_error_estimate
+    assert link.mesh["reached"]
+    assert link.mesh["drawn_out"]
+    assert link.stiffness[2, 2] == pytest.approx(G * J / length, rel=error)
+    stretch = link.stiffness[5, 5] * length / (E * A)
+    assert 1 - error < stretch < 1.01 + error
+
+
+def test_a_slender_bar_lies_where_its_surface_does():
+    """Turned and moved: its volume, and its ends on the interfaces."""
+    turn = rotation_matrix(np.array([0.3, -0.7, 1.1]))
+    shift = np.array([0.2, -0.1, 0.4])
+    for made, area in ((box(0.002, 0.005, 0.4), 1e-5), (tube(0.01, 0.0097, 0.4), None)):
+        surface = check_surface(made.points @ turn.T + shift, made.triangles, "bar")
+        base = Interface("plane", shift, turn[:, 2], np.inf)
+        tip = Interface("plane", shift + 0.4 * turn[:, 2], -turn[:, 2], np.inf)
+        solid = slender_bar(surface, base, tip)
+        for patch, interface in ((0, base), (1, tip)):
+            corners = solid.points[solid.faces[solid.patch == patch]]
+            assert interface.distance(corners).max() < 1e-12
+        middle = shift + 0.2 * turn[:, 2]
+        np.testing.assert_allclose(solid.points.mean(axis=0), middle, atol=1e-9)
+        assert (solid.volumes() > 0).all()
+        volume = surface.volume if area is None else area * 0.4
+        assert solid.volumes().sum() == pytest.approx(volume, rel=0.03)
+
+
+def test_other_parts_are_left_to_the_mesher():
+    """A stubby bar, a tapered one, and one that a disc holds in its middle only."""
+    stubby = check_surface(*cylinder(0.02, 0.1), "bar")
+    assert slender_bar(stubby, *ends(0.1)) is None
+    tapered = check_surface(*cylinder(1e-3, 1.0, 32, 0.8e-3), "taper")
+    assert slender_bar(tapered, *ends(1.0)) is None
+    assert slender_bar(tube(0.01, 0.008, 0.2), *ends(0.2)) is None
+    square = box(0.002, 0.005, 0.4)
+    assert slender_bar(square, *ends(0.4)) is not None
+    side = parse_interface("x=0.001")
+    assert slender_bar(square, parse_interface("z=0"), side) is None

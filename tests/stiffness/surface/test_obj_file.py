@@ -1,0 +1,95 @@
+"""OBJ files as programs write them."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.obj_file import read_obj
+from stiffness.surface.surface import read_surface
+
+CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
+SIDES = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3),
+         (2, 4, 8, 6)]  # fmt: skip
+POINTS = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+
+
+def cube(corner="{k}", line="f {corners}\n"):
+    """A cube of 0.1 m, each corner of a face written as stated."""
+    faces = [" ".join(corner.format(k=k, n=k - 9) for k in side) for side in SIDES]
+    return POINTS + "".join(line.format(corners=corners) for corners in faces)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        cube(),
+        cube("{k}/{k}"),
+        cube("{k}//"),
+        cube("{k}/"),
+        cube("{k}//{k}"),
+        cube("{k}/7/99"),
+        cube("{n}"),
+        cube().replace("f ", "f \\\n"),
+        cube().replace("\n", "\r\n"),
+        "# made by hand\nmtllib none.mtl\n" + cube(line="s 1\nf {corners} # f\n"),
+        cube().replace("v ", "V ").replace("f ", "F "),
+        cube()[:-1],
+    ],
+    ids=[
+        "plain", "absent texture", "double slash", "slash", "absent normals",
+        "absent both", "from the end", "continued", "CRLF", "comments", "capitals",
+        "no last line end",
+    ],
+)  # fmt: skip
+def test_every_way_to_name_a_corner_gives_the_same_cube(tmp_path, content):
+    path = tmp_path / "cube.obj"
+    path.write_bytes(content.encode())
+    points, faces = read_obj(path)
+    np.testing.assert_array_equal(points, CORNERS)
+    assert faces == [[k - 1 for k in side] for side in SIDES]
+
+
+def test_faces_that_name_absent_texture_coordinates_are_read(tmp_path):
+    """VTK's reader dies of them; 1e-3 m^3."""
+    path = tmp_path / "cube.obj"
+    path.write_text(cube("{k}/{k}"))
+    assert read_surface(path).volume == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
+    """An L of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
+    outline = [(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]
+    lines = [f"v {x} {y} {z}" for z in (0, 0.02) for x, y in outline]
+    lines += ["f 6 5 4 3 2 1", "f 7 8 9 10 11 12"]
+    for k in range(1, 7):
+        lines.append(f"f {k} {k % 6 + 1} {k % 6 + 7} {k + 6}")
+    path = tmp_path / "angle.obj"
+    path.write_text("\n".join(lines))
+    assert read_surface(path).volume == pytest.approx(1.28e-4, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("f 1 2 9", r"cube.obj:9: found a face of point 9, expected 1 to 8"),
+        ("f 1 2 0", r"cube.obj:9: found a face of point 0, expected 1 to 8"),
+        ("f -9 2 3", r"cube.obj:9: found a face of point 0, expected 1 to 8"),
+        ("f 1 2", r"cube.obj:9: found a face of 2 points"),
+        ("f 1 2 x", r"cube.obj:9: found 'f 1 2 x', expected f with numbers"),
+        ("v 1 2", r"cube.obj:9: found 'v 1 2', expected v X Y Z"),
+        ("v 1 2 z", r"cube.obj:9: found 'v 1 2 z', expected v X Y Z"),
+        ("f 1 2 400000000", r"found a face of point 400000000, expected 1 to 8"),
+    ],
+)
+def test_a_line_that_is_not_proper_is_refused_with_its_number(tmp_path, line, message):
+    path = tmp_path / "cube.obj"
+    path.write_text(POINTS + line + "\n")
+    with pytest.raises(BadInput, match=message):
+        read_surface(path)
+
+
+def test_a_file_without_faces_is_refused(tmp_path):
+    path = tmp_path / "points.obj"
+    path.write_text(POINTS)
+    with pytest.raises(BadInput, match="holds no triangles, or is not OBJ"):
+        read_surface(path)

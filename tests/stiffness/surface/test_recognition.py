@@ -1,0 +1,100 @@
+"""Shapes that meet tangentially, and flat faces that are none of them."""
+
+import numpy as np
+import pytest
+
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import find_patches
+from stiffness.surface.primitives import Cone, Plane, Torus
+from stiffness.surface.surface import check_surface
+from stiffness.surface.true_surface import TrueSurface
+from tests.solids_for_tests import cylinder, fillet_profile, rounded_block
+
+ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")
+
+
+def filleted_plate(fillet=0.006, corner=0.025, steps=6):
+    """200 x 300 x 12 mm, a fillet around its foot, which meets the round corners."""
+    profile = fillet_profile(fillet, 0.012, steps)
+    return rounded_block((0.1, 0.15), corner, profile, 2 * steps)
+
+
+def volume_of(fillet=0.006, corner=0.025):
+    """[m^3] of the plate: outline's area integrated over the height."""
+
+    def area(inset):
+        a, b, r = 0.2 - 2 * inset, 0.3 - 2 * inset, corner - inset
+        return a * b - (4 - np.pi) * r**2
+
+    z = np.linspace(0, fillet, 20001)
+    inset = fillet - np.sqrt(fillet**2 - (fillet - z) ** 2)
+    return float(np.trapezoid(area(inset), z) + area(0.0) * (0.012 - fillet))
+
+
+@pytest.mark.parametrize("fillet", [0.002, 0.006])
+@pytest.mark.parametrize("steps", [4, 6])
+def test_fillets_around_rounded_corners_are_cylinders_and_tori(fillet, steps):
+    """Four of each, and four upright cylinders, of the radii it was made with."""
+    patches = find_patches(filleted_plate(fillet, 0.025, steps), *ENDS)
+    kinds = [type(shape) for shape in patches.shapes]
+    assert (kinds.count(Plane), kinds.count(Cone), kinds.count(Torus)) == (6, 8, 4)
+    radii = sorted(s.radius for s in patches.shapes if isinstance(s, Cone))
+    assert radii == pytest.approx([fillet] * 4 + [0.025] * 4, rel=1e-6)
+    for shape in patches.shapes:
+        if isinstance(shape, Torus):
+            assert (shape.radius, shape.tube) == pytest.approx((0.025 - fillet, fillet))
+
+
+def test_the_volume_of_a_filleted_plate_is_that_of_its_true_shapes():
+    """Against the integral over its height; the facets lack 0.1 % of it."""
+    surface = filleted_plate()
+    true = TrueSurface(surface, find_patches(surface, *ENDS))
+    assert surface.volume < 0.9995 * volume_of()
+    assert true.volume == pytest.approx(volume_of(), rel=2e-6)
+    assert true.unsure_volume == 0.0
+
+
+def test_the_volume_of_a_faceted_cylinder_is_the_cylinders():
+    surface = check_surface(*cylinder(0.02, 0.1, 32), "bar")
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    true = TrueSurface(surface, find_patches(surface, *faces))
+    assert true.volume == pytest.approx(np.pi * 0.02**2 * 0.1, rel=5e-5)
+
+
+def chamfered(width, flat, drop):
+    """A bar along z whose top has two flat chamfers: four corners are on a circle."""
+    half = width / 2
+    outline = np.array([
+        [-half, -half], [half, -half], [half, half - drop],
+        [flat / 2, half], [-flat / 2, half], [-half, half - drop],
+    ])  # fmt: skip
+    count = len(outline)
+    points = np.concatenate([np.insert(outline, 2, z, axis=1) for z in (0, 0.1)])
+    i, j = np.arange(count), (np.arange(count) + 1) % count
+    fan = np.arange(1, count - 1)
+    triangles = np.concatenate([
+        np.column_stack([i, j, j + count]), np.column_stack([i, j + count, i + count]),
+        np.column_stack([0 * fan, fan + 1, fan]),
+        np.column_stack([0 * fan, fan, fan + 1]) + count,
+    ])  # fmt: skip
+    return check_surface(points, triangles, "chamfered bar")
+
+
+@pytest.mark.parametrize("flat", [0.02, 0.03, 0.036])
+def test_flat_chamfers_stay_flat(flat):
+    """Chamfers of 20 degrees on both sides of a flat top are no cylinder."""
+    drop = np.tan(np.radians(20)) * (0.04 - flat) / 2
+    surface = chamfered(0.04, flat, drop)
+    faces = parse_interface("z=0"), parse_interface("z=0.1")
+    patches = find_patches(surface, *faces)
+    assert all(isinstance(shape, Plane) for shape in patches.shapes)
+    assert len(patches.shapes) == 8
+
+
+def test_a_plate_between_fillets_is_flat_and_not_bulged():
+    """The side of two triangles, 150 x 6 mm, meets fillets on three of its edges."""
+    surface = filleted_plate()
+    true = TrueSurface(surface, find_patches(surface, *ENDS))
+    middle = np.array([[0.01, 0.15, 0.009], [0.0, -0.15, 0.008]])
+    outward = np.array([[0, 1.0, 0], [0, -1.0, 0]])
+    assert true.outside(middle, outward) == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,35 @@
+"""A stepped shaft with a fillet: its shapes are those it was turned with, no others."""
+
+import pytest
+
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import find_patches
+from stiffness.surface.primitives import Cone, Plane, Torus
+from stiffness.surface.surface import check_surface
+from tests.solids_for_tests import shouldered_shaft
+
+
+@pytest.mark.parametrize(("around", "rows"), [(36, 6), (48, 8), (48, 12)])
+def test_a_shoulder_and_the_first_row_of_its_fillet_are_no_torus(around, rows):
+    """Radii 15 and 10 mm, fillet 2 mm: three planes, two cylinders and one torus.
+
+    Three coaxial circles of corners always lie on a torus; here the shoulder's two and
+    the next one did, and the fillet ended in an inner edge.
+    """
+    points, triangles = shouldered_shaft(0.015, 0.010, 0.002, around, rows)
+    surface = check_surface(points, triangles, "shaft")
+    patches = find_patches(surface, *map(parse_interface, ("z=0", "z=0.12")))
+    kinds = sorted(type(shape).__name__ for shape in patches.shapes)
+    assert kinds == ["Cone", "Cone", "Plane", "Plane", "Plane", "Torus"]
+    for number, shape in enumerate(patches.shapes):
+        corners = surface.points[surface.triangles[patches.patch == number]]
+        low, high = corners[..., 2].min(), corners[..., 2].max()
+        if isinstance(shape, Torus):
+            assert (shape.radius, shape.tube) == pytest.approx((0.012, 0.002), rel=1e-6)
+            assert (low, high) == pytest.approx((0.05, 0.052), abs=1e-9)
+        elif isinstance(shape, Cone):
+            radius = 0.015 if low < 0.05 else 0.010
+            assert (shape.radius, shape.slope) == pytest.approx((radius, 0), abs=1e-9)
+        else:
+            assert isinstance(shape, Plane)
+            assert high - low < 1e-9

@@ -1,0 +1,129 @@
+"""STL files as programs write them, and as they are damaged."""
+
+import re
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.surface.stl_file import read_stl
+from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
+
+CORNERS = CUBE[CUBE_TRIANGLES]  # (12, 3, 3)
+
+
+def text_of(corners):
+    """An STL file of words, after the description of 3D Systems (1988)."""
+    lines = ["solid cube"]
+    for facet in corners:
+        lines += [" facet normal 0 0 0", "  outer loop"]
+        lines += ["   vertex " + " ".join(map(repr, map(float, p))) for p in facet]
+        lines += ["  endloop", " endfacet"]
+    return "\n".join([*lines, "endsolid cube", ""])
+
+
+def binary_of(corners, head=b"cube", count=None):
+    """A binary STL file: 80 bytes, the number of triangles, 50 bytes each."""
+    count = len(corners) if count is None else count
+    body = b"".join(
+        bytes(12) + facet.astype("<f4").tobytes() + bytes(2) for facet in corners
+    )
+    return head.ljust(80) + count.to_bytes(4, "little") + body
+
+
+TEXT, BINARY = text_of(CORNERS).encode(), binary_of(CORNERS)
+
+
+def read(tmp_path, content):
+    path = tmp_path / "cube.stl"
+    path.write_bytes(content)
+    points, triangles = read_stl(path)
+    return points[triangles]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        TEXT,
+        TEXT.upper(),
+        TEXT.replace(b"\n", b"\r\n"),
+        TEXT.replace(b"\n", b"\r"),
+        TEXT.replace(b"\n", b" "),
+        b"\xef\xbb\xbf" + TEXT,
+        TEXT[: TEXT.index(b"endsolid")],
+        TEXT[: TEXT.index(b"endsolid") + 5],
+        TEXT[: TEXT.rindex(b"endfacet") + 4],
+        TEXT[: TEXT.rindex(b"endloop")],
+        TEXT.replace(b"solid cube", b"solid vertex 1 2 3 facet"),
+        TEXT.replace(b"endsolid cube\n", b"endsolid cube\nsolid more\nendsolid more"),
+    ],
+    ids=[
+        "as described", "capitals", "CRLF", "CR", "one line", "byte order mark",
+        "no last line", "last line cut", "last facet's end cut", "last loop open",
+        "name of keywords", "several solids",
+    ],
+)  # fmt: skip
+def test_text_as_programs_write_it_is_read_exactly(tmp_path, content):
+    """Double precision: what the text says, to the last bit."""
+    np.testing.assert_array_equal(read(tmp_path, content), CORNERS)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        BINARY,
+        binary_of(CORNERS, head=b"solid cube"),
+        BINARY + bytes(37),
+        BINARY + b"written by a scanner, vertex and all",
+        binary_of(CORNERS, count=0),
+        binary_of(CORNERS, count=2**32 - 1),
+        BINARY[:-2],
+    ],
+    ids=[
+        "as described", "head of text", "zeros behind", "text behind", "no count",
+        "count of -1", "last tag cut",
+    ],
+)  # fmt: skip
+def test_binary_as_programs_write_it_is_read(tmp_path, content):
+    """Single precision, as the format is."""
+    found = read(tmp_path, content)
+    np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (BINARY[:-60], "found 10 whole triangles, expected 12"),
+        (b"no stl at all", "not a readable STL file"),
+        (b"solid cube\nendsolid cube\n", "holds no triangles, or is not STL"),
+        (TEXT[: TEXT.rindex(b"vertex")], "facet 12: found 2 vertices, expected 3; the"),
+        (TEXT.replace(b"  endloop\n", b"vertex 1 1 1\n", 1), "facet 1: found 4 vertic"),
+        (TEXT.replace(b" facet", b" faces", 1), "before the first facet: found 3"),
+        (TEXT.replace(b"0.1", b"0,1", 1), 'facet 1: found "0,1", expected a coord'),
+        (
+            TEXT[: TEXT.rindex(b"\n", 0, TEXT.rindex(b"endloop")) - 4],
+            "facet 12: the file",
+        ),
+        (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is cut"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_its_facet(tmp_path, content, message):
+    with pytest.raises(BadInput, match=re.escape(message).replace('"', "['\"]")) as no:
+        read(tmp_path, content)
+    assert "cube.stl" in str(no.value)
+
+
+def test_no_bytes_do_more_than_refuse(tmp_path, rng):
+    """500 files with bytes changed, cut out or missing at the end."""
+    for number in range(500):
+        content = bytearray(TEXT if number % 2 else BINARY)
+        if number % 3:
+            for place in rng.integers(0, len(content), 8):
+                content[place] = rng.integers(256)
+        else:
+            first, last = np.sort(rng.integers(0, len(content), 2))
+            del content[first:last]
+        try:
+            assert read(tmp_path, bytes(content)).shape[1:] == (3, 3)
+        except BadInput:
+            continue

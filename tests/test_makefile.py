@@ -1,0 +1,48 @@
+"""The environment that `make` sets up belongs to the Python that is named."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+OWN = "{}.{}".format(*sys.version_info[:2])
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
+
+
+def commands(folder, stamp):
+    """What `make test` would do with an environment that has this stamp."""
+    for name in ("Makefile", "pyproject.toml"):
+        shutil.copy(ROOT / name, folder)
+    (folder / ".venv").mkdir()
+    (folder / ".venv" / stamp).touch()
+    return subprocess.run(
+        ["make", "-n", "test", f"PYTHON={sys.executable}"],
+        capture_output=True, text=True, cwd=folder, check=True,
+    ).stdout  # fmt: skip
+
+
+@pytest.mark.parametrize("stamp", ["ready", "ready-3.9", "unfinished"])
+def test_an_environment_of_another_python_is_made_anew(tmp_path, stamp):
+    assert f"{sys.executable} -m venv --clear .venv" in commands(tmp_path, stamp)
+
+
+def test_the_environment_of_the_same_python_is_kept(tmp_path):
+    found = commands(tmp_path, f"ready-{OWN}")
+    assert "venv --clear" not in found
+    assert "pytest" in found
+
+
+@pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
+def test_the_newest_python_is_one_that_pyproject_names_and_runs():
+    found = subprocess.run(
+        ["sh", ".ci/newest_python"], capture_output=True, text=True, cwd=ROOT,
+        check=True,
+    ).stdout.strip()  # fmt: skip
+    said = subprocess.run([found, "--version"], capture_output=True, text=True,
+                          check=True).stdout  # fmt: skip
+    version = said.split()[1].rpartition(".")[0]
+    named = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert found == "python3" or f"Python :: {version}" in named

@@ -1,0 +1,119 @@
+"""The smallest changes that a cross-check notices: two bars on one line by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import Clearance
+from tests.robots_for_tests import coaxial_beams
+from validation.crosscheck import crosscheck
+from validation.crosscheck.clearance_metric import TOLERANCE, ClearanceMetric
+from validation.crosscheck.limits import LIMIT_TOLERANCE
+from validation.crosscheck.pair import Pair, scaled
+from validation.crosscheck.pose_metric import PoseMetric
+from validation.crosscheck.resolution import resolution_text, resolutions
+
+ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
+
+
+def bars(clearance=CLEARANCE):
+    """Two bars that lack 0.4 mm on the x axis, and a disc of 0.1 mm where they meet."""
+    play = Clearance(radial=clearance) if clearance else None
+    gap = [0, 0, 0, ERROR, 0, 0]
+    return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=play))
+
+
+def found(posture, metric):
+    """By name, with the linear model in the simulation's place: it is not asked."""
+    simulated = SimpleNamespace(held=False)
+    pairs = tuple(
+        Pair(s, solve_assembly(scaled(posture, s)), simulated, None) for s in (1.0, 0.5)
+    )
+    compared = metric(posture.robot, pairs)
+    nothing = np.zeros(6), np.zeros(3)
+    return {r.name: r for r in resolutions(posture, pairs, compared, *nothing)}
+
+
+def with_clearances(robot, pairs):
+    return ClearanceMetric(robot, pairs, True)
+
+
+def without(robot, pairs):
+    return PoseMetric(robot, pairs, True, False)
+
+
+def test_a_clearance_is_noticed_by_the_energy_that_it_saves():
+    """E = k (e - c)^2 / 4: a share d of c changes it by 2 c d / (e - c)."""
+    by_name = found(bars(), with_clearances)
+    (clearance,) = (r for r in by_name.values() if r.kind == "clearance")
+    expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * CLEARANCE)
+    assert clearance.smallest == pytest.approx(expected, rel=0.02)
+    assert clearance.by == "energy"
+    assert (clearance.value, clearance.unproved) == (CLEARANCE, False)
+
+
+def test_an_error_is_noticed_by_the_energy_that_it_costs():
+    """A share d of e changes E by 2 e d / (e - c)."""
+    (error,) = (r for r in found(bars(), with_clearances).values() if r.kind == "error")
+    expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * ERROR)
+    assert error.smallest == pytest.approx(expected, rel=0.02)
+
+
+def test_a_bar_is_noticed_by_half_of_what_it_gives_way():
+    """Of two equal springs in a row one makes half the energy: 2 b for the bound b."""
+    for clearance, metric, bound in (
+        (CLEARANCE, with_clearances, TOLERANCE),
+        (None, without, LIMIT_TOLERANCE),
+    ):
+        links = [r for r in found(bars(clearance), metric).values() if r.kind == "link"]
+        assert len(links) == 2
+        for link in links:
+            assert link.smallest == pytest.approx(2 * bound, rel=0.02)
+
+
+def test_what_no_load_reaches_is_unproved_and_said_to_be():
+    """The bars are pulled along x: a clearance of 20 um along z changes nothing."""
+    frames = [
+        f if f.clearance is None
+        else replace(f, clearance=replace(f.clearance, axial=2e-5))
+        for f in bars().robot.frames
+    ]  # fmt: skip
+    posture = replace(bars(), robot=replace(bars().robot, frames=tuple(frames)))
+    by_name = found(posture, with_clearances)
+    (axial,) = (r for name, r in by_name.items() if name.endswith(".axial"))
+    assert axial.unproved
+    (line,) = (x for x in resolution_text(list(by_name.values())) if "unproved" in x)
+    assert axial.name in line
+    assert f"1 of {len(by_name)} numbers" in line
+
+
+@pytest.mark.slow
+@pytest.mark.exudyn
+@pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
+def test_a_simulation_with_a_wrong_clearance_is_told_beyond_what_is_noticed(
+    monkeypatch, share, passed
+):
+    """Half of the smallest change passes, twice of it fails: by Exudyn's contact."""
+    posture = bars()
+    right = crosscheck.crosscheck(posture, clearances=True)
+    (clearance,) = (r for r in right.resolutions if r.kind == "clearance")
+    more = 1.0 + share * clearance.smallest
+    simulate = crosscheck.simulate_assembly
+
+    def wrong(given, *arguments, **options):
+        frames = tuple(
+            f if f.clearance is None
+            else replace(f, clearance=Clearance(radial=more * f.clearance.radial))
+            for f in given.robot.frames
+        )  # fmt: skip
+        robot = replace(given.robot, frames=frames)
+        return simulate(replace(given, robot=robot), *arguments, **options)
+
+    monkeypatch.setattr(crosscheck, "simulate_assembly", wrong)
+    check = crosscheck.crosscheck(posture, clearances=True)
+    assert right.passed, right.text()
+    assert check.passed == passed, check.text()

@@ -1,0 +1,59 @@
+"""Scale of the noise, and blunders."""
+
+import numpy as np
+import pytest
+
+from validation.diagnosis.noise import (
+    findings,
+    good_readings,
+    scale,
+    scatter_of_repeats,
+)
+
+
+def test_blunders_are_told_from_noise():
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=600)
+    z[[5, 77, 300]] += [40.0, -25.0, 12.0]
+    good = good_readings(z**2)
+    assert set(np.flatnonzero(good < 0.5)) == {5, 77, 300}
+
+
+def test_noise_alone_hardly_has_blunders():
+    rng = np.random.default_rng(1)
+    called = [
+        (good_readings(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
+    ]
+    # beyond 4.4 sigma lies one reading in 80 000: one campaign of 600 in 130
+    assert np.mean(called) < 0.03
+
+
+def test_many_readings_far_off_are_no_blunders():
+    z = np.random.default_rng(2).normal(size=600)
+    z[:60] += 30.0
+    assert (good_readings(z**2) == 1).all()
+
+
+@pytest.mark.parametrize("true", [0.5, 1.0, 3.0])
+def test_scale_follows_what_is_left(true):
+    z = true * np.random.default_rng(3).normal(size=2000)
+    tau, std = scale(float(z @ z), 2000)
+    assert tau == pytest.approx(true, rel=0.05)
+    assert abs(tau - true) < 4 * std
+
+
+def test_repeats_scatter_by_their_own_mean():
+    z = np.array([1.0, 3.0, 10.0, 10.0, 7.0])
+    rms, freedom = scatter_of_repeats(z, np.array([4, 4, 2, 2, 9]))
+    assert freedom == 2
+    assert rms == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("tau", "repeats", "told"), [
+    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["left"]), (0.4, (0.5, 40), ["left"]),
+    (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
+])  # fmt: skip
+def test_noise_is_told_of_where_it_is_not_as_stated(tau, repeats, told):
+    found = findings(tau, 0.03, repeats, memory=False)
+    assert len(found) == len(told)
+    assert all(word in one for word, one in zip(told, found, strict=True))

@@ -1,0 +1,54 @@
+"""Sizes at which readings are likeliest, against a search over the density."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import multivariate_t
+
+from validation.diagnosis.gaussian import size_cost
+from validation.diagnosis.prior_sizes import best_sizes
+
+
+def _case(seed=1):
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(60, 12)) / np.sqrt(60)
+    group = np.repeat([0, 1], [8, 4])
+    x = np.where(group == 0, 5.0, 30.0) * rng.normal(size=12)
+    return X, group, X @ x + rng.normal(size=60)
+
+
+def test_sizes_are_where_the_density_is_largest():
+    X, group, z = _case()
+
+    def cost(logs):
+        C = np.eye(60) + (X * np.exp(2 * logs)[group]) @ X.T
+        return -multivariate_t(shape=C, df=20).logpdf(z)
+
+    expected = np.exp(minimize(cost, np.log([5.0, 30.0]), tol=1e-10).x)
+    nan, inf = np.full(12, np.nan), np.full(12, np.inf)
+    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, 20.0, group, nan, inf, {})
+    assert [found.of_group[g] for g in (0, 1)] == pytest.approx(expected, rel=0.05)
+    assert np.exp(cost(np.log(expected))) > 0
+
+
+def test_a_given_size_is_kept_and_costs_nothing():
+    X, group, z = _case()
+    given, inf = np.full(12, 2.0), np.full(12, np.inf)
+    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, 20.0, group, given, inf, {})
+    assert (found.std == 2.0).all()
+    assert found.cost == 0.0
+
+
+def test_no_size_exceeds_what_is_plausible():
+    X, group, z = _case()
+    nan, most = np.full(12, np.nan), np.full(12, 3.0)
+    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, 20.0, group, nan, most, {})
+    assert found.std.max() <= 3.0
+
+
+def test_a_chosen_size_costs_what_laplace_says():
+    # ln of the average over a range R of ln t of exp(-gamma u^2) about its maximum
+    for gamma in (1.0, 6.0):
+        u = np.linspace(-5.18, 5.18, 100001)
+        average = np.log(np.trapezoid(np.exp(-gamma * u**2), u) / 10.36)
+        assert size_cost(gamma) == pytest.approx(-average, abs=2e-3)

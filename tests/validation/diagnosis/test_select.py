@@ -1,0 +1,131 @@
+"""The search of a diagnosis, on a drive and a bar whose readings are closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.measurement.predict import with_second_order
+from tests.bar_for_tests import BEAM, LENGTH, along, bar
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.elements import Dense
+from validation.diagnosis.noise import FREEDOM
+from validation.diagnosis.search import Search
+from validation.diagnosis.select import select
+from validation.diagnosis.signatures import conditions_of
+
+ROWS = 40
+TIME = 60.0 * np.random.default_rng(0).permutation(ROWS)
+CAMPAIGN = bar(link=BEAM, rows=ROWS, spread=6.0, time=TIME)
+TURN = CAMPAIGN.coordinates[:, 0]
+ACROSS = np.cross([0, 0, 1], along(CAMPAIGN))
+
+
+@pytest.fixture(scope="module")
+def columns():
+    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+
+
+def turned(angle):
+    """(R, 6) readings of a bar whose drive stands wrong by angles (R,)."""
+    still = np.zeros((ROWS, 2))
+    return np.hstack([still, angle[:, None], LENGTH * angle[:, None] * ACROSS])
+
+
+def found(columns, readings, seed=0, *, noise=1.0):
+    """What is selected of readings (R, 6) and noise in every cell but each fourth."""
+    z = (readings / CAMPAIGN.sigma).ravel()
+    z = z + noise * np.random.default_rng(seed).normal(size=len(z))
+    cells = columns.row % 4 > 0
+    return select(columns, z[cells], cells)
+
+
+@pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
+def test_noise_teaches_nothing_whatever_sigma_was_stated(columns, noise):
+    selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
+    assert selected.hypotheses == selected.functions == ()
+    assert max(selected.probability.values(), default=0.0) < 0.1
+    assert selected.noise.tau == pytest.approx(noise, rel=0.2)
+
+
+def test_a_longer_bar_is_found_with_its_length(columns):
+    sigma = CAMPAIGN.sigma[0, 3]
+    longer = np.hstack([np.zeros((ROWS, 3)), 8 * sigma * along(CAMPAIGN)])
+    selected = found(columns, longer)
+    assert [h.effect for h in selected.hypotheses] == ["link_length"]
+    # of the 30 rows fitted every one tells the length to a sigma
+    assert selected.values[0] == pytest.approx(8 * sigma, abs=4 * sigma / 30**0.5)
+
+
+def test_waves_of_a_gear_are_found_with_their_number(columns):
+    sigma = CAMPAIGN.sigma[0, 3]
+    selected = found(columns, turned(12 * sigma * np.sin(5 * TURN + 0.4)))
+    assert selected.hypotheses == ()
+    (one,) = selected.functions
+    (part,) = one.candidate.parts
+    assert (part.where, part.components, part.variable) == ("drive", ("rz",), "q.drive")
+    assert one.candidate.shape.names == ("5.sine", "5.cosine")
+    assert one.probability > 0.9
+
+
+def test_growth_with_time_is_no_drift_of_the_reading(columns):
+    sigma = CAMPAIGN.sigma[0, 3]
+    grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
+    selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
+    assert selected.hypotheses == ()
+    assert {f.candidate.parts[0].variable for f in selected.functions} == {"time"}
+    assert selected.functions[0].candidate.parts[0].where != "reading"
+
+
+def test_blunders_are_left_out(columns):
+    sigma = CAMPAIGN.sigma[0, 3]
+    readings = np.zeros((ROWS, 6))
+    readings[[1, 10, 21], [3, 4, 3]] = 40 * sigma
+    selected = found(columns, readings)
+    assert selected.hypotheses == selected.functions == ()
+    assert (selected.weights < 0.5).sum() == 3
+
+
+def test_no_reading_is_looked_at_but_those_given(columns):
+    other = replace(CAMPAIGN, measured=np.full((ROWS, 6), 1.0))
+    same = Columns(other, with_second_order(conditions_of(other)))
+    readings = turned(np.full(ROWS, 3e-4))
+    one, two = found(columns, readings), found(same, readings)
+    assert one.models == two.models
+    assert np.array_equal(one.values, two.values)
+
+
+def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
+    rng = np.random.default_rng(4)
+    z = 5 * rng.normal(size=6 * ROWS)
+    search = Search(columns, z, np.ones(len(z), dtype=bool), np.ones(len(z)))
+    search.prepare()
+    looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
+    made = [
+        columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
+    ]
+    dense = Dense(made, search.fit.cells, search.fit.root)
+    alone = dense.gains(search.empty[-1].taken, FREEDOM)
+    together = np.array([f.worth - f.log_prior for f in looked])
+    assert len(looked) > 50
+    assert together == pytest.approx(alone, rel=1e-6)
+
+
+def test_what_readings_see_by_rounding_alone_is_no_place():
+    campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
+    measured = np.full((ROWS, 6), np.nan)
+    measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
+    campaign = replace(campaign, measured=measured)
+    known = Columns(campaign, with_second_order(conditions_of(campaign)))
+    assert (("drive", "rz", "screw"),) not in known.functions.places.names
+    assert (("tip", "tx", "screw"),) in known.functions.places.names + [
+        p for equal in known.functions.places.equal for p in equal
+    ]
+
+
+@pytest.mark.parametrize("size", [6.0, 25.0])
+def test_one_row_alone_teaches_no_function(columns, size):
+    readings = np.zeros((ROWS, 6))
+    readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
+    selected = found(columns, readings)
+    assert selected.functions == ()

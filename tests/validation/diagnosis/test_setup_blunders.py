@@ -1,0 +1,292 @@
+"""Set-up blunders of machines whose readings are known: each is found, by its column.
+
+The machine is a built-in robot whose commands, loads or readings are written down
+wrongly after it was placed and measured rightly; it has errors of its own of a
+millimetre, which no correction explains.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.robots import load_robot
+from validation.campaign.campaign import Campaign, number_rows
+from validation.diagnosis.setup_blunders import setup_blunders
+
+ROWS = 25
+POINT = np.array([0.05, 0.02, 0.1])
+DEVICE = Rotation.from_rotvec([0.3, -0.8, 1.9])  # where a device stands in the room
+SHIFT = np.array([2.0, -1.0, 0.5])
+
+
+def placed(robot, q):
+    """Coordinates and transforms of commands (R, drives)."""
+    driven = [frame.actuated for frame in robot.frames]
+    held = np.full((len(q), len(driven)), np.nan)
+    held[:, driven] = q
+    postures, _ = place_many_joints(robot, held)
+    return (
+        np.array([p.coordinates for p in postures]),
+        np.array([p.transforms for p in postures]),
+    )
+
+
+class Machine:
+    """A robot measured at random commands under random loads.
+
+    Attributes:
+        q: (R, drives) commands; loads: (R, 6).
+        points, turns: what a device sees, in its own axes.
+    """
+
+    def __init__(self, rng, name="arm6", spread=0.5, unknown=False, noise=1e-5,
+                 own=1e-3, force=100.0):  # fmt: skip
+        self.robot, self.unknown, self.noise = load_robot(name), unknown, noise
+        driven = [frame for frame in self.robot.frames if frame.actuated]
+        home = np.array([frame.position for frame in driven])
+        self.q = home + spread * rng.uniform(-1, 1, (ROWS, len(driven)))
+        self.loads = force * rng.normal(size=(ROWS, 6)) * np.repeat([0.02, 1.0], 3)
+        T, deviation = self.declared(self.q, self.loads)
+        own = own * np.sin(3 * self.q[:, :3])  # errors of its own
+        turns = Rotation.from_rotvec(deviation[:, :3]).as_matrix() @ T[:, :3, :3]
+        points = T[:, :3, 3] + T[:, :3, :3] @ POINT + deviation[:, 3:] + own
+        points += noise * rng.normal(size=points.shape)
+        R = DEVICE.as_matrix() if unknown else np.eye(3)
+        self.points = points @ R.T + (SHIFT if unknown else 0)
+        self.turns = R @ turns
+
+    def declared(self, q, loads):
+        """Platform poses, and deviations as the robot's file has them."""
+        coordinates, transforms = placed(self.robot, q)
+        posture = Posture(self.robot, coordinates, transforms, 0.0)
+        deviation = predict(as_declared(posture, loads, point=POINT)).deviation
+        return transforms[:, self.robot.index(self.robot.platform)], deviation
+
+    def campaign(self, rotations=False):
+        """What is written down, as it stands now."""
+        coordinates, transforms = placed(self.robot, self.q)
+        T = transforms[:, self.robot.index(self.robot.platform)]
+        gap = Rotation.from_matrix(self.turns @ np.swapaxes(T[:, :3, :3], 1, 2))
+        turned = gap.as_rotvec() if rotations else np.full((ROWS, 3), np.nan)
+        shift = self.points - T[:, :3, 3] - T[:, :3, :3] @ POINT
+        kinds = number_rows(coordinates)
+        return Campaign(
+            name="made up", robot=self.robot, ids=tuple(map(str, range(ROWS))),
+            coordinates=coordinates, transforms=transforms, mismatch=np.zeros(ROWS),
+            commanded="joints", loads=self.loads,
+            measured=np.hstack([turned, shift]),
+            sigma=np.tile(np.repeat([1e-5, self.noise], 3), (ROWS, 1)),
+            covariates={}, reference_point=POINT,
+            registration="unknown" if self.unknown else "known",
+            configuration=kinds, repeat=kinds,
+        )  # fmt: skip
+
+
+def found(campaign):
+    """Blunders, with conditions as the robot's file declares them."""
+    posture = Posture(campaign.robot, campaign.coordinates, campaign.transforms, 0.0)
+    conditions = as_declared(posture, campaign.loads, point=campaign.reference_point)
+    return setup_blunders(campaign, conditions)
+
+
+def said(campaign):
+    """Kinds and columns of what is found."""
+    return {(one.kind, one.columns) for one in found(campaign)}
+
+
+@pytest.mark.parametrize("unknown", [False, True])
+@pytest.mark.parametrize("joint", range(6))
+def test_joint_with_its_sign_reversed_is_named(rng, joint, unknown):
+    machine = Machine(rng, unknown=unknown)
+    machine.q[:, joint] *= -1
+    (one,) = found(machine.campaign())
+    assert (one.kind, one.columns) == ("sign", (f"q.joint{joint + 1}",))
+    assert f"q.joint{joint + 1} fits with its sign reversed" in one.sentence
+    assert one.after < 0.5 * one.before
+
+
+@pytest.mark.parametrize("joint", [1, 2, 4])
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_joint_whose_zero_is_quarter_turns_off_is_named(rng, joint, quarters):
+    machine = Machine(rng, unknown=True)
+    machine.q[:, joint] -= quarters * np.pi / 2
+    (one,) = found(machine.campaign())
+    assert (one.kind, one.columns) == ("quarter_turn", (f"q.joint{joint + 1}",))
+    assert f"with {(90, 180, -90)[quarters - 1]} degrees added" in one.sentence
+
+
+def test_zero_of_the_first_joint_cannot_be_told_from_where_the_device_stood(rng):
+    machine = Machine(rng, unknown=True, force=0.0)
+    machine.q[:, 0] += np.pi / 2
+    assert said(machine.campaign()) == set()
+    known = Machine(rng, force=0.0)
+    known.q[:, 0] += np.pi / 2
+    assert said(known.campaign()) == {("quarter_turn", ("q.joint1",))}
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), (3, 5)])
+def test_exchanged_joints_are_named(rng, pair):
+    machine = Machine(rng, unknown=True)
+    machine.q[:, list(pair)] = machine.q[:, list(pair)[::-1]]
+    names = tuple(f"q.joint{k + 1}" for k in pair)
+    assert said(machine.campaign()) == {("exchanged", names)}
+
+
+def test_two_blunders_together_are_both_named(rng):
+    machine = Machine(rng, unknown=True)
+    machine.q[:, 1] *= -1
+    machine.q[:, 3] += np.pi / 2
+    expected = {("sign", ("q.joint2",)), ("quarter_turn", ("q.joint4",))}
+    assert said(machine.campaign()) == expected
+
+
+LOADS = tuple(f"load.{c}" for c in ("mx", "my", "mz", "fx", "fy", "fz"))
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind", "words"),
+    [(-1, "sign", "with their signs reversed"), (1 / 9.81, "unit", "times 9.81"),
+     (9.81, "unit", "times 0.1019"), (1e-3, "unit", "times 1000"),
+     (1e3, "unit", "times 0.001")],
+)  # fmt: skip
+def test_loads_that_are_reactions_or_in_another_unit_are_named(
+    rng, factor, kind, words
+):
+    machine = Machine(rng, force=1e3, unknown=True)
+    machine.loads = factor * machine.loads
+    (one,) = found(machine.campaign())
+    assert (one.kind, one.columns) == (kind, LOADS)
+    assert words in one.sentence
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(25.4, "times 0.03937"), (1 / 25.4, "times 25.4"), (1e3, "times 0.001"),
+     (1e-3, "times 1000")],
+)  # fmt: skip
+def test_positions_in_another_unit_are_named(rng, factor, words):
+    machine = Machine(rng, unknown=True)
+    machine.points = factor * machine.points
+    (one,) = found(machine.campaign())
+    assert (one.kind, one.columns) == ("unit", ("meas.tx", "meas.ty", "meas.tz"))
+    assert f"{words}, as positions" in one.sentence
+
+
+ROTATIONS = ("meas.rx", "meas.ry", "meas.rz")
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "words"),
+    [
+        (lambda R: R.inv(), "transposed", "transposed, as orientations"),
+        # a file of x y z w, read as w x y z: w, x, y, z become x, y, z, w
+        (lambda R: Rotation.from_quat(R.as_quat()[:, [1, 2, 3, 0]]),
+         "quaternion", "w taken last, not first"),
+        (lambda R: Rotation.from_quat(R.as_quat()[:, [3, 0, 1, 2]]),
+         "quaternion", "w taken first, not last"),
+    ],
+)  # fmt: skip
+def test_rotations_that_were_misread_are_named(rng, change, kind, words):
+    machine = Machine(rng)
+    machine.turns = change(Rotation.from_matrix(machine.turns)).as_matrix()
+    (one,) = found(machine.campaign(rotations=True))
+    assert (one.kind, one.columns) == (kind, ROTATIONS)
+    assert words in one.sentence
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["arm6", "3rrr", *(pytest.param(n, marks=pytest.mark.slow)
+                       for n in ("delta", "hexapod"))],
+)  # fmt: skip
+@pytest.mark.parametrize("unknown", [False, True])
+def test_machine_that_is_only_inaccurate_has_no_blunder(rng, name, unknown):
+    """Errors of a millimetre are a hundred sigma, and no blunder."""
+    machine = Machine(rng, name, spread=0.005, unknown=unknown)
+    assert said(machine.campaign(rotations=True)) == set()
+
+
+@pytest.mark.slow
+def test_drives_of_a_closed_chain_are_named(rng):
+    """A Delta whose second drive was written down reversed."""
+    machine = Machine(rng, "delta", spread=0.05)
+    machine.q[:, 1] *= -1
+    (name,) = [f"q.{f.name}" for f in machine.robot.frames if f.actuated][1:2]
+    assert said(machine.campaign()) == {("sign", (name,))}
+
+
+def test_readings_of_single_blunders_do_not_hide_it(rng):
+    machine = Machine(rng)
+    machine.q[:, 2] *= -1
+    machine.points[[3, 17]] += 5.0
+    assert said(machine.campaign()) == {("sign", ("q.joint3",))}
+
+
+def test_campaign_within_its_noise_has_no_blunder(rng):
+    assert found(Machine(rng, own=0.0).campaign()) == ()
+
+
+def test_springs_that_do_not_respond_are_no_blunder_of_units(rng):
+    """The file's drives are soft, the machine is stiff: no load is in another unit."""
+    machine = Machine(rng, force=1e3)
+    T, _ = machine.declared(machine.q, machine.loads)
+    machine.points = T[:, :3, 3] + T[:, :3, :3] @ POINT
+    assert said(machine.campaign()) == set()
+
+
+def test_heights_alone_name_a_joint_where_the_device_is_known(rng):
+    machine = Machine(rng)
+    machine.q[:, 2] *= -1
+    machine.points[:, :2] = np.nan
+    assert said(machine.campaign()) == {("sign", ("q.joint3",))}
+
+
+def commanded_by_pose(machine, change):
+    """The campaign of a machine whose commanded poses are written down changed."""
+    T, _ = machine.declared(machine.q, machine.loads)
+    turns = Rotation.from_matrix(T[:, :3, :3])
+    postures, _ = place_many(machine.robot, change(T[:, :3, 3], turns))
+    campaign = machine.campaign(rotations=True)
+    given = np.array([p.transforms for p in postures])
+    nominal = given[:, machine.robot.index(machine.robot.platform)]
+    gap = Rotation.from_matrix(
+        machine.turns @ np.swapaxes(nominal[:, :3, :3], 1, 2)
+    ).as_rotvec()
+    shift = machine.points - nominal[:, :3, 3] - nominal[:, :3, :3] @ POINT
+    return replace(
+        campaign,
+        commanded="pose",
+        coordinates=np.array([p.coordinates for p in postures]),
+        transforms=given,
+        measured=np.hstack([gap, shift]),
+    )
+
+
+@pytest.mark.slow
+def test_commanded_rotations_that_were_transposed_are_named(rng):
+    machine = Machine(rng, "hexapod", spread=0.01)
+    campaign = commanded_by_pose(
+        machine, lambda p, R: np.hstack([p, R.inv().as_rotvec()])
+    )
+    expected = {("transposed", ("pose.rx", "pose.ry", "pose.rz"))}
+    assert said(campaign) == expected
+    right = commanded_by_pose(machine, lambda p, R: np.hstack([p, R.as_rotvec()]))
+    assert said(right) == set()
+
+
+@pytest.mark.slow
+def test_commanded_places_in_another_unit_are_named(rng):
+    """Inches taken for a length that is 25.4 times longer; struts have no limits."""
+    machine = Machine(rng, "hexapod", spread=0.01)
+
+    def change(p, R):
+        return np.hstack([p * 25.4, R.as_rotvec()])
+
+    (one,) = found(commanded_by_pose(machine, change))
+    assert (one.kind, one.columns) == ("unit", ("pose.tx", "pose.ty", "pose.tz"))
+    assert "times 0.03937" in one.sentence

@@ -1,0 +1,545 @@
+"""Files as devices' programs write them: every one holds the same perfect readings.
+
+The readings come from the planar arm's closed form, so a campaign made of any of these
+files has deviations that are rounding.
+"""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from forcefit.inputs.errors import BadInput
+from tests.validation.exchange.test_tracker import (
+    ANGLES,
+    SHIFT,
+    SPATIAL_ANALYZER,
+    TARGETS,
+    TURN,
+    Lab,
+    points,
+    seen,
+)
+from validation.campaign.campaign_file import read_campaign
+from validation.exchange.cells import read_sheet
+from validation.exchange.clock import parse_time
+from validation.exchange.reading import Writing
+
+
+@pytest.fixture
+def lab(tmp_path):
+    return Lab(tmp_path)
+
+
+def imported(lab, run, text, encoding="utf-8"):
+    """What the command says of an export, as JSON."""
+    lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
+    status, out, err = run(*lab.words(), "--json", "-")
+    assert status == 0, err
+    return json.loads(out)
+
+
+def refused(lab, run, text):
+    """The one line that refuses an export; nothing is written."""
+    lab.export(text)
+    status, out, err = run(*lab.words())
+    assert (status, out) == (2, "")
+    assert not (lab.folder / "campaign").exists()
+    return err.strip().splitlines()[-1]
+
+
+def assert_exact(lab, readings=None):
+    """Deviations of the campaign are rounding, and as many as given are there."""
+    campaign = read_campaign(lab.folder / "campaign")
+    assert np.nanmax(np.abs(campaign.measured[:, 3:])) < 1e-9
+    if readings is not None:
+        assert len(campaign) == readings
+
+
+def rows(names="ABC", mark=",", line=None):
+    """x, y, z [mm] of all targets, one line for each command."""
+    for k, angles in enumerate(ANGLES):
+        cells = [repr(float(x)) for n in names for x in 1e3 * seen(angles, n)]
+        yield mark.join(([line.format(k=k)] if line else []) + cells)
+
+
+LEICA = (
+    "X  [mm],Y  [mm],Z  [mm],U(95)  [mm],U(95) X  [mm],U(95) Y  [mm],U(95) Z  [mm],"
+    "Tilt  [deg],Target,Temperature  [°C],Time Stamp,OTG Applied"
+)
+LEICA_ROW = (
+    "{x!r},{y!r},{z!r},0.01,0.008,0.002,0.006,29.9,TMC 30-B #5320,22.8,"
+    "'11.10.2022 15:{k:02d}:48.043,FALSE"
+)
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16"])
+def test_leica_export_with_a_zero_uncertainty_is_read(lab, run, encoding):
+    """U(95) is two standard deviations; one shown as 0 is the device's noise."""
+    lab.targets("A", unit=None)
+    body = list(points("A", LEICA_ROW))
+    body[3] = body[3].replace(",0.002,", ",0,")
+    table = imported(lab, run, "\r\n".join([LEICA, *body]) + "\r\n", encoding)
+    assert (table["readings"], table["joined_by"]) == (13, "order")
+    assert_exact(lab, 13)
+    campaign = read_campaign(lab.folder / "campaign")
+    variance = TURN.as_matrix() ** 2 @ (np.array([4e-6, 1e-6, 3e-6]) ** 2)
+    expected = np.tile(np.sqrt(variance), (13, 1))
+    expected[3] = 1e-5
+    assert campaign.sigma[:, 3:] == pytest.approx(expected, rel=1e-9)
+    assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
+
+
+WIDE_HEADS = {
+    "prefix": ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
+    "dots": ",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"),
+    "suffix": ",".join(f"{a}_{n}" for n in "ABC" for a in "xyz"),
+    "joined": ",".join(f"{n}{a}" for n in "ABC" for a in "xyz"),
+    "numbered": ",".join(f"{a}{k}" for k in (1, 2, 3) for a in "xyz"),
+    "twice": ",".join("XYZ" * 3),
+}
+
+
+@pytest.mark.parametrize("head", WIDE_HEADS)
+def test_table_with_all_targets_in_a_row_is_read(lab, run, head):
+    table = imported(lab, run, "\n".join([WIDE_HEADS[head], *rows()]))
+    assert (table["readings"], table["rows"]) == (39, 13)
+    assert_exact(lab, 39)
+
+
+def test_wide_table_is_joined_by_the_commands_in_its_rows(lab, run):
+    head = "Point," + WIDE_HEADS["prefix"]
+    body = list(rows(line="p{k}"))
+    table = imported(lab, run, "\n".join([head, *reversed(body)]))
+    assert (table["joined_by"], table["readings"]) == ("name", 39)
+    assert_exact(lab, 39)
+
+
+@pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
+def test_rows_of_numbers_alone_are_all_targets_in_their_order(lab, run, before):
+    """A counter or a time before them is told by the targets' distances."""
+    body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
+    assert imported(lab, run, "\n".join(body))["readings"] == 39
+    assert_exact(lab, 39)
+
+
+def test_rows_without_any_reading_are_one_line(lab, run):
+    line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
+    assert "found no" in line
+
+
+def test_vicon_trajectories_are_read(lab, run):
+    """Names above merged cells, units below; a target that was hidden is missing."""
+    body = list(rows(line="{k}00,0"))
+    cells = body[4].split(",")
+    cells[2:5] = "", "", ""
+    body[4] = ",".join(cells)
+    head = ["Trajectories", "100", ",,arm:A,,,arm:B,,,arm:C,,",
+            "Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z", ",,mm" + 8 * ",mm"]  # fmt: skip
+    lab.targets(unit=None)
+    table = imported(lab, run, "\r\n".join([*head, *body]))
+    assert table["readings"] == 38
+    assert "1 readings without coordinates" in table["left_out"][0]
+    assert_exact(lab, 38)
+
+
+def test_motive_csv_is_read(lab, run):
+    """OptiTrack's: properties, then name, ID and kind of each column above the axes."""
+    head = [
+        "Format Version,1.23,Capture Frame Rate,120.0,Length Units,Millimeters",
+        "",
+        ",Type," + ",".join(["Marker"] * 9),
+        ",Name," + ",".join(f"arm:{n}" for n in "ABC" for _ in "xyz"),
+        ",ID," + ",".join(["7"] * 9),
+        ",," + ",".join(["Position"] * 9),
+        "Frame,Time (Seconds)," + ",".join("XYZ" * 3),
+    ]
+    lab.targets(unit=None)
+    table = imported(lab, run, "\n".join([*head, *rows(line="{k},0.{k}")]))
+    assert table["readings"] == 39
+    assert_exact(lab, 39)
+
+
+def test_motive_rigid_body_is_read_without_its_markers(lab, run):
+    """Its rotation is a quaternion x, y, z, w; its markers have its name too."""
+    lab.targets("A", unit=None, noise_rotation=1e-4)
+    kinds = ["Rotation"] * 4 + ["Position"] * 6
+    head = [
+        "Format Version,1.23,Length Units,Millimeters",
+        ",Type," + ",".join(["Rigid Body"] * 7 + ["Rigid Body Marker"] * 3),
+        ",Name," + ",".join(["A"] * 7 + ["A:1"] * 3),
+        ",," + ",".join(kinds),
+        "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z",
+    ]
+    body = []
+    for k, angles in enumerate(ANGLES):
+        place = 1e3 * seen(angles, "A")
+        cells = [k, 0.1 * k, *oriented(k).as_quat(), *place, *place]
+        body.append(",".join(repr(float(x)) for x in cells))
+    table = imported(lab, run, "\n".join([*head, *body]))
+    assert table["mounts"]["A"] == pytest.approx(MOUNT.as_rotvec(), abs=1e-9)
+    assert_exact(lab, 13)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit",
+     "Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit",
+     "Point Name;X_mm;Y_mm;Z_mm;Date;Time"],
+)  # fmt: skip
+def test_german_headers_and_units_after_a_slash_are_read(lab, run, head):
+    lab.targets(unit=None, decimal='","')
+    line = "p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00"
+    body = [line.replace(".", ",").replace("02,03,", "02.03.")
+            for line in points(line=line)]  # fmt: skip
+    imported(lab, run, "\n".join([head, *body]))
+    assert_exact(lab, 39)
+    times = read_campaign(lab.folder / "campaign").covariates["time"]
+    assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
+
+
+@pytest.mark.parametrize("stated", ["Units: Millimeters", "Units in mm", "unit\tmm"])
+def test_lines_before_the_header_are_passed_over_and_say_the_unit(lab, run, stated):
+    head = ["FARO CAM2 2023", "Report: robot 7", stated, "Coordinate System: World", ""]
+    lab.targets(unit=None)
+    body = points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021")
+    text = "\n".join([*head, "Name\tX\tY\tZ\tDeviation", *body])
+    assert imported(lab, run, text)["joined_by"] == "name"
+    assert_exact(lab, 39)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Point Name    X          Y          Z", "Point  X [mm]  Y [mm]  Z [mm]",
+     "Point X [mm] Y [mm] Z [mm]"],
+)  # fmt: skip
+def test_header_of_words_in_a_table_of_blanks_is_read(lab, run, head):
+    body = points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}")
+    assert imported(lab, run, "\n".join([head, *body]))["joined_by"] == "name"
+    assert_exact(lab, 39)
+
+
+def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
+    line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
+    assert 'line 1: found the unit "in", the targets file says "mm"' in line
+
+
+def test_decimal_comma_of_an_export_does_not_touch_a_table_of_commas(lab, run):
+    """The commands are parted by commas and have points."""
+    lab.targets(unit=None, decimal='","')
+    body = [
+        line.replace(".", ",") for line in points(line="p{k}::{name};{x!r};{y!r};{z!r}")
+    ]
+    imported(lab, run, "\n".join(["Point;X [mm];Y [mm];Z [mm]", *body]), "utf-8-sig")
+    assert_exact(lab, 39)
+
+
+def test_decimal_is_declared_for_each_table(lab, run):
+    text = (lab.folder / "commands.csv").read_text().replace(",", ";")
+    (lab.folder / "commands.csv").write_text(text)
+    body = [
+        line.replace(".", ",") for line in points(line="p{k}::{name};{x!r};{y!r};{z!r}")
+    ]
+    lab.targets(decimal='","')
+    assert 'decimal = { commands = "." }' in refused(lab, run, "\n".join(body))
+    lab.targets(decimal='{ export = ",", commands = "." }')
+    imported(lab, run, "\n".join(body))
+    assert_exact(lab, 39)
+
+
+def test_time_of_the_commands_reaches_the_campaign(lab, run):
+    """The export has no clock; the table of commands has one, in minutes."""
+    lab.commands([str(0.5 * k) for k in range(13)], head="id,q.one,q.two")
+    text = (lab.folder / "commands.csv").read_text().replace("time", "time [min]")
+    (lab.folder / "commands.csv").write_text(text)
+    imported(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
+    campaign = read_campaign(lab.folder / "campaign")
+    times = 30.0 * np.repeat(np.arange(13), 3)
+    assert campaign.covariates["time"] == pytest.approx(times)
+
+
+@pytest.mark.parametrize(
+    ("column", "message"),
+    [
+        ("cov.temperature [K]", None),
+        ("cov.temperature [°C]", None),
+        ("cov.humidity [%]", None),
+        ("cov.temperature [kg]", 'found the unit "kg"'),
+        ("load.fx [mm]", 'found the unit "mm"'),
+    ],
+)
+def test_units_of_commands_are_those_of_their_kind(lab, run, column, message):
+    lab.commands(range(13))
+    path = lab.folder / "commands.csv"
+    path.write_text(path.read_text().replace("time", column), encoding="utf-8")
+    text = "\n".join(points(line=SPATIAL_ANALYZER))
+    if message:
+        assert message in refused(lab, run, text)
+        return
+    imported(lab, run, text)
+    (name,) = (c for c in lab.table() if c.startswith("cov."))
+    assert name == column.split(" ")[0]
+    assert [float(x) for x in lab.table()[name]] == list(range(13))
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "", "-", "#N/A"])
+def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, nothing):
+    """Joined by order: the readings after it belong to the commands after it."""
+    lab.targets("A")
+    body = list(points("A", "A;{x!r};{y!r};{z!r}"))
+    body[6] = f"A;{nothing};{nothing};{nothing}"
+    table = imported(lab, run, "\n".join(["name;x;y;z", *body]))
+    assert (table["joined_by"], table["readings"]) == ("order", 12)
+    assert "1 readings without coordinates" in table["left_out"][0]
+    assert_exact(lab, 12)
+    assert "p6" not in lab.table()["id"]
+
+
+def test_reading_that_a_file_has_twice_is_named(lab, run):
+    body = list(points(line=SPATIAL_ANALYZER))
+    table = imported(lab, run, "\n".join([*body, body[4]]))
+    assert table["readings"] == 39
+    (line,) = table["left_out"]
+    assert 'line 40 ("Main::p1::B"): the same reading twice' in line
+
+
+def test_reading_that_is_one_too_many_is_named(lab, run):
+    """Joined by order a repeated line moves all that follow."""
+    body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
+    lab.targets("A")
+    line = refused(lab, run, "\n".join([*body[:6], body[5], *body[6:]]))
+    assert 'found 14 readings of "A" for 13 commands' in line
+    assert line.endswith("; line 7 repeats line 6")
+
+
+def test_what_is_there_twice_in_the_commands_is_named(lab, run):
+    path = lab.folder / "commands.csv"
+    text = path.read_text()
+    path.write_text(text.replace("p5", "p3"))
+    body = "\n".join(points(line=SPATIAL_ANALYZER))
+    expected = 'line 7, id: found "p3", already the label of line 5'
+    assert expected in refused(lab, run, body)
+    path.write_text(text.replace("q.two", "q.one"))
+    assert 'column "q.one" is there twice' in refused(lab, run, body)
+
+
+# -- lengths and axes that are not what they are taken for ---------------------------
+
+
+def changed(change):
+    """An export whose points, in mm, were changed."""
+    return "\n".join(points(line=SPATIAL_ANALYZER, change=lambda k, n, p: change(p)))
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (1 / 25.4, "times 25.4, as in taken for mm"),
+        (25.4, "times 0.03937, as mm taken for in"),
+        (1e-3, "times 1000, as m taken for mm"),
+        (1 / 304.8, "times 304.8, as ft taken for mm"),
+    ],
+)
+def test_lengths_of_another_unit_are_refused_with_the_factor(lab, run, factor, words):
+    line = refused(lab, run, changed(lambda p: factor * p))
+    assert f"unit: the readings fit far better {words}" in line
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_left_handed_coordinates_are_refused(lab, run, axis):
+    mirror = np.ones(3)
+    mirror[axis] = -1
+    line = refused(lab, run, changed(lambda p: mirror * p))
+    assert "left-handed: the readings fit far better with one axis reversed" in line
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p: p * [1, -1, 1], "where y is the device's -y"),
+        (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
+    ],
+)
+def test_axes_of_a_known_registration_are_named(lab, run, change, words):
+    """The base's axes stand: which one is reversed can be told."""
+    lab.targets(registration='"known"')
+
+    def base(k, name, p):
+        return change(TURN.apply(p) + SHIFT)
+
+    line = refused(lab, run, "\n".join(points(line=SPATIAL_ANALYZER, change=base)))
+    assert words in line
+
+
+def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
+    text = (lab.folder / "smr.toml").read_text()
+    head = text.split("[targets]")[0]
+    places = [f"{n} = {[1e3 * x for x in at]}" for n, at in TARGETS.items()]
+    (lab.folder / "smr.toml").write_text("\n".join([head, "[targets]", *places]))
+    line = refused(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
+    assert "0.001 times as far, all alike, as mm taken for m" in line
+
+
+def test_targets_that_are_elsewhere_are_remarked(lab, run):
+    """B was mounted 60 mm from its place: its distances are not those declared."""
+
+    def change(k, name, p):
+        turn = Rotation.from_euler("z", sum(ANGLES[k]))
+        return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
+
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
+    status, out, _ = run(*lab.words())
+    assert status == 0
+    assert "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143" in out
+
+
+def test_readings_that_do_not_follow_the_commands_are_remarked(lab, run):
+    """Joined by order, and the commands were written down in another."""
+    lab.targets("A")
+    body = list(points("A", "{x!r} {y!r} {z!r}"))
+    lab.export("\n".join(body[::2] + body[1::2]))
+    status, out, _ = run(*lab.words())
+    assert status == 0
+    assert "are they joined to the right ones?" in out
+
+
+# -- orientations ---------------------------------------------------------------------
+
+MOUNT = Rotation.from_rotvec([0.3, 0.2, -0.5])  # the target's axes on the platform
+
+
+def oriented(k, error=(0, 0, 0)):
+    """The target's axes seen from the device's, of the closed form."""
+    turned = Rotation.from_rotvec(error) * Rotation.from_euler("z", sum(ANGLES[k]))
+    return TURN.inv() * turned * MOUNT
+
+
+def oriented_rows(values, errors=((0, 0, 0),) * 13):
+    """Rows of target A with what an orientation is written as."""
+    for k, angles in enumerate(ANGLES):
+        cells = [*(1e3 * seen(angles, "A")), *values(oriented(k, errors[k]))]
+        yield ",".join(repr(float(x)) for x in cells)
+
+
+ORIENTATIONS = {
+    "quaternion": ("qw,qx,qy,qz", lambda R: np.roll(R.as_quat(), 1), {}),
+    "ros": ("orientation.x,orientation.y,orientation.z,orientation.w",
+            lambda R: R.as_quat(), {}),
+    "motive": ("Rotation X,Rotation Y,Rotation Z,Rotation W",
+               lambda R: R.as_quat(), {}),
+    "numbered": ("q0,q1,q2,q3", lambda R: -np.roll(R.as_quat(), 1), {}),
+    "moving": ("rx [deg],ry [deg],rz [deg]",
+               lambda R: R.as_euler("ZYX", degrees=True)[::-1],
+               {"orientation": '"ZYX"'}),
+    "fixed": ("roll [deg],pitch [deg],yaw [deg]",
+              lambda R: R.as_euler("xyz", degrees=True), {"orientation": '"xyz"'}),
+    "kuka": ("A [deg],B [deg],C [deg]", lambda R: R.as_euler("ZYX", degrees=True),
+             {"orientation": '"ZYX"'}),
+    "vector": ("rx,ry,rz", lambda R: R.as_rotvec(),
+               {"orientation": '"rotation_vector"', "angle_unit": '"rad"'}),
+    "proper": ("rx [rad],ry [rad],rz [rad]", lambda R: R.as_euler("ZXZ"),
+               {"orientation": '"ZXZ"'}),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:Gimbal")
+@pytest.mark.parametrize("kind", ORIENTATIONS)
+def test_orientations_become_rotations_of_the_platform(lab, run, kind):
+    """The platform stands as commanded; how the target is mounted is found."""
+    head, values, keys = ORIENTATIONS[kind]
+    lab.targets("A", noise_rotation=1e-4, **keys)
+    text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
+    table = imported(lab, run, text)
+    assert table["mounts"]["A"] == pytest.approx(MOUNT.as_rotvec(), abs=1e-9)
+    campaign = read_campaign(lab.folder / "campaign")
+    assert np.abs(campaign.measured[:, :3]).max() < 1e-9
+    assert (campaign.sigma[:, :3] == 1e-4).all()
+
+
+def test_declared_mount_gives_the_rotations_themselves(lab, run, rng):
+    head, values, _ = ORIENTATIONS["quaternion"]
+    lab.targets("A", noise_rotation=1e-4)
+    with (lab.folder / "smr.toml").open("a") as file:
+        file.write(f"[rotations]\nA = {MOUNT.as_rotvec().tolist()}\n")
+    errors = 1e-4 * rng.normal(size=(13, 3))
+    imported(lab, run, "\n".join(["X,Y,Z," + head, *oriented_rows(values, errors)]))
+    rotations = read_campaign(lab.folder / "campaign").measured[:, :3]
+    assert rotations == pytest.approx(errors, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "values", "keys", "message"),
+    [
+        ("rx [deg],ry [deg],rz [deg]", lambda R: [1, 2, 3], {},
+         "found three angles, expected their order in the targets file"),
+        ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"ZYX"'},
+         "found no unit of angles"),
+        ("qw,qx,qy,qz", lambda R: [1, 2, 3, 4], {}, "found a quaternion of norm 5.477"),
+        ("qw,qx,qy,qz", lambda R: np.roll(R.inv().as_quat(), 1), {},
+         "the orientations fit far better inverted"),
+        ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
+         "orientation: found"),
+    ],
+)  # fmt: skip
+def test_orientations_that_are_not_certain_are_refused(
+    lab, run, head, values, keys, message
+):
+    lab.targets("A", noise_rotation=1e-4, **keys)
+    text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
+    assert message in refused(lab, run, text)
+
+
+def test_orientations_are_passed_over_without_their_noise(lab, run):
+    head, values, _ = ORIENTATIONS["quaternion"]
+    lab.targets("A")
+    imported(lab, run, "\n".join(["X,Y,Z," + head, *oriented_rows(values)]))
+    assert not [name for name in lab.table() if name.startswith("meas.r")]
+
+
+def test_orientation_of_one_of_several_targets_is_the_platforms(lab, run):
+    """Wide: A has a quaternion, B and C are points."""
+    head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
+    lab.targets(noise_rotation=1e-4)
+    body = []
+    for k, angles in enumerate(ANGLES):
+        a, b, c = (1e3 * seen(angles, name) for name in "ABC")
+        turn = np.roll(oriented(k).as_quat(), 1)
+        body.append(",".join(repr(float(x)) for x in [*a, *turn, *b, *c]))
+    imported(lab, run, "\n".join([head, *body]))
+    campaign = read_campaign(lab.folder / "campaign")
+    turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)
+    assert (turned.sum(), len(campaign)) == (13, 52)
+    assert np.abs(campaign.measured[turned, :3]).max() < 1e-9
+
+
+# -- cells and clocks ---------------------------------------------------------------
+
+
+def test_cells_are_parted_by_what_most_lines_have(tmp_path):
+    """A preamble of other marks does not decide; quoted marks do not part cells."""
+    path = tmp_path / "a.txt"
+    path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
+    cells = [cells for _, cells in read_sheet(path).rows]
+    assert cells[1:] == [["p, 1", "2", "3"], ["p, 2", "4", "5"], ["p, 3", "6", "7"]]
+    path.write_text("p1 1,5 2,5 3,5\np2 1,5 2,5 4,5\n")
+    sheet = read_sheet(path, ",")
+    assert (sheet.decimal, sheet.rows[0][1]) == (",", ["p1", "1,5", "2,5", "3,5"])
+
+
+def test_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
+    with pytest.raises(BadInput, match="holds NUL"):
+        read_sheet(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("10:30:00", 37800.0), ("9:30:00 PM", 77400.0), ("10:30:00,25", 37800.25),
+        ("1.1.1970 00:01:00.123456789", 60.123456),
+    ],
+)  # fmt: skip
+def test_times_of_day_and_fractions_are_read(text, seconds):
+    assert parse_time("", text, Writing()) == seconds

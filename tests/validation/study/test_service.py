@@ -1,0 +1,184 @@
+"""A study's robot at work: load, stiffness, frequencies; maps of many axes."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+
+import forcefit as ff
+from assembly.files.robot_file import write_robot
+from assembly.report.platform_stiffness import largest_rows
+from tests.pages_for_tests import parse
+from tests.robots_for_tests import coaxial_beams
+from validation.study.report import report_page, results_table, write_study
+from validation.study.study import run_study
+from validation.study.study_file import read_study
+
+QUIET = "[checks]\npicture = false\ncrosscheck = false\nreference = false\n"
+LOAD = np.array([0.0, 0.0, 0.0, 40.0, -30.0, 0.0])
+
+
+def study_of(folder, text):
+    path = folder / "study.toml"
+    path.write_text(text + QUIET, encoding="utf-8")
+    results = run_study(read_study(path, folder / "out"))
+    write_study(results)
+    return results, parse((folder / "out" / "report.html").read_text())
+
+
+def test_two_springs_side_by_side_give_by_the_load_over_their_sum(tmp_path):
+    """400 N on 1e6 and 3e6 N/m: 0.1 mm; the errors' own 0.05 mm stay apart."""
+    write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), tmp_path / "beams.toml")
+    text = (
+        'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
+        "[service]\nload = [0, 0, 0, 400, 0, 0]\n"
+    )
+    results, page = study_of(tmp_path, text)
+    assert results.service["deflection"] == pytest.approx(
+        [0, 0, 0, 1e-4, 0, 0], abs=1e-12
+    )
+    assert results.passed
+    rows = {
+        row[0].text: row
+        for row in page.table("", "platform error with load and weight")[1:]
+    }
+    assert rows["TX"][2].value == pytest.approx(1e-4)
+    assert rows["TX"][1].value == pytest.approx(1e-4 + 2e-4 * 3 / 4)
+    table = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert table["service"]["load"] == [0, 0, 0, 400, 0, 0]
+
+
+def test_a_load_that_nothing_carries_does_not_pass(tmp_path):
+    """The platform of a single free pin turns under a moment about it."""
+    (tmp_path / "pin.toml").write_text(
+        'platform = "tip"\n[[frame]]\nname = "pin"\nparent = "base"\n'
+        'joint = "revolute"\n[[frame]]\nname = "tip"\nparent = "pin"\n'
+        "translation = [0.1, 0, 0]\ngeometric_error = [0, 0, 0, 1e-4, 0, 0]\n"
+    )
+    text = 'robot = "pin.toml"\n[service]\nload = [0, 0, 1, 0, 0, 0]\n'
+    results, _ = study_of(tmp_path, text)
+    assert results.service["status"] != "ok"
+    assert "service" in results.unchecked
+    assert not results.passed
+
+
+@pytest.fixture(scope="module")
+def five_bar(tmp_path_factory):
+    """Without clearances, so that what a load does is linear in it."""
+    folder = tmp_path_factory.mktemp("service")
+    robot = ff.load_robot("five_bar")
+    tight = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    rigid = replace(robot, frames=tight)
+    write_robot(rigid, folder / "five_bar.toml")
+    load = ", ".join(map(str, LOAD))
+    text = (
+        'robot = "five_bar.toml"\ngrid = "tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01"\n'
+        f"[service]\nload = [{load}]\nstiffness = true\n"
+    )
+    return (rigid, folder, *study_of(folder, text))
+
+
+def test_over_the_grid_a_load_moves_the_platform_by_its_compliance(five_bar):
+    """C w of K_C, whose method shares nothing with the equilibrium under load."""
+    robot, _, results, _ = five_bar
+    for tx, ty in ((-0.02, 0.13), (0.02, 0.14)):
+        posture = ff.place_robot(robot, {"tx": tx, "ty": ty})
+        expected = ff.platform_stiffness(posture).compliance @ LOAD
+        found = results.maps["deflection"].sel(tx=tx, ty=ty, method="nearest")
+        assert found.values == pytest.approx(
+            expected, abs=1e-5 * np.abs(expected).max()
+        )
+
+
+def test_maps_at_work_are_layers_rows_and_variables_of_the_file(five_bar):
+    _, folder, results, page = five_bar
+    (drawn,) = (one for one in page.figures if "layers" in one)
+    layers = {one["key"]: np.array(one["values"], float) for one in drawn["layers"]}
+    with xarray.open_dataset(folder / "out" / "results.nc") as data:
+        along = data["stiffness"].sel(wrench_component="FX").values
+        np.testing.assert_array_equal(layers["stiffness.FX"], along)
+        shift = np.linalg.norm(data["deflection"].values[..., 3:], axis=-1)
+        np.testing.assert_allclose(layers["deflection_shift"], shift, rtol=1e-12)
+    rows = {row[0].text: row for row in page.table("", "least")[1:]}
+    row = rows["stiffness along FX, the other axes free"]
+    assert [row[1].value, row[3].value] == [along.min(), along.max()]
+    assert results_table(results)["maps"]["stiffness.FX"][2] == along.max()
+
+
+def test_frequencies_at_the_pose_are_those_of_the_grid_there(tmp_path):
+    """k / m: a mass of 4 kg on 1e6 and 3e6 N/m, along each axis."""
+    robot = coaxial_beams(np.zeros(6), (1e6, 3e6))
+    write_robot(robot, tmp_path / "beams.toml")
+    file = tmp_path / "beams.toml"
+    name = 'name = "end_one"\n'
+    file.write_text(file.read_text().replace(name, f"{name}mass = 4.0\n"))
+    results, page = study_of(
+        tmp_path, 'robot = "beams.toml"\n[service]\nfrequencies = 3\n'
+    )
+    expected = np.sqrt(4e6 / 4.0) / (2 * np.pi)
+    assert results.service["frequencies"]["frequencies"] == pytest.approx(
+        [expected] * 3, rel=1e-6
+    )
+    assert page.table("mode")[1][1].value == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_grid_of_three_axes_is_drawn_where_its_largest_error_is(tmp_path):
+    text = (
+        'robot = "orthoglide"\n'
+        'grid = "tx=-0.05:0.05:0.05,ty=-0.05:0.05:0.05,tz=-0.05:0.05:0.1"\n'
+    )
+    results, page = study_of(tmp_path, text)
+    error = results.maps["translation_error"].sel(bound="upper")
+    at = np.unravel_index(int(np.nanargmax(error.values)), error.shape)
+    place = {d: float(error[d][i]) for d, i in zip(error.dims, at, strict=True)}
+    (row, *_) = page.table("", "least")[1:]
+    assert row[4].text == ", ".join(f"{d} = {v:.6g} m" for d, v in place.items())
+    (drawn,) = (one for one in page.figures if "layers" in one)
+    values = np.array(drawn["layers"][0]["values"], float)
+    np.testing.assert_array_equal(
+        values, error.sel(tz=place["tz"]).transpose("tx", "ty").values
+    )
+    assert np.nanmax(values) == row[3].value
+    assert "The grid has 3 axes: the map is drawn over tx and ty, with tz = " in (
+        report_page(results)
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("load = [1, 2]", "service.load: found [1, 2] of length 2"),
+        ("gravity = 9.81", "service.gravity: found 9.81"),
+        ("stiffness = 1", "service.stiffness: found 1, expected true or false"),
+        ("frequencies = -1", "service.frequencies: found -1, expected a whole number"),
+        ("frequencies = 2000", "service.frequencies: found 2000, expected at most"),
+        ("frequencies = 3", "service.frequencies: irsbot2: found no mass that moves"),
+        ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
+    ],
+)
+def test_every_mistake_of_service_is_one_message(tmp_path, line, message):
+    path = tmp_path / "study.toml"
+    path.write_text(f'robot = "irsbot2"\n[service]\n{line}\n')
+    with pytest.raises(ff.BadInput) as error:
+        read_study(path)
+    assert message in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_shares_in_the_chart_add_up(tmp_path):
+    """Of all twelve parts of a hexapod, not of the eight largest."""
+    _, page = study_of(tmp_path, 'robot = "hexapod"\n')
+    rows = page.table("part", "rx")[1:]
+    for column in range(1, 7):
+        total = sum(float(row[column].text) for row in rows)
+        # each is printed to 0.05 %
+        assert total == pytest.approx(100.0, abs=0.05 * len(rows))
+
+
+def test_parts_beyond_the_largest_are_one_row_of_others():
+    shares = {f"part {k}": [0.5**k] * 6 for k in range(1, 30)}
+    rows = largest_rows(shares)
+    assert list(rows)[-1] == "17 others"
+    assert np.sum(list(rows.values()), axis=0) == pytest.approx([1 - 0.5**29] * 6)

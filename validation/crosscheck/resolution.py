@@ -1,0 +1,212 @@
+"""The smallest change of each number of a robot that a cross-check would notice.
+
+A check notices a wrong number by what it changes in the linear model: each number is
+changed by a hundredth, the model is solved again, and its answer is compared with the
+unchanged one by the same metric, floors and bounds as the simulation's.  The relative
+change at which the first check reaches its bound follows in proportion.  A number whose
+change by its own size is not noticed is unproved.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.reduction import FreeMotion
+from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, MeshLink
+from assembly.solvers.conic import SolverFailed
+from stiffness.screws import SCREW
+from validation.crosscheck.clearance_metric import ClearanceMetric
+from validation.crosscheck.link_models import link_stiffness
+from validation.crosscheck.pair import (
+    Pair,
+    hold_free_motions,
+    holding_energy,
+    scaled,
+)
+from validation.crosscheck.pose_metric import PoseMetric
+
+_CHANGE = 1e-2  # relative, of a number, to see what follows
+_QUADRATIC = "optimality gap"  # grows with the square of a change
+UNPROVED = 1.0  # relative change that is not noticed
+_NAMED = 4  # numbers in a line of text
+_KINDS = ("link", "joint stiffness", "clearance", "error")
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """What of one number a cross-check would notice.
+
+    Attributes:
+        name: frame and quantity, such as ``leg1.elbow.radial``.
+        kind: link, joint stiffness, clearance or error.
+        value: of the number; 1 for a link, whose stiffness is scaled.
+        smallest: relative change that is noticed; inf if none is.
+        by: the check that notices it first.
+    """
+
+    name: str
+    kind: str
+    value: float
+    smallest: float
+    by: str = ""
+
+    @property
+    def unproved(self) -> bool:
+        """Whether even a change by its own size is not noticed."""
+        return not self.smallest < UNPROVED
+
+
+def resolutions(
+    posture: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
+    load: NDArray, gravity: NDArray,
+) -> list[Resolution]:  # fmt: skip
+    """The smallest changes that the limits of a cross-check notice.
+
+    Args:
+        posture: of the robot compared.
+        pairs: solutions at several scales, largest first.
+        metric: what is compared.
+        load: (6,) [N m, N] at scale 1.
+        gravity: (3,) [m/s^2] at scale 1.
+
+    Returns:
+        One for each link, finite entry of a joint's stiffness, clearance and component
+        of a geometric error that is not zero, in the robot's order.
+    """
+    found = []
+    for name, kind, value, frame in _changes(posture, bool(gravity.any())):
+        changed = _with_frame(posture, frame)
+        try:
+            smallest, by = _noticed(changed, pairs, metric, load, gravity)
+        except (CannotAssemble, FreeMotion, SolverFailed):
+            smallest, by = _CHANGE, "no equilibrium"
+        found.append(Resolution(name, kind, value, smallest, by))
+    return found
+
+
+def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, Frame]]:
+    """Name, kind and value of each number, and its frame with the number changed."""
+    more = 1.0 + _CHANGE
+    for frame in posture.robot.frames:
+        link = frame.link
+        if isinstance(link, BeamLink):
+            stiffer = replace(link, young=more * link.young)
+            yield f"{frame.name}.link", "link", 1.0, replace(frame, link=stiffer)
+        elif link is not None and not (weight and isinstance(link, MeshLink)):
+            K = MatrixLink(more * link_stiffness(frame))
+            yield f"{frame.name}.link", "link", 1.0, replace(frame, link=K)
+        yield from _joint_changes(frame, more)
+        clearance = frame.clearance or Clearance()
+        for key, bound in vars(clearance).items():
+            if bound:
+                larger = replace(clearance, **{key: more * bound})
+                name = f"{frame.name}.{key}"
+                yield name, "clearance", bound, replace(frame, clearance=larger)
+        for i in np.flatnonzero(frame.geometric_error).tolist():
+            error = frame.geometric_error.copy()
+            error[i] *= more
+            name = f"{frame.name}.error.{SCREW[i]}"
+            value = float(frame.geometric_error[i])
+            yield name, "error", value, replace(frame, geometric_error=error)
+
+
+def _joint_changes(
+    frame: Frame, more: float
+) -> Iterator[tuple[str, str, float, Frame]]:
+    """The finite entries of a joint's stiffness; a full matrix as a whole."""
+    K = frame.joint_stiffness
+    if K is None:
+        return
+    kind, diagonal = "joint stiffness", np.diag(K)
+    finite = np.isfinite(diagonal) & (diagonal > 0)
+    if K[~np.eye(6, dtype=bool)].any():
+        yield f"{frame.name}.K", kind, 1.0, replace(frame, joint_stiffness=more * K)
+        return
+    for i in np.flatnonzero(finite).tolist():
+        stiffer = K.copy()
+        stiffer[i, i] *= more
+        name = f"{frame.name}.K.{SCREW[i]}"
+        yield name, kind, float(diagonal[i]), replace(frame, joint_stiffness=stiffer)
+
+
+def _with_frame(posture: Posture, frame: Frame) -> Posture:
+    """The posture with one frame in the place of the one of its name."""
+    frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
+    return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
+
+
+def _noticed(
+    changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
+    load: NDArray, gravity: NDArray,
+) -> tuple[float, str]:  # fmt: skip
+    """The smallest relative change that a limit notices, and which limit."""
+    first = pairs[0]
+    if first.simulated.held:
+        changed = hold_free_motions(changed)
+    s = first.scale
+    other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
+    # the linear model is homogeneous: any second scale will do
+    compared = tuple(
+        replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
+    )
+    checks = replace(metric, pairs=compared).limits
+    smallest, by = np.inf, ""
+    for name, check in checks.items():
+        if not check.signal or not check.value > 0.0:
+            continue
+        ratio = check.bound / check.value
+        change = _CHANGE * (np.sqrt(ratio) if name == _QUADRATIC else ratio)
+        if change < smallest:
+            smallest, by = float(change), name
+    return smallest, by
+
+
+def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
+    """A solution at the first scale as a simulation's at another."""
+    ratio = pair.scale / first.scale
+    held = holding_energy(other.posture.robot, other.joint_screws)
+    energy = (other.energy - held) * ratio**2 + pair.between
+    return SimpleNamespace(
+        platform_screw=ratio * other.platform_screw,
+        energy=energy,
+        rigid_energy=energy,
+        link_screws=ratio * other.link_screws,
+        link_wrenches=ratio * other.wrenches,
+        joint_screws=ratio * other.joint_screws,
+        joint_wrenches=ratio * other.joint_wrenches,
+        clearance_screws=ratio * other.clearance_screws,
+        held=pair.simulated.held,
+    )
+
+
+def resolution_text(found: Sequence[Resolution]) -> list[str]:
+    """Lines for people: what is noticed of each kind of number, what is unproved."""
+    lines = []
+    for kind in _KINDS:
+        proved = [r for r in found if r.kind == kind and not r.unproved]
+        if proved:
+            low, high = (f(proved, key=lambda r: r.smallest) for f in (min, max))
+            lines.append(
+                f"smallest change noticed, {kind}: {_percent(low.smallest)} "
+                f"({low.name}) to {_percent(high.smallest)} ({high.name})"
+            )
+    unproved = [r.name for r in found if r.unproved]
+    if unproved:
+        more = f" and {len(unproved) - _NAMED} more" if len(unproved) > _NAMED else ""
+        lines.append(
+            f"unproved, a change by its own size would not be noticed: {len(unproved)} "
+            f"of {len(found)} numbers: {', '.join(unproved[:_NAMED])}{more}"
+        )
+    return lines
+
+
+def _percent(share: float) -> str:
+    """A share with two digits."""
+    return f"{100 * share:.2g} %"

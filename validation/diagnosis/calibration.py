@@ -1,0 +1,85 @@
+"""How often a diagnosis is right on a campaign's own design, by simulation."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.lack_of_fit import SIGNIFICANT
+from validation.diagnosis.select import select
+from validation.diagnosis.selected import Selected
+from validation.diagnosis.verdict import Kept, verdict
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How often the method is right on a campaign's own design.
+
+    Attributes:
+        campaigns: simulated, of each kind.
+        without: verdicts where nothing but noise was there.
+        with_found: verdicts where what was found was there at its fitted size.
+        right: share of the latter that named exactly the effects found.
+        false_claims: share of all that named effects that were not there.
+    """
+
+    campaigns: int
+    without: dict[str, int]
+    with_found: dict[str, int]
+    right: float
+    false_claims: float
+
+
+def calibrate(
+    diagnosis: Diagnosis, count: int, update: Callable[[int, int], None]
+) -> Calibration:
+    """Simulate campaigns on a design and search them.
+
+    To first order about the machine found: search and verdict are the diagnosis's, the
+    final fit is left out.
+
+    Args:
+        diagnosis: whose design, and whose machine.
+        count: campaigns of each kind.
+        update: told how many of all are done.
+
+    Returns:
+        The tally.
+    """
+    traced = diagnosis.traced
+    cells = traced.used[traced.columns.row]
+    best = traced.selected.states[0]
+    signal = np.zeros(int(cells.sum()))
+    signal[:] = best.fitted / np.sqrt(best.fit.weights)
+    truth = tuple(sorted(e.name for e in best.elements if e.name))
+    rng = np.random.default_rng(0)
+    tally: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
+    right = wrong = 0
+    for k in range(2 * count):
+        present = k % 2 == 1
+        z = rng.standard_normal(len(signal)) + (signal if present else 0.0)
+        decision, claimed = _decided(select(traced.columns, z, cells), len(z))
+        tally[present][decision] += 1
+        right += present and decision == "explained" and claimed == truth
+        wrong += decision == "explained" and claimed != (truth if present else ())
+        update(k + 1, 2 * count)
+    return Calibration(
+        count, dict(tally[False]), dict(tally[True]),
+        right / count if truth else float("nan"), wrong / (2 * count),
+    )  # fmt: skip
+
+
+def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
+    """The verdict on a simulated campaign."""
+    best = selected.states[0]
+    kept = Kept(
+        tuple(sorted(e.name for e in best.elements if e.name)),
+        bool(selected.functions), len(selected.prior.std) > 0,
+    )  # fmt: skip
+    freedom = max(1.0, count - selected.unknowns)
+    more = float(chi2.sf(best.sizes.squares, freedom)) < SIGNIFICANT
+    decision, claimed = verdict(selected, kept, more)
+    return decision, tuple(sorted(claimed))

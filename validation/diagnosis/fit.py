@@ -1,0 +1,177 @@
+r"""The last step of a diagnosis: every unknown number of a robot fitted together.
+
+The most probable x minimises
+
+    F(x) = |(y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
+
+with f the readings of the robot that would be saved, computed by the function that
+predicts with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are
+Gauss-Newton's, with the slopes of the linear model at the robot reached; a step that
+leads up is halved.
+
+======  ==============  =========  ===================================================
+symbol  code            shape      meaning
+======  ==============  =========  ===================================================
+y       ``measured``    (n,)       readings of the fitted cells
+A       ``A``           (n, k)     slopes over sigma
+P       ``precision``   (k,)       1 / s^2
+C       ``covariance``  (k, k)     (A'A + P)^-1
+======  ==============  =========  ===================================================
+
+Sources:
+    Nocedal, Wright, Numerical Optimization, 10.3 (Gauss-Newton's method).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import lsq_linear
+
+from assembly.model.robot import Robot
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.prediction import residual_of
+from validation.diagnosis.unknowns import Acting, Unknowns
+
+_STEPS = 20
+_SLOPES = 6  # steps for which slopes are computed again
+_SHORTEST = 1 / 64  # of a step
+_SETTLED = 1e-3  # decrease of F that is none; F counts squared standard deviations
+_NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no answer
+
+
+@dataclass(frozen=True, eq=False)
+class MachineFit:
+    """A robot fitted to some rows of a campaign.
+
+    Attributes:
+        unknowns: what was fitted.
+        x: (k,) the most probable numbers.
+        covariance: (k, k) of their posterior, at fixed prior sizes and sigma.
+        slopes: (n, k) change of the fitted cells per unknown, over sigma.
+        residual: (n,) of the fitted cells, over sigma.
+    """
+
+    unknowns: Unknowns
+    x: NDArray
+    covariance: NDArray
+    slopes: NDArray
+    residual: NDArray
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The fitted robot, as it would be saved."""
+        return self.unknowns.robot_at(self.x)
+
+    def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
+        """(k,) values, (k, k) covariance and (n, k) slopes of one effect's unknowns."""
+        places = zip(self.unknowns.parts, self.unknowns.slices, strict=True)
+        own = next(s for one, s in places if one is part)
+        return self.x[own], self.covariance[own, own], self.slopes[:, own]
+
+    @property
+    def determined(self) -> NDArray:
+        """(k,) share of each unknown that the readings say and not its prior."""
+        std = self.unknowns.std
+        return 1.0 - np.clip(np.diag(self.covariance) / std**2, 0.0, 1.0)
+
+
+def fit_machine(
+    campaign: Campaign, unknowns: Unknowns, rows: NDArray, start: NDArray | None = None
+) -> MachineFit:
+    """Fit the unknown numbers of a robot to some rows of a campaign.
+
+    Args:
+        campaign: of R rows, whose sigma is believed.
+        unknowns: of its robot.
+        rows: (R,) bool, rows to be fitted; readings of others are not used.
+        start: (k,) where to begin; the prior's mean if absent.
+
+    Returns:
+        The fit.
+    """
+    # all rows are predicted: what a row reads may depend on commands before it
+    cells = campaign.cells & rows[:, None]
+    sigma = campaign.sigma[cells]
+
+    def residual(x: NDArray) -> NDArray:
+        left = residual_of(campaign, unknowns.robot_at(x))[cells] / sigma
+        return np.where(np.isfinite(left), left, _NO_ANSWER)
+
+    def slopes(x: NDArray) -> NDArray:
+        return unknowns.slopes(campaign, x)[cells] / sigma[:, None]
+
+    x, A, left = _minimum(unknowns, residual, slopes, start)
+    covariance = _covariance(A, unknowns.std)
+    return MachineFit(unknowns, x, covariance, A, left)
+
+
+def _minimum(
+    unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
+    slopes: Callable[[NDArray], NDArray], start: NDArray | None,
+) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
+    """(k,) most probable x, (n, k) slopes and (n,) residual there."""
+    mean, std = unknowns.mean, unknowns.std
+    lower, upper = unknowns.bounds
+    x = np.clip(mean if start is None else start, lower, upper)
+
+    def total(x: NDArray, left: NDArray) -> float:
+        return float(left @ left + np.sum(((x - mean) / std) ** 2))
+
+    left = residual(x)
+    A, F = slopes(x), total(x, left)
+    for turn in range(_STEPS):
+        if not len(x):
+            break
+        step = _step(A, left, x, (mean, std, lower, upper))
+        share = 1.0
+        while share >= _SHORTEST:
+            trial = np.clip(x + share * step, lower, upper)
+            there = residual(trial)
+            if total(trial, there) < F:
+                break
+            share /= 2
+        else:
+            break
+        gained = F - total(trial, there)
+        x, left, F = trial, there, F - gained
+        if gained < _SETTLED:
+            break
+        if turn < _SLOPES:
+            A = slopes(x)
+    return x, A, left
+
+
+def _step(
+    A: NDArray, left: NDArray, x: NDArray,
+    prior: tuple[NDArray, NDArray, NDArray, NDArray],
+) -> NDArray:  # fmt: skip
+    """(k,) Gauss-Newton step within the bounds, unknowns in units of their prior."""
+    mean, std, lower, upper = prior
+    B = A * std
+    M = B.T @ B
+    M[np.diag_indices(len(M))] += 1.0
+    L = cholesky(M, lower=True, check_finite=False)
+    wanted = B.T @ left - (x - mean) / std
+    y = solve_triangular(L, wanted, lower=True, check_finite=False)
+    step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
+    low, high = (lower - x) / std, (upper - x) / std
+    if np.any(step < low) or np.any(step > high):
+        # |L' step - y| is the same minimum, now with bounds
+        wide = high - low > 0.0
+        step = np.zeros(len(x))
+        free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")
+        step[wide] = free.x
+    return step * std
+
+
+def _covariance(A: NDArray, std: NDArray) -> NDArray:
+    """(k, k) of the posterior."""
+    B = A * std
+    M = B.T @ B
+    M[np.diag_indices(len(M))] += 1.0
+    C = np.linalg.inv(M)
+    return np.asarray(C * np.outer(std, std))

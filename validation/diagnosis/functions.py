@@ -1,0 +1,293 @@
+"""All functions that may act, scored together: places times forms of variables.
+
+A column of a function is what a component does to the readings of a row times a number
+of that row, B_(rc)q = a_rc P_rq.  So its products take one pass over the readings for
+each component at a place, and one over the rows for each number:
+
+======  ===============  ===========  ================================================
+symbol  code             shape        meaning
+======  ===============  ===========  ================================================
+a       ``answers``      (S, R, 6)    whitened change per unit of a component at a place
+W       ``squares``      (S, R)       sum of a^2 over the cells of a row
+P       ``numbers``      (R, q)       columns of all forms of a variable
+T       ``through``      (R, S, p)    sum over the cells of a row of a U
+======  ===============  ===========  ================================================
+
+    B'B = P' W P,    U'B = T' P,    B'C^-1 z = P' (sum of a C^-1 z).
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.campaign.campaign import Campaign
+from validation.diagnosis import shapes as forms
+from validation.diagnosis.candidates import (
+    Candidate,
+    CandidatePart,
+    Sensitivities,
+    in_cells,
+    variables_of,
+)
+from validation.diagnosis.elements import Element, function_element
+from validation.diagnosis.forms_tried import CandidateShape, is_angle
+from validation.diagnosis.gaussian import Taken, averaged_gains
+from validation.diagnosis.places import Places, Weighted, Where
+
+Variables = tuple[str, ...]
+Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
+_WIDEST = 36  # columns of a function of several components
+_LISTED = 2000  # functions that are ordered
+
+
+@dataclass(frozen=True)
+class Found:
+    """A function that was scored.
+
+    Attributes:
+        worth: log evidence ratio and log prior together.
+        where: number of its place.
+        variables: one or two.
+        shape: the form.
+        log_prior: of it.
+    """
+
+    worth: float
+    where: int
+    variables: Variables
+    shape: CandidateShape
+    log_prior: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """Products of one form at c places, columns scaled to norm about one."""
+
+    number: int
+    shape: int
+    where: NDArray
+    gram: NDArray
+    along: NDArray
+    most: NDArray
+    prior: float
+
+
+def _likeliest(
+    parts: Mapping[int, Sequence[_Scored]], taken: Taken, freedom: float
+) -> list[tuple[float, int, int, int]]:
+    """Worth, and which variables, form and place, of all that show; best first."""
+    worths, whose = [], []
+    for own in parts.values():
+        gains = averaged_gains(
+            np.concatenate([p.gram for p in own]),
+            np.concatenate([p.along for p in own]),
+            np.concatenate([p.most for p in own]), False, taken, freedom,
+        )  # fmt: skip
+        sizes = [len(p.where) for p in own]
+        worths.append(gains + np.repeat([p.prior for p in own], sizes))
+        numbers = np.repeat([(p.number, p.shape) for p in own], sizes, axis=0)
+        whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
+    worth, names = np.concatenate(worths), np.concatenate(whose)
+    order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
+    return [
+        (float(worth[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
+        for i in order
+    ]
+
+
+def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
+    """(c, m) root of the mean squared norm of columns, of turns and of shifts."""
+    diagonal = np.einsum("skk->sk", gram)
+    squares = np.zeros_like(diagonal)
+    for kind in (turns, ~turns):
+        mean = (diagonal * kind).sum(axis=1) / np.maximum(kind.sum(axis=1), 1)
+        squares += kind * mean[:, None]
+    return np.sqrt(squares)
+
+
+class Functions:
+    """Places, variables and forms of a campaign's functions."""
+
+    def __init__(
+        self, campaign: Campaign, sensitivities: Sensitivities, some: bool = True
+    ) -> None:
+        """List them; what does the same to the readings counts once.
+
+        Args:
+            campaign: of which commands, loads, covariates and sigma are read.
+            sensitivities: of its rows.
+            some: whether any function may act.
+        """
+        self.campaign, self.sensitivities = campaign, sensitivities
+        self.conditions = sensitivities.conditions
+        self.variables = variables_of(self.conditions) if some else []
+        self.places = Places(campaign, sensitivities)
+        self._keep()
+
+    def _keep(self) -> None:
+        """Make each answer once."""
+        self.shapes_of = cache(self._shapes_of)
+        self.prior = cache(self._prior)
+        self._numbers = cache(self._columns)
+
+    def of(self, variables: list[str]) -> "Functions":
+        """The same of some of the variables."""
+        other = copy(self)
+        other.variables = variables
+        other._keep()
+        return other
+
+    def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
+        """All forms of one variable or two, with ln of the prior at one place."""
+        if len(variables) == 1:
+            shapes = forms.every(self.conditions, variables[0], "compliance")
+        else:
+            both = forms.of_two(self.conditions, *variables)
+            shapes = [] if both is None else both[1]
+        count, places = len(self.variables), len(self.places)
+        prior = -math.log(2.0) - math.log(max(count, 1)) - math.log(max(places, 1))
+        if len(variables) > 1:
+            prior -= math.log(2.0 * max(count - 1, 1))
+        logs = forms.log_priors(shapes)
+        return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
+
+    def _prior(self, variables: Variables, shape: CandidateShape) -> float:
+        """Ln of the prior of a form of variables, at one place."""
+        known = self.shapes_of(variables)
+        return known.get(shape, min(known.values(), default=-math.inf))
+
+    def first_look(self) -> list[Asked]:
+        """Variables, and forms that show whether they count."""
+        return [
+            ((name,), tuple(forms.first(self.conditions, name)))
+            for name in self.variables
+        ]
+
+    def products(self, names: Iterable[str]) -> list[Asked]:
+        """Products of some variables with any others."""
+        asked: dict[Variables, tuple[CandidateShape, ...]] = {}
+        for name in names:
+            for other in self.variables:
+                both = None
+                if other != name:
+                    both = forms.of_two(self.conditions, name, other)
+                if both is not None and both[0] not in asked:
+                    asked[both[0]] = tuple(both[1])
+            if is_angle(self.campaign.robot, name):
+                asked[(name,)] = (forms.of_direction(name),)
+        return list(asked.items())
+
+    def look(
+        self, taken: Taken, weighted: Weighted, freedom: float,
+        asked: Sequence[Asked], most: int,
+    ) -> list[Found]:  # fmt: skip
+        """The best functions of some variables and forms beside what is known.
+
+        Args:
+            taken: what is known, and what is left, in the cells of ``weighted``.
+            weighted: places.
+            freedom: of the noise's scale.
+            asked: variables with their forms.
+            most: functions of each variable or pair.
+
+        Returns:
+            Functions, best first.
+        """
+        if not len(self.places):
+            return []
+        row, component = weighted.cells
+        count = taken.across.shape[1]
+        U = np.zeros((len(weighted.rows), 6, count))
+        U[row, component] = taken.across
+        held = np.zeros((len(weighted.rows), 6))
+        held[row, component] = taken.held
+        through = weighted.answers.transpose(1, 0, 2) @ U
+        on = np.einsum("src,rc->sr", weighted.answers, held)
+        parts: dict[int, list[_Scored]] = {}
+        for number, (variables, shapes) in enumerate(asked):
+            for one in self._blocks(number, weighted, variables, shapes, through, on):
+                parts.setdefault(one.along.shape[1], []).append(one)
+        best: list[Found] = []
+        each: dict[int, int] = {}
+        for worth, number, k, where in _likeliest(parts, taken, freedom):
+            each[number] = each.get(number, 0) + 1
+            if each[number] <= most:
+                variables, shapes = asked[number]
+                prior = self.prior(variables, shapes[k])
+                best.append(Found(worth, where, variables, shapes[k], prior))
+        return best
+
+    def _blocks(
+        self, number: int, weighted: Weighted, variables: Variables,
+        shapes: Sequence[CandidateShape], through: NDArray, on: NDArray,
+    ) -> Iterator[_Scored]:  # fmt: skip
+        """Products of all forms of variables at all places."""
+        columns = [self._numbers(variables, s)[weighted.rows] for s in shapes]
+        ends = np.cumsum([0, *(c.shape[1] for c in columns)])
+        P = np.hstack(columns)
+        S = len(weighted.answers)
+        shown = (through.reshape(len(P), -1).T @ P).reshape(S, -1, P.shape[1])
+        along = on @ P
+        for k, own in enumerate(columns):
+            part = slice(ends[k], ends[k + 1])
+            m = own.shape[1]
+            whole, cross = weighted.products((variables, shapes[k]), own)
+            prior = self.prior(variables, shapes[k])
+            for where, mem, turns in self.places.sizes:
+                c, size = mem.shape
+                if size > 1 and size * m > _WIDEST:
+                    continue
+                B = (
+                    whole[mem[:, 0]]
+                    if size == 1
+                    else self.places.joined(mem, whole, cross)
+                )
+                y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
+                b = along[mem, part].reshape(c, size * m)
+                norm = _by_kind(np.repeat(turns, m, axis=1), B)
+                scale = np.where(norm > 0, 1 / np.maximum(norm, 1e-300), 0.0)
+                left = B - y.transpose(0, 2, 1) @ y
+                left *= scale[:, :, None] * scale[:, None, :]
+                most = self.places.most[where] * norm.max(axis=1)
+                yield _Scored(number, k, where, left, b * scale, most, prior)
+
+    def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
+        """(R, q) columns of a form, falling as their prior does."""
+        columns = self.sensitivities.basis(variables, shape)[0]
+        return columns * forms.falling(shape, columns.shape[1])
+
+    def candidate(self, found: Found) -> Candidate:
+        """The function that was scored."""
+        return self._at(self.places.names[found.where], found.variables, found.shape)
+
+    @staticmethod
+    def _at(
+        place: tuple[Where, ...], variables: Variables, shape: CandidateShape
+    ) -> Candidate:
+        part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
+        return Candidate((part,), place[0][2], shape)
+
+    def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
+        """Parts of candidates at other places that do the same to the readings."""
+        if len(one.parts) > 1:
+            return []
+        part = one.parts[0]
+        own = tuple((part.where, c, one.kind) for c in part.components)
+        names = self.places.names
+        same = self.places.equal[names.index(own)] if own in names else []
+        return [self._at(p, part.variables, one.shape).parts for p in same]
+
+    def element(self, one: Candidate, log_prior: float) -> Element | None:
+        """A candidate with its columns."""
+        columns = in_cells(self.sensitivities, one, self.campaign)
+        axes = self.sensitivities.axes(one)
+        each = columns.shape[1] // sum(len(p.components) for p in one.parts)
+        fall = np.tile(forms.falling(one.shape, each), columns.shape[1] // each)
+        wheres = [(p.where, c, one.kind) for p in one.parts for c in p.components]
+        most = min(self.places.plausible(w) for w in wheres)
+        return function_element(one, columns, axes, fall, most, log_prior)

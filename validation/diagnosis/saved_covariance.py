@@ -1,0 +1,254 @@
+"""The covariance of the numbers in a saved robot file, in a file of its own.
+
+A number of the file is a geometric error, a compliance in series with a joint, a
+parameter of an effect or one of a function.  What is written is their joint posterior
+covariance, so that readings can be predicted with an interval:
+
+    covariance of readings = J C J',  J their derivatives in the numbers.
+"""
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import write_bytes
+from stiffness.screws import SCREW
+from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_error
+from validation.diagnosis.unknowns import Small, Unknowns
+
+_AXES = tuple(axis.lower() for axis in SCREW)
+ERROR, COMPLIANCE, EFFECT, FUNCTION = (
+    "geometric_error", "joint_compliance", "effect", "function",
+)  # fmt: skip
+_STEP = 1e-4  # of an unknown's standard deviation, for derivatives of the numbers
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of a robot file.
+
+    Attributes:
+        kind: one of the four at the head of this file.
+        owner: the frame, the effect, or the place of the function in the file.
+        name: the component, or the parameter.
+        session: of an effect that acts in one session alone.
+    """
+
+    kind: str
+    owner: str
+    name: str
+    session: str = ""
+
+    def of(self, robot: Robot) -> float:
+        """Its value; of a compliance what was added to the file's, which is 0."""
+        if self.kind == ERROR:
+            return float(robot.errors[robot.index(self.owner), _AXES.index(self.name)])
+        if self.kind == EFFECT:
+            effects = robot.effects
+            if self.session:
+                effects = robot.session_effects.get(self.session, {})
+            return float(effects.get(self.owner, {}).get(self.name, 0.0))
+        if self.kind == FUNCTION:
+            return float(robot.functions[int(self.owner)].parameters[self.name])
+        return 0.0
+
+    def moved(self, robot: Robot, by: float) -> Robot:
+        """The robot in which it is larger, a compliance by no less than 0."""
+        if self.kind in {ERROR, COMPLIANCE}:
+            place = np.array([robot.index(self.owner)]), _place(self.name)
+            change = with_error if self.kind == ERROR else with_compliance
+            return change(robot, *place, np.array([by]))
+        if self.kind == FUNCTION:
+            functions = list(robot.functions)
+            one = functions[int(self.owner)]
+            value = one.parameters[self.name] + by
+            functions[int(self.owner)] = replace(
+                one, parameters={**one.parameters, self.name: value}
+            )
+            return replace(robot, functions=tuple(functions))
+        effects = robot.effects
+        if self.session:
+            effects = robot.session_effects.get(self.session, {})
+        own = {**effects.get(self.owner, {}), self.name: self.of(robot) + by}
+        changed = {**effects, self.owner: own}
+        if self.session:
+            sessions = {**robot.session_effects, self.session: changed}
+            return replace(robot, session_effects=sessions)
+        return replace(robot, effects=changed)
+
+
+def _place(name: str) -> NDArray:
+    return np.array([_AXES.index(name)])
+
+
+@dataclass(frozen=True, eq=False)
+class SavedCovariance:
+    """Numbers of a robot file and their covariance.
+
+    Attributes:
+        numbers: k of them.
+        covariance: (k, k) in SI units.
+    """
+
+    numbers: tuple[Number, ...]
+    covariance: NDArray
+
+
+def covariance_of(
+    unknowns: Unknowns, x: NDArray, C: NDArray, robot: Robot
+) -> SavedCovariance:
+    """Covariance of a fitted robot's numbers.
+
+    Args:
+        unknowns: what was fitted.
+        x: (k,) their values.
+        C: (k, k) their covariance.
+        robot: as it is saved.
+
+    Returns:
+        That of the numbers of its file, to first order.
+    """
+    numbers = _numbers(unknowns, robot)
+    J = np.zeros((len(numbers), len(x)))
+    springs = {n: i for i, n in enumerate(numbers) if n.kind == COMPLIANCE}
+    small = np.zeros(len(x), dtype=bool)
+    for part, own in zip(unknowns.parts, unknowns.slices, strict=True):
+        if isinstance(part, Small) and part.name != GEOMETRY:
+            small[own] = True
+            for k, (row, axis) in enumerate(zip(part.frame, part.axis, strict=True)):
+                one = Number(COMPLIANCE, robot.frames[row].name, _AXES[axis])
+                J[springs[one], own.start + k] = 1.0
+    middle = np.array([n.of(robot) for n in numbers])
+    std = np.sqrt(np.maximum(np.diag(C), 0.0))
+    for k in np.flatnonzero(~small & (std > 0.0)).tolist():
+        moved = x.copy()
+        moved[k] += _STEP * std[k]
+        other = unknowns.robot_at(moved)
+        there = np.array([_value(n, other) for n in numbers])
+        J[:, k] = np.where(np.isfinite(there), there - middle, 0.0) / (_STEP * std[k])
+    return SavedCovariance(tuple(numbers), J @ C @ J.T)
+
+
+def _value(number: Number, robot: Robot) -> float:
+    """A number's value, NaN in a robot that lacks it."""
+    try:
+        return number.of(robot)
+    except (KeyError, IndexError):
+        return float("nan")
+
+
+def _numbers(unknowns: Unknowns, robot: Robot) -> list[Number]:
+    """Numbers of a saved robot that the unknowns change."""
+    numbers = []
+    for part in unknowns.small:
+        kind = ERROR if part.name == GEOMETRY else COMPLIANCE
+        for row, axis in zip(part.frame, part.axis, strict=True):
+            numbers.append(Number(kind, robot.frames[row].name, _AXES[axis]))
+    for one in unknowns.effects:
+        effects = robot.effects
+        if one.session is not None:
+            effects = robot.session_effects.get(one.session, {})
+        for name in effects.get(one.hypothesis.effect, {}):
+            number = Number(EFFECT, one.hypothesis.effect, name, one.session or "")
+            if number not in numbers:
+                numbers.append(number)
+    first = len(unknowns.robot.functions)
+    for k, function in enumerate(robot.functions[first:], first):
+        numbers += [Number(FUNCTION, str(k), name) for name in function.std]
+    return numbers
+
+
+def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
+    """Write a covariance as a file of arrays.
+
+    Args:
+        saved: numbers and covariance.
+        path: with the ending ``.npz``.
+
+    Raises:
+        BadInput: it cannot be written.
+    """
+    labels = [json.dumps([n.kind, n.owner, n.name, n.session]) for n in saved.numbers]
+    content = io.BytesIO()
+    np.savez_compressed(
+        content, numbers=np.array(labels, dtype=str), covariance=saved.covariance
+    )
+    write_bytes(content.getvalue(), path)
+
+
+def read_covariance(robot: Robot) -> SavedCovariance | None:
+    """The covariance that a robot file names.
+
+    Args:
+        robot: of the file.
+
+    Returns:
+        None where the file names none.
+
+    Raises:
+        BadInput: the file named is not there, or is no covariance of this robot.
+    """
+    path = robot.diagnosis.get("covariance")
+    if not path:
+        return None
+    expected = "expected the covariance that was written with the robot file"
+    try:
+        with np.load(Path(path), allow_pickle=False) as content:
+            labels = content["numbers"].tolist()
+            C = np.array(content["covariance"], dtype=float)
+        numbers = tuple(Number(*json.loads(label)) for label in labels)
+        values = [number.of(robot) for number in numbers]
+    except FileNotFoundError:
+        raise BadInput(f"{path}: no such file; {expected}") from None
+    except (OSError, ValueError, KeyError, IndexError, TypeError, zipfile.BadZipFile):
+        raise BadInput(f"{path}: found other content, {expected}") from None
+    if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
+        raise BadInput(f"{path}: found shape {C.shape}, expected {len(values)} squared")
+    return SavedCovariance(numbers, C)
+
+
+def known_covariance(robot: Robot) -> SavedCovariance:
+    """All that a robot file says of the uncertainty of its numbers.
+
+    Args:
+        robot: of the file.
+
+    Returns:
+        The covariance that the file names; of numbers that it lacks, ``tolerance`` of
+        frames and ``std`` of functions, as independent.
+
+    Raises:
+        BadInput: as :func:`read_covariance`.
+    """
+    saved = read_covariance(robot)
+    numbers = [] if saved is None else list(saved.numbers)
+    variance: list[float] = []
+    further = []
+    for frame in robot.frames:
+        for axis, sigma in zip(_AXES, _sigmas(frame.tolerance), strict=True):
+            further.append((Number(ERROR, frame.name, axis), sigma))
+    for k, function in enumerate(robot.functions):
+        further += [(Number(FUNCTION, str(k), n), s) for n, s in function.std.items()]
+    known = set(numbers)
+    for number, sigma in further:
+        if sigma > 0.0 and number not in known:
+            numbers.append(number)
+            variance.append(sigma**2)
+    first = len(numbers) - len(variance)
+    C = np.zeros((len(numbers), len(numbers)))
+    if saved is not None:
+        C[:first, :first] = saved.covariance
+    C[first:, first:] = np.diag(variance)
+    return SavedCovariance(tuple(numbers), C)
+
+
+def _sigmas(tolerance: NDArray | None) -> list[float]:
+    """Six standard deviations, 0 where nothing is said."""
+    return [0.0] * 6 if tolerance is None else tolerance.tolist()

@@ -1,0 +1,147 @@
+"""Forms in which a function may depend on one variable or two, and their priors.
+
+Every family of forms that a variable may have is as likely as any other; within it
+forms share, waves the less the more of them there are in a turn.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.variables import variable
+from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle
+
+_DEPTHS = 0.03, 0.1, 0.3, 1.0  # of a variable's range: what slips after it
+_ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
+_HIGH = 12  # waves a turn that are looked for one by one
+_CLOCKS = "time", "cov.time"
+_JUMPS, _MANY_JUMPS = 10, 91  # levels of time at which something may jump
+_ANGLE = ("0.cosine", "1.sine", "1.cosine")
+
+
+def _waves(*orders: int) -> CandidateShape:
+    names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
+    return CandidateShape("waves", names)
+
+
+def first(conditions: Conditions, name: str) -> list[CandidateShape]:
+    """Forms general enough to show whether a variable counts at all."""
+    if name == "approach":
+        return [CandidateShape("powers", ("1",))]
+    powers = CandidateShape("powers", ("0", "1", "2", "3"))
+    straight = [CandidateShape("powers", (k,)) for k in ("1", "2")]
+    if is_angle(conditions.robot, name):
+        waves = [_waves(k) for k in range(1, _HIGH + 1)]
+        return [_waves(1, 2, 3, 4), powers, *waves, *_reversals(conditions, name)]
+    steps = _steps(conditions, name, _JUMPS) if name in _CLOCKS else []
+    return [powers, *straight, *steps, *_reversals(conditions, name)]
+
+
+def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
+    """All forms of one variable."""
+    shapes = list(all_shapes(conditions, name, kind))
+    if is_angle(conditions.robot, name):
+        shapes += [_waves(k) for k in range(9, _HIGH + 1)]
+    if name in _CLOCKS:
+        shapes = [s for s in shapes if s.form != "step"]
+        shapes += _steps(conditions, name, _MANY_JUMPS)
+    more = [*first(conditions, name), *_reversals(conditions, name, _ALL_DEPTHS)]
+    return list(dict.fromkeys([*shapes, *more]))
+
+
+def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
+    """A jump at so many levels, as many rows between two as between others."""
+    x = variable(conditions, name)
+    levels = np.unique(np.quantile(x, np.linspace(0.05, 0.95, count)))
+    return [CandidateShape("step", ("size",), (("at", float(v)),)) for v in levels]
+
+
+def _reversals(
+    conditions: Conditions, name: str, depths: Sequence[float] = _DEPTHS
+) -> list[CandidateShape]:
+    """Forms that remember from where a variable came."""
+    if not name.startswith(("q.", "load.")) or name == "load.force":
+        return []
+    size = float(np.ptp(variable(conditions, name)))
+    plays = [
+        CandidateShape("play", ("size",), (("depth", depth * size),))
+        for depth in depths
+    ]
+    return [CandidateShape("reversal", ("0",)), *plays]
+
+
+def of_two(
+    conditions: Conditions, first: str, second: str
+) -> tuple[tuple[str, str], list[CandidateShape]] | None:
+    """Products of two variables, the variables in the order in which forms have them.
+
+    Returns:
+        The variables and forms; None where a product says nothing new.
+    """
+    angles = [is_angle(conditions.robot, name) for name in (first, second)]
+    if {first, second} == {"time", "cov.time"}:
+        return None
+    if all(angles):
+        pair = ("1.1.sine", "1.1.cosine", "1.-1.sine", "1.-1.cosine")
+        turned = CandidateShape("reversal_waves", _ANGLE[1:])
+        return (first, second), [CandidateShape("waves", pair), turned]
+    if any(angles):
+        order = (first, second) if angles[0] else (second, first)
+        waves = [
+            CandidateShape(
+                "scaled_waves", tuple(f"{k}.{w}" for w in ("sine", "cosine"))
+            )
+            for k in (1, 2, 3)
+        ]
+        return order, [*waves, CandidateShape("scaled_waves", _ANGLE)]
+    if "approach" in {first, second}:
+        other = second if first == "approach" else first
+        shapes = [CandidateShape("reversal", (k,)) for k in ("1", "2")]
+        return ("approach", other), [*shapes, CandidateShape("reversal", ("0", "1"))]
+    shapes = [CandidateShape("powers", (k,)) for k in ("1.1", "1.2", "2.1")]
+    return (first, second), [*shapes, CandidateShape("powers", ("1.0", "0.1", "1.1"))]
+
+
+def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
+    """What is softer in some places of a turn than in others."""
+    if not is_angle(conditions.robot, name):
+        return []
+    names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
+    return [CandidateShape("waves", own) for own in names]
+
+
+def of_direction(name: str) -> CandidateShape:
+    """Backlash that varies around a turn of the same joint."""
+    return CandidateShape("reversal_waves", _ANGLE)
+
+
+def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
+    """(len(shapes),) ln of the prior of each among all forms of its variables."""
+    weight = np.array([_weight(shape) for shape in shapes])
+    families = [shape.form for shape in shapes]
+    total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
+    own = np.array([total[f] for f in families])
+    return np.log(weight / own) - math.log(len(total))
+
+
+def _weight(shape: CandidateShape) -> float:
+    """Of a form within its family."""
+    if shape.form.endswith("waves"):
+        orders = [
+            abs(int(part)) for name in shape.names for part in name.split(".")[:-1]
+        ]
+        return 1.0 / max(*orders, 1)
+    return 1.0
+
+
+def falling(shape: CandidateShape, count: int) -> NDArray:
+    """(count,) prior size of a form's columns beside one another's."""
+    if shape.form != "waves" or count != len(shape.names):
+        return np.ones(count)
+    order = np.array([
+        max(abs(int(part)) for part in name.split(".")[:-1]) for name in shape.names
+    ])
+    return order.clip(1).min() / order.clip(1)

@@ -1,0 +1,90 @@
+"""Functions at several places at once, and cubic laws of a joint's wrench.
+
+Beams that all swell, drives that all have backlash: one function of one form, each
+place with numbers of its own.
+"""
+
+import math
+from collections.abc import Iterator
+
+from assembly.effects.functions import AXES
+from validation.diagnosis import shapes as forms
+from validation.diagnosis.candidates import Candidate, CandidatePart, places_of
+from validation.diagnosis.elements import Element
+from validation.diagnosis.forms_tried import CandidateShape, is_angle
+from validation.diagnosis.functions import Functions
+from validation.diagnosis.gaussian import SIZES
+
+_CUBIC = CandidateShape("powers", ("2",))  # of a compliance: times its own wrench
+Parts = tuple[CandidatePart, ...]
+
+
+def together(functions: Functions) -> list[Element]:
+    """Functions that act at several places, and those of a joint's own wrench.
+
+    Args:
+        functions: of a campaign.
+
+    Returns:
+        Those that the readings can see, with their columns.
+    """
+    listed: list[tuple[Candidate, float]] = []
+    for kind, parts, tried in (*_by_kind(functions), *_at_drives(functions)):
+        own = parts[0].variables
+        listed += [(Candidate(parts, kind, s), functions.prior(own, s)) for s in tried]
+    listed += _cubic(functions)
+    made = [functions.element(one, prior) for one, prior in listed]
+    return [e for e in made if e is not None and e.most > SIZES[0]]
+
+
+def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
+    """A joint that gives with the third power of what it carries."""
+    names = functions.places.names
+    joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
+    prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
+    listed = []
+    for name, component, kind in joints:
+        wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
+        part = CandidatePart(name, (component,), wrench)
+        listed.append((Candidate((part,), kind, _CUBIC), prior))
+    return listed
+
+
+def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
+    """Beams together, and drives each with its own coordinate."""
+    conditions = functions.conditions
+    for kind, parts in places_of(functions.campaign.robot, functions.variables):
+        if len(parts) > 1:
+            tried = forms.first(conditions, parts[0].variable)
+            if kind == "compliance":
+                tried += forms.uneven(conditions, parts[0].variable)
+            yield kind, parts, tried
+
+
+def _at_drives(
+    functions: Functions,
+) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
+    """Drives together, of what all share; and backlash around the turn of each."""
+    conditions, robot = functions.conditions, functions.campaign.robot
+    own = [(f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated]
+    if len(own) < 2:
+        return
+
+    def at(*variables: str) -> Parts:
+        return tuple(CandidatePart(w, c, *variables) for w, c in own)
+
+    sided = "approach" in functions.variables
+    for name in functions.variables:
+        if name.startswith("q."):
+            continue
+        yield "screw", at(name), forms.first(conditions, name)
+        both = forms.of_two(conditions, "approach", name)
+        if sided and name != "approach" and both is not None:
+            yield "screw", at(*both[0]), both[1]
+    if all(is_angle(robot, f"q.{w}") for w, _ in own):
+        turns = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)
+        yield "screw", turns, [forms.of_direction(turns[0].variable)]
+        both = forms.of_two(conditions, turns[0].variable, "approach")
+        if sided and both is not None:
+            sides = tuple(CandidatePart(w, c, f"q.{w}", "approach") for w, c in own)
+            yield "screw", sides, both[1]

@@ -1,0 +1,273 @@
+"""The search of a diagnosis, from readings to the unknown numbers of a machine.
+
+Steps:
+
+1. the measuring frame is found, where it is not known;
+2. effects and functions are searched for together (:mod:`.select`);
+3. the machine that has them is fitted (:mod:`.fit`); what finite motions add to its
+   geometric errors is added to the model, and 2 is repeated until it stays.
+
+It is given the rows to be fitted, and reads no others.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY
+from assembly.linear.closure import virtual_joints
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import (
+    predict,
+    with_finite_motions,
+    with_rest_positions,
+    with_second_order,
+)
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.claims import supported
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.noise import weights_of
+from validation.diagnosis.plausible import impossible_rows
+from validation.diagnosis.registration import register
+from validation.diagnosis.select import select
+from validation.diagnosis.selected import Selected
+from validation.diagnosis.signatures import conditions_of, whiten
+from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.states import foretold
+from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
+
+Update = Callable[[str, int, int], None]
+FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
+_TURNS = 3  # of the search, with what finite geometric errors add
+_CLEARLY = 2.0  # standard errors by which time must predict other spans better
+_BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What the search found.
+
+    Attributes:
+        campaign: of R rows; sigma is as large as the search believed, of a blunder
+            many times as large.
+        unregistered: conditions of all rows, before any registration.
+        conditions: the same, registered, with what finite geometric errors add.
+        used: (R,) bool, rows that were fitted.
+        outliers: (R,) bool, rows whose readings are blunders, left out.
+        selected: models with their probabilities.
+        columns: of the campaign's cells.
+        finite: whether motions of the declared model are finite.
+    """
+
+    campaign: Campaign
+    unregistered: Conditions
+    conditions: Conditions
+    used: NDArray
+    outliers: NDArray
+    selected: Selected
+    columns: Columns
+    finite: bool
+
+    @property
+    def fitting(self) -> Campaign:
+        """The rows fitted."""
+        return self.campaign.take(self.used)
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """The unknown numbers of the machine, with their priors."""
+        found, effects, at = self.selected, [], 0
+        unknown = self.campaign.registration == "unknown"
+        for k, h in enumerate(found.hypotheses):
+            own = slice(at, at := at + len(h.slots))
+            if unknown and k == 0:
+                effects += self._device_frames(h)
+            elif h.effect != FINITE or self._alone:
+                effects.append(Acting(h, found.values[own]))
+        small = []
+        for name, springs in ((GEOMETRY, False), (SPRINGS, True)):
+            own = found.prior.spring == springs
+            if own.any():
+                prior = found.prior
+                small.append(
+                    Small(name, prior.frame[own], prior.axis[own], prior.std[own])
+                )
+        functions = [LearnedFunction(f.candidate, f.std) for f in found.functions]
+        return Unknowns(
+            self.campaign.robot, tuple(effects), tuple(small), tuple(functions),
+            self.columns.sensitivities if functions else None,
+        )  # fmt: skip
+
+    @property
+    def _alone(self) -> bool:
+        """Whether the best model has one element: finite motions then are a claim."""
+        found = self.selected
+        device = self.campaign.registration == "unknown"
+        return len(found.hypotheses) - device + len(found.functions) == 1
+
+    def rivals(self, most: int = 3) -> list[Unknowns]:
+        """Machines of other effects than the best model's, likeliest first."""
+        states = self.selected.states
+        own = frozenset(e.name for e in states[0].elements if e.name)
+        found: dict[frozenset[str], Unknowns] = {}
+        for state in states[1:]:
+            other = frozenset(e.name for e in state.elements if e.name)
+            if own <= other or other <= own or other in found or len(found) == most:
+                continue
+            elements = [(k, e) for k, e in enumerate(state.elements) if e.name]
+            effects = [
+                Acting(e.hypothesis, e.values(state.sizes.mean[state.own(k)]))
+                for k, e in elements
+            ]
+            device = [e for e in self.unknowns.effects if e.device]
+            found[other] = replace(
+                self.unknowns, effects=(*device, *effects), functions=()
+            )
+        return list(found.values())
+
+    def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
+        """The measuring frame as it was found, one for each session."""
+        base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
+        own = {}
+        for session in self.campaign.sessions or (None,):
+            row = 0
+            if session is not None:
+                row = int(np.flatnonzero(self.campaign.session == session)[0])
+            own[session] = base[row]
+        return [Acting(hypothesis, start, s, True) for s, start in own.items()]
+
+
+def trace(
+    campaign: Campaign, fitted: NDArray, update: Update, *, finite: bool = False,
+    odds: Mapping[str, float] = MappingProxyType({}),
+) -> tuple[Traced, MachineFit]:  # fmt: skip
+    """Search for the effects and functions that a declared model lacks.
+
+    Args:
+        campaign: of R rows.
+        fitted: (R,) bool, the rows that are read.
+        update: told what is done, how much of it and of how much.
+        finite: whether motions of the declared model are finite.
+        odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
+
+    Returns:
+        What was found, and the machine that has it.
+
+    Raises:
+        BadInput: the measuring frame is not known and cannot be found.
+    """
+    declared = conditions_of(campaign)
+    finite = finite or declared.exact
+    complete = with_finite_motions if finite else with_second_order
+    declared = conditions = complete(declared)
+    fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
+    if campaign.registration == "unknown":
+        conditions = register(campaign.take(fitted), conditions)
+    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
+        # where clearances of closed chains rest is found row by row, once
+        conditions = with_rest_positions(conditions)
+    columns = Columns(campaign, conditions, update, odds)
+    cells = fitted[columns.row]
+    for turn in range(_TURNS):
+        read = predict(conditions).deviation
+        z = whiten(campaign, campaign.measured - read)
+        cells &= np.isfinite(z)
+        selected = _searched(columns, z[cells], cells, update)
+        traced = _traced(
+            campaign, declared, conditions, fitted, cells, selected, columns, finite
+        )
+        fit = _fitted(traced)
+        if turn == _TURNS - 1:
+            break
+        bent = _with_errors(conditions, fit, complete)
+        if bent is None or not _differs(campaign, bent, read, fitted):
+            break
+        conditions = bent
+    return traced, fit
+
+
+def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
+    """The search; where rows follow one another, time itself explains the least."""
+    # it varies with whatever changed meanwhile, and says nothing of another day: it is
+    # believed only where it predicts other spans of time clearly better
+    whole = select(columns, z, cells, update)
+    if not columns.has_clocks:
+        return whole
+    timeless = select(columns.without_clocks(), z, cells, update)
+    blocks = columns.block[cells]
+    gain, error = foretold(whole.states[0], timeless.states[0], blocks)
+    return whole if gain > _CLEARLY * error else timeless
+
+
+def _traced(
+    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
+    cells: NDArray, selected: Selected, columns: Columns, finite: bool,
+) -> Traced:  # fmt: skip
+    """What was found, with the sigma that was believed and rows that are blunders."""
+    weights = np.ones(len(columns.row))
+    weights[cells] = weights_of(selected.weights)
+    sigma = campaign.sigma.copy()
+    sigma[campaign.cells] *= selected.noise.tau / np.sqrt(weights)
+    good = np.ones(len(columns.row))
+    good[cells] = selected.weights
+    count = np.bincount(columns.row, minlength=len(campaign))
+    share = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
+    outliers = (share > 0.5 * np.maximum(count, 1)) | impossible_rows(campaign)
+    return Traced(
+        campaign=replace(campaign, sigma=sigma),
+        unregistered=declared,
+        conditions=conditions,
+        used=fitted & ~outliers,
+        outliers=outliers,
+        selected=selected,
+        columns=columns,
+        finite=finite,
+    )
+
+
+def _fitted(traced: Traced) -> MachineFit:
+    """The machine found, without effects that the readings do not support."""
+    fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
+    while True:
+        weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
+        if not weak:
+            return fit
+        # the weakest first: two effects that do the same are both uncertain
+        one = min(weak, key=lambda e: _size(fit, e))
+        fit = fit_machine(traced.campaign, fit.unknowns.without([one]), traced.used)
+
+
+def _size(fit: MachineFit, one: Acting) -> float:
+    """[sigma^2] squared change of the fitted readings by an effect."""
+    x, _, slopes = fit.own(one)
+    return float(np.sum((slopes @ x) ** 2))
+
+
+def _with_errors(
+    conditions: Conditions, fit: MachineFit,
+    complete: Callable[[Conditions], Conditions],
+) -> Conditions | None:  # fmt: skip
+    """Conditions with what finite motions add to the geometric errors found."""
+    if not any(part.name == GEOMETRY for part in fit.unknowns.small):
+        return None
+    frames = fit.unknowns.robot.frames
+    own = [conditions.robot.index(frame.name) for frame in frames]
+    errors = conditions.errors.copy()
+    errors[:, own] += fit.robot.errors - fit.unknowns.robot.errors
+    added = complete(replace(conditions, errors=errors)).second_order
+    return replace(conditions, second_order=added)
+
+
+def _differs(
+    campaign: Campaign, bent: Conditions, read: NDArray, fitted: NDArray
+) -> bool:
+    """Whether finite geometric errors change a fitted reading by more than noise."""
+    change = (predict(bent).deviation - read) / campaign.sigma
+    change = np.where(campaign.cells & fitted[:, None], change, 0.0)
+    return bool(np.nanmax(np.abs(change), initial=0.0) > _BENT)

@@ -1,0 +1,141 @@
+"""The two texts of an imported campaign: its table, and ``campaign.toml``."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput
+from validation.exchange.commands_table import Commands
+from validation.exchange.device_frame import DeviceFrame
+from validation.exchange.reading import Reading
+from validation.exchange.targets_file import TargetsFile
+
+Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
+
+
+def columns_of(
+    commands: Commands, rows: Rows, gaps: NDArray, turns: NDArray, frame: DeviceFrame,
+    names: Sequence[str],
+) -> dict[str, NDArray]:  # fmt: skip
+    """Columns of the campaign's table, SI.
+
+    Args:
+        commands: what was commanded.
+        rows: of the campaign.
+        gaps: (R, T, 3) [m] deviation of each target; NaN where not read.
+        turns: (R, 3) [rad] of the platform; NaN where not read.
+        frame: where the device stood.
+        names: of the targets.
+
+    Returns:
+        The columns by name.
+    """
+    at = [command for command, _ in rows]
+    columns = {name: values[at] for name, values in commands.columns.items()}
+    read = np.array([
+        min((r.time for r in readings.values()), default=np.nan) for _, readings in rows
+    ])
+    for times in (read, commands.times[at]):
+        if np.isfinite(times).all() and "cov.time" not in columns:
+            columns["cov.time"] = times - times.min()
+    sigma = spreads(rows, frame, names)
+    for k, name in enumerate(names):
+        point = f".{name}" if len(names) > 1 else ""
+        for i, axis in enumerate("xyz"):
+            columns[f"meas{point}.t{axis}"] = gaps[:, k, i]
+        if np.isfinite(sigma[:, k]).any():
+            for i, axis in enumerate("xyz"):
+                columns[f"sigma{point}.t{axis}"] = sigma[:, k, i]
+    if np.isfinite(turns).any():
+        for i, axis in enumerate("xyz"):
+            columns[f"meas.r{axis}"] = turns[:, i]
+    return columns
+
+
+def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
+    """Standard deviations of readings along the base's axes.
+
+    Args:
+        rows: of the campaign.
+        frame: where the device stood.
+        names: of the targets.
+
+    Returns:
+        (R, T, 3) [m], NaN where not stated.
+    """
+    sigma = np.full((len(rows), len(names), 3), np.nan)
+    for i, (_, readings) in enumerate(rows):
+        for k, name in enumerate(names):
+            if name in readings:
+                sigma[i, k] = np.sqrt(frame.rotation**2 @ readings[name].sigma ** 2)
+    return sigma
+
+
+def labels_of(commands: Commands, rows: Rows) -> list[str]:
+    """Ids of the rows: the command's, numbered where it is there again.
+
+    Args:
+        commands: what was commanded.
+        rows: of the campaign.
+
+    Returns:
+        A label for each.
+    """
+    seen: dict[int, int] = {}
+    labels = []
+    for command, _ in rows:
+        seen[command] = seen.get(command, 0) + 1
+        again = f".{seen[command]}" if seen[command] > 1 else ""
+        labels.append(commands.ids[command] + again)
+    return labels
+
+
+def cell(value: float) -> str:
+    """A number with all its digits, nothing where there is none."""
+    return repr(float(value)) if np.isfinite(value) else ""
+
+
+def declaration(
+    declared: TargetsFile, folder: Path, spread: NDArray, turned: bool
+) -> str:
+    """Text of ``campaign.toml``.
+
+    Args:
+        declared: the targets file.
+        folder: of the campaign.
+        spread: (..., 3) [m] stated with the readings, NaN where not.
+        turned: whether orientations were read.
+
+    Returns:
+        The text.
+
+    Raises:
+        BadInput: a reading states no standard deviation, nor does the targets file.
+    """
+    name = declared.robot_name
+    path = declared.file.parent / name
+    if path.is_file():
+        name = os.path.relpath(path.resolve(), folder.resolve())
+    places: Mapping[str, list[float]] = {
+        k: [float(x) for x in v] for k, v in declared.places.items()
+    }
+    lines = [f'robot = "{name}"', 'measurements = "measurements.csv"',
+             f'registration = "{declared.registration}"']  # fmt: skip
+    if len(places) == 1:
+        lines.append(f"reference_point = {next(iter(places.values()))}")
+    if not np.isfinite(spread).all() and declared.noise is None:
+        raise BadInput(
+            f"{declared.file}: noise: missing; expected one standard deviation [m]: "
+            "not every reading states its own"
+        )
+    if declared.noise is not None:
+        lines += ["[noise]", f"position = {declared.noise!r}"]
+    if turned:
+        lines += ["[noise]"] if declared.noise is None else []
+        lines += [f"rotation = {declared.noise_rotation!r}"]
+    if len(places) > 1:
+        lines += ["[points]", *(f'"{k}" = {v}' for k, v in places.items())]
+    return "\n".join(lines) + "\n"

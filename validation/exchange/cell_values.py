@@ -1,0 +1,76 @@
+"""Numbers of a device's table: lengths in metres, and cells that hold no reading."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from forcefit.inputs.errors import BadInput, describe, quoted
+from validation.campaign.dialect import parse_number
+from validation.exchange.cells import Sheet
+from validation.exchange.header import Header
+from validation.exchange.reading import LARGEST, LENGTHS, Writing
+
+_NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
+
+
+def missing(cell: str) -> bool:
+    """Whether a cell says that nothing was read."""
+    return cell.lower() in _NO_READING
+
+
+@dataclass(frozen=True, eq=False)
+class CellValues:
+    """Cells of a table as numbers.
+
+    Attributes:
+        sheet: the table.
+        header: its columns.
+        writing: what it does not say itself.
+    """
+
+    sheet: Sheet
+    header: Header
+    writing: Writing
+
+    def length(self, line: int, k: int, cell: str) -> float:
+        """[m] of a cell of column k."""
+        name = self.header.cells[k]
+        return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
+
+    def unit(self, stated: str) -> float:
+        """[m] of a column's unit: its own, else as declared, else as the file says."""
+        path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
+        if not stated and declared and found:
+            if LENGTHS[found] != LENGTHS[declared]:
+                raise BadInput(
+                    f"{path}: line {self.header.unit_line}: found the unit "
+                    f"{quoted(found)}, the targets file says {quoted(declared)}"
+                )
+        unit = stated or declared or found
+        if not unit:
+            raise BadInput(
+                f"{path}: found no unit of lengths; expected it in the header, such as "
+                'x [mm], or unit = "mm" in the targets file'
+            )
+        if unit not in LENGTHS:
+            known = ", ".join(LENGTHS)
+            raise BadInput(f"{path}: found the unit {quoted(unit)}, expected {known}")
+        return LENGTHS[unit]
+
+    def number(self, line: int, column: str, cell: str) -> float:
+        """A finite number of a cell."""
+        decimal = self.sheet.decimal
+        value = parse_number(cell, decimal)
+        if abs(value) <= LARGEST:
+            return value
+        other = "," if decimal == "." else "."
+        hint = ""
+        if np.isfinite(parse_number(cell, other)):
+            hint = (
+                f'; if that is a decimal mark say decimal = "{other}" in the targets '
+                "file"
+            )
+        raise BadInput(
+            f"{self.sheet.file}: line {line}, {column}: found {describe(cell)}, "
+            f"expected a number{hint}"
+        )

@@ -1,0 +1,123 @@
+"""The text and the cells of a device's table, in the encodings that programs write.
+
+Excel and Leica write UTF-16 or Latin-1, others UTF-8; a cell that begins with an
+apostrophe is text in Excel.
+"""
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.table import read_bytes
+
+_MARKS = (";", "\t", ",")  # between cells, the likeliest first
+_BLANK = " "
+_SAMPLE = 2000  # lines by which the mark between cells is found
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table in cells.
+
+    Attributes:
+        file: its path, for messages.
+        decimal: its decimal mark.
+        rows: for each line its number and its cells, without quotes and blanks
+            around them; comments and blank lines are left out.
+    """
+
+    file: str
+    decimal: str
+    rows: Sequence[tuple[int, list[str]]]
+
+
+def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
+    """Cells of a table.
+
+    Args:
+        path: a text file in UTF-8, UTF-16 or Latin-1.
+        decimal: the decimal mark declared; a table parted by commas has points.
+
+    Returns:
+        The table.
+
+    Raises:
+        BadInput: the file cannot be read, is no text, or has no rows.
+    """
+    lines = [
+        (number, line.strip(" \r\n"))
+        for number, line in enumerate(_text(path).split("\n"), 1)
+        if line.strip() and not line.lstrip().startswith(("//", "#"))
+    ]
+    if not lines:
+        raise BadInput(f"{path}: empty; expected a table")
+    mark = _mark([line for _, line in lines[:_SAMPLE]], decimal)
+    rows = [(number, _cells(line, mark)) for number, line in lines]
+    if mark == _BLANK:
+        rows = _with_names_of_words(lines, rows)
+    return Sheet(str(path), "." if mark == "," else decimal, rows)
+
+
+def _with_names_of_words(
+    lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
+) -> list[tuple[int, list[str]]]:
+    """Rows, in which two blanks part a header of words, such as Point Name."""
+    usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
+    return [
+        (number, wide)
+        if len(cells) != usual
+        and len(wide := re.split(r"\s{2,}|\t", line.strip())) == usual
+        else (number, cells)
+        for (number, line), (_, cells) in zip(lines, rows, strict=True)
+    ]
+
+
+def _text(path: Path | str) -> str:
+    """Text of a file in UTF-8, UTF-16 or Latin-1, with its line ends made one."""
+    content = read_bytes(path)
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encodings = ["utf-16"]
+    elif content[1:40:2].count(0) > 10:  # ASCII in UTF-16 without its mark
+        encodings = ["utf-16-le"]
+    elif content[0:40:2].count(0) > 10:
+        encodings = ["utf-16-be"]
+    else:
+        encodings = ["utf-8-sig", "cp1252", "latin-1"]
+    for encoding in encodings:
+        try:
+            text = content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise BadInput(f"{path}: line {line} holds NUL; expected a text file")
+    raise BadInput(f"{path}: not UTF-16 as it begins; expected a text file")
+
+
+def _mark(lines: Sequence[str], decimal: str) -> str:
+    """The mark between cells: of most lines, the likeliest where there are several."""
+    for mark in _MARKS:
+        if 2 * sum(mark in line for line in lines) < len(lines):
+            continue
+        blank = sum(len(line.split()) > 3 for line in lines)
+        if mark == "," and decimal == "," and 2 * blank >= len(lines):
+            return _BLANK  # the commas are decimal marks
+        return mark
+    return _BLANK
+
+
+def _cells(line: str, mark: str) -> list[str]:
+    """Cells of a line."""
+    if mark == _BLANK:
+        line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
+    try:
+        row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
+    except csv.Error:  # a cell without end: no table
+        row = line.split(mark)
+    return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

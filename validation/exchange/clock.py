@@ -1,0 +1,76 @@
+"""Times as devices and controllers write them, in seconds."""
+
+import re
+from datetime import UTC, datetime
+
+import numpy as np
+
+from forcefit.inputs.errors import BadInput, describe
+from validation.campaign.dialect import parse_number
+from validation.exchange.reading import Writing
+
+DATES = ("day_first", "month_first")
+_DATE = re.compile(r"(\d{1,2})([./])(\d{1,2})[./](\d{4})(.*)")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?: ?[APap][Mm])?")
+
+
+def parse_time(place: str, text: str, writing: Writing) -> float:
+    """[s] of a time: seconds, a time of day, ISO 8601, 14 digits, or a date.
+
+    Args:
+        place: file and line, for messages.
+        text: the cell, or date and time.
+        writing: its decimal mark, and what comes first where a date has slashes.
+
+    Returns:
+        Seconds on a clock of its own; only differences mean something.
+
+    Raises:
+        BadInput: none of these.
+    """
+    number = parse_number(text, writing.decimal)
+    digits = text.isascii() and text.isdigit() and len(text) == 14
+    if np.isfinite(number) and not digits:
+        return float(number)
+    try:
+        if digits:
+            return _seconds(text, "%Y%m%d%H%M%S")
+        if _CLOCK.fullmatch(text):
+            return _dated("1970", "1", "1", text)
+        if match := _DATE.fullmatch(text):
+            a, mark, b, year, rest = match.groups()
+            if mark == "/" and writing.dates is None:
+                raise BadInput(
+                    f"{place}: found {describe(text)}; expected dates = "
+                    '"day_first" or "month_first" in the targets file'
+                )
+            swap = mark == "/" and writing.dates == "month_first"
+            day, month = (b, a) if swap else (a, b)
+            return _dated(year, month, day, rest.strip())
+        moment = datetime.fromisoformat(text)
+    except BadInput:
+        raise
+    except ValueError:
+        raise BadInput(
+            f"{place}: found {describe(text)}, expected a time: seconds, "
+            "2026-11-22T10:30:00, 20261122103000 or 22.11.2026 10:30:00"
+        ) from None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def _dated(year: str, month: str, day: str, clock: str) -> float:
+    """[s] of a date and a time of day such as 10:30:00.25 or 9:30:00 PM."""
+    clock = clock.replace(",", ".")
+    half = clock[-2:].upper() if clock[-1:] in {"M", "m"} else ""
+    clock = clock[: len(clock) - len(half)].strip()
+    style = ("%I:%M:%S" if half else "%H:%M:%S") + (".%f" if "." in clock else "")
+    if "." in clock:
+        clock = clock[: clock.index(".") + 7]  # microseconds are the finest known
+    suffix = " %p" if half else ""
+    text = f"{year}-{month}-{day} {clock} {half}".strip()
+    return _seconds(text, f"%Y-%m-%d {style}{suffix}")
+
+
+def _seconds(text: str, style: str) -> float:
+    """[s] since 1970 of a time in UTC."""
+    return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

@@ -1,0 +1,160 @@
+"""Exports whose lengths or axes are not what they are taken for.
+
+A wrong unit multiplies all distances by one factor; a left-handed export is a mirror
+image, which no place of the device explains.  Both are refused, never corrected: the
+same setting of the device may have touched what cannot be seen here.
+
+Sources:
+    Umeyama (1991), Least-squares estimation of transformation parameters between two
+    point patterns, IEEE Trans. PAMI 13, 376: scale, and the sign of the determinant.
+"""
+
+from collections.abc import Mapping
+from itertools import combinations, permutations, product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput
+from validation.exchange.device_frame import robust_frame, scatter_of
+from validation.exchange.reading import LENGTHS
+
+_UNITS = {**LENGTHS, "ft": 0.3048}
+_FAR_BETTER = 0.25  # of the scatter must be left for another reading to be believed
+_SCALED = 0.02  # scatter of ratios of distances that have one factor
+_UNIT = 0.05  # by which a factor may miss that of two units: the robot has errors too
+_PAIRED = 10  # readings that follow, to each of which the distance is taken
+_APART = 0.1  # of the distance declared between two targets: worth a remark
+_MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a turn makes them equal
+
+
+def check_axes(
+    file: Path, measured: NDArray, nominal: NDArray, known: bool
+) -> None:  # fmt: skip
+    """Refuse lengths of another unit, mirrored axes, and axes exchanged.
+
+    Args:
+        file: the targets file, for messages.
+        measured: (N, 3) [m] readings, device axes.
+        nominal: (N, 3) [m] where they should be, base axes.
+        known: whether the device's axes are the base's.
+
+    Raises:
+        BadInput: another unit or other axes fit far better.
+    """
+    scatter = _scatter(measured, nominal, known)
+    factor, meant = _units_of(_factor(measured, nominal, known))
+    for mirror in (np.ones(3), _MIRRORED) if meant else ():
+        rescaled = _scatter(factor * measured * mirror, nominal, known)
+        if rescaled < _FAR_BETTER * scatter:
+            raise BadInput(
+                f"{file}: unit: the readings fit far better times {factor:.4g}, "
+                f"{meant} (scatter {rescaled:.2g} m for {scatter:.2g})"
+            )
+    if known:
+        _check_known_axes(file, measured, nominal, scatter)
+        return
+    mirrored = _scatter(measured * _MIRRORED, nominal, known)
+    if mirrored < _FAR_BETTER * scatter:
+        raise BadInput(
+            f"{file}: the device's axes are left-handed: the readings fit far better "
+            f"with one axis reversed, as y to -y (scatter {mirrored:.2g} m for "
+            f"{scatter:.2g}); export them right-handed"
+        )
+
+
+def check_targets(
+    file: Path, places: Mapping[str, NDArray], measured: NDArray
+) -> list[str]:
+    """Compare distances between targets with those declared.
+
+    Args:
+        file: the targets file, for messages.
+        places: (3,) [m] of each target, platform axes, by name.
+        measured: (R, T, 3) [m] their readings, row by row; NaN where not read.
+
+    Returns:
+        Remarks on pairs that are not as far apart as declared.
+
+    Raises:
+        BadInput: all distances differ by one factor.
+    """
+    names, ratios, remarks = list(places), [], []
+    for i, j in combinations(range(len(names)), 2):
+        apart = np.linalg.norm(measured[:, i] - measured[:, j], axis=1)
+        apart = apart[np.isfinite(apart)]
+        declared = float(np.linalg.norm(places[names[i]] - places[names[j]]))
+        if not len(apart) or not declared > 0:
+            continue
+        ratios.append(apart / declared)
+        if np.median(np.abs(apart - declared)) > _APART * declared:
+            remarks.append(
+                f"{names[i]} and {names[j]} are read {apart.min():.3g} .. "
+                f"{apart.max():.3g} m apart, declared {declared:.3g}"
+            )
+    if remarks:
+        ratio = np.concatenate(ratios)
+        factor = float(np.median(ratio))
+        if np.median(np.abs(ratio / factor - 1)) < _SCALED:
+            _, meant = _units_of(factor)
+            raise BadInput(
+                f"{file}: targets: {remarks[0]}: {factor:.4g} times as far, all alike"
+                f"{', ' if meant else ''}{meant}; expected places in m"
+            )
+    return remarks
+
+
+def _units_of(factor: float) -> tuple[float, str]:
+    """The factor of two units near a factor, and which they are; 1 and "" if none."""
+    found = [
+        (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
+        for a, b in permutations(_UNITS, 2)
+        if abs(factor * _UNITS[a] / _UNITS[b] - 1) < _UNIT and _UNITS[a] != _UNITS[b]
+    ]
+    likely = min(found, key=lambda f: ("mm" not in f, "um" in f), default=(1.0, ""))
+    return likely[0], likely[1]
+
+
+def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
+    """How many times larger nominal distances are; robust against blunders."""
+    if known:
+        pairs = [(measured, nominal)]
+    else:  # between readings: wherever the device stood
+        shifts = range(1, min(len(measured), _PAIRED))
+        pairs = [
+            (measured - np.roll(measured, k, axis=0), nominal - np.roll(nominal, k, 0))
+            for k in shifts
+        ]
+    lengths = [np.linalg.norm(pair, axis=2) for pair in pairs]
+    read, wanted = np.concatenate(lengths, axis=1)
+    apart = read > 0
+    return float(np.median(wanted[apart] / read[apart])) if apart.any() else 1.0
+
+
+def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
+    """[m] scatter about the frame that fits best, or about the base's own."""
+    if known:
+        return scatter_of(np.linalg.norm(measured - nominal, axis=1))
+    return robust_frame(measured, nominal)[1]
+
+
+def _check_known_axes(
+    file: Path, measured: NDArray, nominal: NDArray, scatter: float
+) -> None:
+    """Refuse axes of the device that are others of the base, or reversed."""
+    best, found = scatter, ""
+    for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
+        tried = _scatter(measured[:, list(order)] * signs, nominal, known=True)
+        if tried < best:
+            best = tried
+            found = ", ".join(
+                f"{axis} is the device's {'-' if sign < 0 else ''}{'xyz'[k]}"
+                for axis, k, sign in zip("xyz", order, signs, strict=True)
+                if (sign, "xyz"[k]) != (1, axis)
+            )
+    if best < _FAR_BETTER * scatter:
+        raise BadInput(
+            f'{file}: registration = "known": the readings fit far better where '
+            f"{found} (scatter {best:.2g} m for {scatter:.2g})"
+        )

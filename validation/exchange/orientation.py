@@ -1,0 +1,169 @@
+"""Orientations that a device reads: quaternions, or three angles of a stated order.
+
+They turn the target's axes into the device's: p_device = R p_target.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from forcefit.inputs.errors import BadInput, quoted
+from validation.exchange.column_names import QUATERNION, Column
+
+ROTATION_VECTOR = "rotation_vector"
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
+_FAR_BETTER = 0.25  # of the scatter must be left for the inverse to be believed
+_GROSS = 20.0  # times the scatter: left out of the mean
+_MEDIAN = 1.538  # median length of a Gaussian vector in space, of one component's sigma
+_ROUNDING = 1e-12  # [rad]
+_UNIT_NORM = 0.01  # by which rounded quaternions may miss their norm of 1
+
+
+def orders() -> tuple[str, ...]:
+    """What ``orientation`` of a targets file may be.
+
+    Returns:
+        ``rotation_vector`` and the 24 orders of three angles, small letters about
+        fixed axes, capital letters about axes that move along.
+    """
+    axes = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
+    return (ROTATION_VECTOR, *axes, *(axis.upper() for axis in axes))
+
+
+def orientation_columns(
+    columns: Sequence[Column], own: Sequence[int]
+) -> tuple[str, dict[str, int]]:
+    """Columns of a target's orientation.
+
+    Args:
+        columns: of the table.
+        own: numbers of the target's.
+
+    Returns:
+        ``"quaternion"``, ``"angles"`` or empty, and the column of each component.
+    """
+    w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
+    angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
+    if "w" in w:  # Rotation X, Y, Z beside a W are no angles
+        w = angles | w
+    if set(w) >= set(QUATERNION):
+        return "quaternion", {axis: w[axis] for axis in QUATERNION}
+    if set(angles) == set("xyz"):
+        return "angles", angles
+    return "", {}
+
+
+def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
+    """(3, 3) target axes seen from the device's, of a quaternion w x y z.
+
+    Args:
+        place: file and line, for messages.
+        values: w, x, y, z.
+
+    Returns:
+        The rotation.
+
+    Raises:
+        BadInput: its norm is not 1.
+    """
+    w, x, y, z = values
+    norm = float(np.linalg.norm(values))
+    if abs(norm - 1) > _UNIT_NORM:
+        raise BadInput(f"{place}: found a quaternion of norm {norm:.4g}, expected 1")
+    return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix())
+
+
+def from_angles(
+    place: str, angles: Mapping[str, float], order: str | None
+) -> NDArray:  # fmt: skip
+    """(3, 3) target axes seen from the device's, of three angles [rad].
+
+    Args:
+        place: file and line, for messages.
+        angles: by axis in the order of the columns.
+        order: as in the targets file, or None.
+
+    Returns:
+        The rotation.
+
+    Raises:
+        BadInput: no order is declared, which cannot be guessed.
+    """
+    if order is None:
+        raise BadInput(
+            f"{place}: found three angles, expected their order in the targets file: "
+            f'orientation = "xyz" (fixed axes), "ZYX" (moving axes) or '
+            f"{quoted(ROTATION_VECTOR)}"
+        )
+    if order == ROTATION_VECTOR:
+        vector = [angles[axis] for axis in "xyz"]
+        return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+    named = len(set(order.lower())) == 3
+    turns = [angles[axis] for axis in order.lower()] if named else [*angles.values()]
+    return np.asarray(Rotation.from_euler(order, turns).as_matrix())
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Orientations of one target as deviations of the platform.
+
+    Attributes:
+        deviation: (R, 3) [rad] rotation vector of actual against nominal, base axes;
+            NaN where not read.
+        mount: (3, 3) the target's axes seen from the platform's.
+        scatter: [rad] of one component.
+    """
+
+    deviation: NDArray
+    mount: NDArray
+    scatter: float
+
+
+def turns_of(
+    file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
+) -> Turns:
+    """Deviations of orientations read.
+
+    Args:
+        file: the targets file, for messages.
+        seen: (R, 3, 3) the target's axes seen from the device's; NaN where not read.
+        base: (3, 3) the device's axes seen from the base's.
+        nominal: (R, 3, 3) the platform's, of the declared robot.
+        mount: the target's axes seen from the platform's; None: that fit best.
+
+    Returns:
+        The deviations.
+
+    Raises:
+        BadInput: the inverse rotations fit far better.
+    """
+    best = _turns(base @ seen, nominal, mount)
+    other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
+    if other.scatter < _FAR_BETTER * best.scatter:
+        raise BadInput(
+            f"{file}: the orientations fit far better inverted (scatter "
+            f"{other.scatter:.2g} rad for {best.scatter:.2g}); expected the target's "
+            "axes seen from the device's"
+        )
+    return best
+
+
+def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
+    """Deviations about a mount declared or fitted, without asking whether they fit."""
+    taken = np.isfinite(read).all(axis=(1, 2))
+    seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
+    if mount is None:
+        middle = seen.mean()
+        near = (middle.inv() * seen).magnitude()
+        kept = near <= _GROSS * np.median(near) + _ROUNDING
+        mount = seen[kept].mean().as_matrix()
+    actual = read[taken] @ mount.T
+    gap = Rotation.from_matrix(actual @ np.swapaxes(nominal[taken], 1, 2)).as_rotvec()
+    deviation = np.full((len(read), 3), np.nan)
+    deviation[taken] = gap
+    scatter = float(np.median(np.linalg.norm(gap, axis=1))) / _MEDIAN + _ROUNDING
+    return Turns(deviation, mount, scatter)

@@ -1,0 +1,200 @@
+"""Readings in the base's axes: where the device stood, and what cannot be there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, quoted
+from stiffness.screws import rotation_matrix, rotation_vector
+from validation.exchange.commands_table import Commands
+from validation.exchange.device_axes import check_axes, check_targets
+from validation.exchange.device_frame import (
+    DeviceFrame,
+    exchanged_here,
+    exchanged_throughout,
+    is_gross,
+    robust_frame,
+    scatter_of,
+    spans_a_plane,
+)
+from validation.exchange.orientation import turns_of
+from validation.exchange.reading import Reading
+from validation.exchange.targets_file import TargetsFile
+
+_ASTRAY = 0.1  # of the spread of the commands: no machine is as wrong as that
+_HERE = DeviceFrame(np.eye(3), np.zeros(3))
+
+Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Readings as deviations from the declared robot.
+
+    Attributes:
+        frame: where the device stood.
+        scatter: [m] of one component of all readings.
+        read: (R, T) whether a target was read where it can be.
+        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN where not read.
+        turns: (R, 3) [rad] of the platform, base axes; NaN where not read.
+        mounts: (3,) [rad] rotation vector from the platform's axes to those of each
+            target whose orientation was read.
+        left_out: readings that cannot be where they were read, in words.
+        remarks: what else does not fit, in words.
+    """
+
+    frame: DeviceFrame
+    scatter: float
+    read: NDArray
+    gaps: NDArray
+    turns: NDArray
+    mounts: Mapping[str, NDArray]
+    left_out: list[str]
+    remarks: list[str]
+
+
+def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
+    """Find where the device stood, and bring the readings into base axes.
+
+    Args:
+        declared: the targets file.
+        commands: what was commanded.
+        rows: readings by command.
+
+    Returns:
+        The deviations.
+
+    Raises:
+        BadInput: the readings do not say where the device stood, or fit far better in
+            another unit, mirrored, or with targets exchanged.
+    """
+    names = list(declared.places)
+    T = np.array([commands.postures[command].platform for command, _ in rows])
+    places = np.array([declared.places[name] for name in names])
+    nominal = T[:, None, :3, 3] + np.einsum("rij,tj->rti", T[:, :3, :3], places)
+    measured = np.full(nominal.shape, np.nan)
+    for i, (_, readings) in enumerate(rows):
+        for k, name in enumerate(names):
+            if name in readings:
+                measured[i, k] = readings[name].position
+    frame, scatter = _frame(declared, measured, nominal, names)
+    remarks = check_targets(declared.file, declared.places, measured)
+    remarks += _misfit(nominal, scatter)
+    base = frame.to_base(measured)
+    read = np.asarray(np.isfinite(measured).all(axis=2))
+    left_out = []
+    for i, (command, readings) in enumerate(rows):
+        for k, reason in _suspects(base[i], nominal[i], read[i], scatter, names):
+            label, at = commands.ids[command], readings[names[k]].place
+            left_out.append(f"{at}: command {quoted(label)}: {reason}")
+            read[i, k] = False
+    turns, mounts = np.full((len(rows), len(names), 3), np.nan), {}
+    for k, name in enumerate(names):
+        if any(r[name].rotation is not None for _, r in rows if name in r):
+            turns[:, k], mounts[name] = _turns(
+                declared, commands, rows, T[:, :3, :3], frame, name, left_out
+            )
+    turns[~read] = np.nan
+    return Placed(
+        frame=frame,
+        scatter=scatter,
+        read=read,
+        gaps=np.where(read[..., None], base - nominal, np.nan),
+        turns=_mean(turns),
+        mounts=mounts,
+        left_out=left_out,
+        remarks=remarks,
+    )
+
+
+def _misfit(nominal: NDArray, scatter: float) -> list[str]:
+    """A remark on readings that do not follow the commands."""
+    spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
+    reach = float(np.sqrt(np.mean(spread**2)))
+    if scatter < _ASTRAY * reach:
+        return []
+    return [
+        f"the readings scatter by {scatter:.3g} m about commands {reach:.3g} m apart: "
+        "are they joined to the right ones?"
+    ]
+
+
+def _mean(turns: NDArray) -> NDArray:
+    """(R, 3) mean of (R, T, 3) over the targets read; NaN where none was."""
+    read = np.isfinite(turns).all(axis=2)
+    total = np.where(read[..., None], turns, 0.0).sum(axis=1)
+    count = read.sum(axis=1)[:, None]
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _turns(
+    declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
+    frame: DeviceFrame, name: str, left_out: list[str],
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """(R, 3) [rad] deviations by a target's orientations, and its mount (3,) [rad]."""
+    seen = np.full((len(rows), 3, 3), np.nan)
+    for i, (_, readings) in enumerate(rows):
+        rotation = readings[name].rotation if name in readings else None
+        if rotation is not None:
+            seen[i] = rotation
+    known = declared.rotations.get(name)
+    mount = None if known is None else rotation_matrix(known)
+    turns = turns_of(declared.file, seen, frame.rotation, nominal, mount)
+    deviation = turns.deviation.copy()
+    sizes = np.linalg.norm(deviation, axis=1)
+    for i in np.flatnonzero(sizes > 0).tolist():
+        if is_gross(float(sizes[i]), turns.scatter):
+            label, at = commands.ids[rows[i][0]], rows[i][1][name].place
+            reason = f"turned by {sizes[i]:.4g} rad, the others {turns.scatter:.2g}"
+            left_out.append(f"{at}: orientation at {quoted(label)}: {reason}")
+            deviation[i] = np.nan
+    return deviation, rotation_vector(turns.mount)
+
+
+def _suspects(
+    base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
+) -> list[tuple[int, str]]:
+    """Targets of one command, read where they cannot stand, and why."""
+    suspects = []
+    ks = np.flatnonzero(read)
+    order = exchanged_here(base[ks], nominal[ks], scatter)
+    for place, k in enumerate(ks.tolist()):
+        gap = float(np.linalg.norm(base[k] - nominal[k]))
+        if order is not None and order[place] != place:
+            other = quoted(names[ks[order[place]]])
+            suspects.append((k, f"it is {other}, exchanged"))
+        elif is_gross(gap, scatter):
+            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
+            suspects.append((k, reason))
+    return suspects
+
+
+def _frame(
+    declared: TargetsFile, measured: NDArray, nominal: NDArray, names: list[str]
+) -> tuple[DeviceFrame, float]:
+    """Where the device stood, and the scatter about the declared robot."""
+    read = np.isfinite(measured).all(axis=2)
+    if declared.registration == "known":
+        check_axes(declared.file, measured[read], nominal[read], known=True)
+        gaps = np.linalg.norm(measured[read] - nominal[read], axis=1)
+        return _HERE, scatter_of(gaps)
+    if not spans_a_plane(nominal[read]):
+        raise BadInput(
+            f"{declared.file}: all readings are of points on one line, which cannot "
+            'say where the device stood; expected more, or registration = "known"'
+        )
+    check_axes(declared.file, measured[read], nominal[read], known=False)
+    order = exchanged_throughout(
+        [measured[:, k] for k in range(len(names))],
+        [nominal[:, k] for k in range(len(names))],
+    )
+    if order is not None:
+        wrong = [k for k in range(len(names)) if order[k] != k]
+        order_text = ", ".join(f"{names[k]} is {names[order[k]]}" for k in wrong)
+        raise BadInput(
+            f"{declared.file}: targets: they fit far better exchanged, in every row: "
+            f"{order_text}"
+        )
+    return robust_frame(measured[read], nominal[read])

@@ -1,0 +1,167 @@
+"""The study report's section on the grid: what varies over it, where it is largest."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.tables import component_unit
+from forcefit.page.charts import Axis, Layer, value_map
+from forcefit.page.page import paragraph, section
+from forcefit.page.tables import Cell, Value, table
+from forcefit.page.words import unit_of
+from stiffness.screws import WRENCH
+
+# of the maps: key, words
+MAPPED = {
+    "translation_error": "largest shift, eq. (27), clearances anywhere",
+    "rotation_error": "largest turn, eq. (27), clearances anywhere",
+    "energy": "energy, eq. (22)",
+    "margin_free": "zone margin, compliant joints free",
+    "margin": "zone margin, eq. (21)",
+}
+_UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
+
+
+class Mapped(NamedTuple):
+    """One quantity over the grid.
+
+    Attributes:
+        key: its name.
+        words: that name it on the page.
+        unit: SI.
+        values: over the points, NaN without an answer.
+    """
+
+    key: str
+    words: str
+    unit: str
+    values: Any
+
+
+def mapped(maps: Any) -> Iterator[Mapped]:
+    """The quantities of a study's maps; of pose errors the certified upper bound.
+
+    Args:
+        maps: data set over the grid.
+
+    Yields:
+        Those of every study, then those of the robot at work.
+    """
+    for key, words in MAPPED.items():
+        one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
+        yield Mapped(key, words, unit_of(key), one)
+    if "deflection" in maps:
+        for part, half, unit in (
+            ("shift", slice(3, 6), "m"), ("turn", slice(0, 3), "rad")
+        ):  # fmt: skip
+            size = np.sqrt((maps["deflection"].isel(screw=half) ** 2).sum(
+                "screw", skipna=False
+            ))  # fmt: skip
+            words = f"{part} by load and weight, clearances at least energy"
+            yield Mapped(f"deflection_{part}", words, unit, size)
+    if "stiffness" in maps:
+        for name in WRENCH:
+            unit = component_unit(maps["stiffness"].attrs["units"], name)
+            one = maps["stiffness"].sel(wrench_component=name)
+            words = f"stiffness along {name}, the other axes free"
+            yield Mapped(f"stiffness.{name}", words, unit, one)
+    if "frequency" in maps:
+        for k, mode in enumerate(maps["frequency"]["mode"].values):
+            one = maps["frequency"].isel(mode=k)
+            yield Mapped(f"frequency.{mode}", f"natural frequency {mode}", "Hz", one)
+
+
+def finite(one: Mapped) -> NDArray:
+    """Values of a map with an answer; pose errors that nothing bounds stay infinite."""
+    values = np.asarray(one.values, dtype=float).ravel()
+    if one.key.endswith("_error"):
+        return values[~np.isnan(values)]
+    return values[np.isfinite(values)]
+
+
+def maps_section(maps: Any, summary: dict[str, Any]) -> str:
+    """Maps over the grid, their values under the pointer.
+
+    Args:
+        maps: data set over the grid.
+        summary: of :func:`validation.study.report.map_summary`.
+
+    Returns:
+        Counts, a table of least, median and largest values and where that is, and the
+        map; over more than two axes that of two, the others held.
+    """
+    title = "Over the workspace"
+    counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
+    share = summary["share_assemblable_free"]
+    if share is None:
+        return section(title, paragraph(f"{counts}. No point has an answer."))
+    known = [one for one in mapped(maps) if one.key in summary]
+    rows: list[list[Cell]] = [
+        [one.words, *(Value(v, one.unit) for v in summary[one.key]),
+         _where(maps, one)]
+        for one in known
+    ]  # fmt: skip
+    return section(
+        title,
+        paragraph(
+            f"{counts}. Assembles rigidly with compliant joints free at "
+            f"{100 * share:.1f} % of the points with an answer."
+        ),
+        table(["", "least", "median", "largest", "largest at"], rows, "maps"),
+        _drawn(maps, known[0]) if known else "",
+    )
+
+
+def _drawn(maps: Any, first: Mapped) -> str:
+    """The map over two axes; of further ones a sentence says where they are held."""
+    names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
+    if not names:
+        return ""
+    # the axes with most values; of equal ones the first
+    axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
+    at = {name: i for name, i in _largest(first).items() if name not in axes}
+    held = {name: i for name, i in at.items() if name in names}
+    view = maps.isel(at, drop=True).transpose(*axes, ...)
+    layers = [
+        Layer(one.key, one.words, one.unit, np.asarray(one.values, dtype=float))
+        for one in mapped(view)
+    ]
+    drawn = value_map(
+        [(Axis(n, _UNITS.get(n, "")), view[n].values) for n in axes], layers,
+        view["status"].values.astype(str), "Over the grid.",
+    )  # fmt: skip
+    if not held:
+        return drawn
+    return paragraph(
+        f"The grid has {len(names)} axes: the map is drawn over {axes[0]} and "
+        f"{axes[1]}, with {_place(maps, held)}, where the {first.words} is largest. "
+        "The table is of all points."
+    ) + drawn  # fmt: skip
+
+
+def _largest(one: Mapped) -> dict[str, int]:
+    """Place along each axis of the largest value."""
+    values = np.nan_to_num(np.asarray(one.values, dtype=float), nan=-np.inf)
+    if not one.key.endswith("_error"):
+        values = np.where(np.isposinf(values), -np.inf, values)
+    at = np.unravel_index(int(values.argmax()), values.shape)
+    return {str(d): int(i) for d, i in zip(one.values.dims, at, strict=True)}
+
+
+def _where(maps: Any, one: Mapped) -> str:
+    """Where a map is largest, in words."""
+    known = finite(one)
+    bounded = bool(np.isfinite(known).all())
+    if bounded and np.ptp(known) <= 1e-9 * np.abs(known).max():
+        return "the same everywhere"
+    return _place(maps, _largest(one))
+
+
+def _place(maps: Any, at: dict[str, int]) -> str:
+    """Coordinates of a point in words."""
+    return ", ".join(
+        f"{name} = {float(maps[name].values[i]):.6g} {_UNITS.get(name, '')}".rstrip()
+        for name, i in at.items()
+    )

@@ -1,0 +1,87 @@
+"""The study report's section on the robot at work, under load and weight."""
+
+from typing import Any
+
+import numpy as np
+
+from forcefit.page.page import Tile, paragraph, section
+from forcefit.page.tables import Cell, Value, table
+from stiffness.screws import SCREW
+
+_POSE = ("rad", "rad", "rad", "m", "m", "m")
+
+
+def service_section(service: dict[str, Any] | None) -> str:
+    """Load, weight, what they do to the platform, and natural frequencies, as HTML.
+
+    Args:
+        service: of :func:`validation.study.service.at_pose`; None for no section.
+
+    Returns:
+        A table for the loads and one for the frequencies.
+    """
+    if service is None:
+        return ""
+    parts = []
+    if "solution" in service:
+        parts += _loaded(service)
+    if "frequencies" in service:
+        parts.append(_frequencies(service["frequencies"]))
+    return section("The robot at work, at this pose", *parts) if parts else ""
+
+
+def _loaded(service: dict[str, Any]) -> list[str]:
+    """The platform under load and weight."""
+    load = ", ".join(f"{v:.6g}" for v in service["load"])
+    weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
+    about = paragraph(
+        f"Load on the platform [{load}] N m, N at its origin, gravity [{weight}] "
+        "m/s^2, both in base axes; clearances at least energy. The certified bounds "
+        "above are without them."
+    )
+    if "deflection" not in service:
+        return [about, paragraph(f"{service['status']}: {service.get('reason', '')}.")]
+    solution = service["solution"]
+    rows: list[list[Cell]] = [
+        [SCREW[k], Value(solution["platform_screw"][k], _POSE[k], 6),
+         Value(service["deflection"][k], _POSE[k], 6)]
+        for k in range(6)
+    ]  # fmt: skip
+    head = ["", "platform error with load and weight", "of that, by them"]
+    return [about, table(head, rows, "platform under load")]
+
+
+def _frequencies(found: dict[str, Any]) -> str:
+    """Natural frequencies, and the parts whose motion each mode is."""
+    if "frequencies" not in found:
+        return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
+    rows: list[list[Cell]] = []
+    for k, mode in enumerate(found["modes"], 1):
+        parts = list(mode["shares"].items())[:3]  # the largest first
+        shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in parts)
+        rows.append([str(k), Value(mode["frequency"], "Hz", 5), shares])
+    return paragraph(
+        "Natural frequencies, the drives held, clearances at zero."
+    ) + table(["mode", "frequency", "where its spring energy is"], rows, "frequencies")
+
+
+def service_tile(service: dict[str, Any] | None) -> list[Tile]:
+    """What load and weight move the platform by, and the lowest frequency."""
+    if service is None:
+        return []
+    tiles = []
+    if "deflection" in service:
+        screw = np.asarray(service["deflection"])
+        turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
+        note = "The platform's motion at this pose, clearances at least energy."
+        motion: list[str | Value] = [
+            Value(shift, "m", 3),
+            " and ",
+            Value(turn, "rad", 3),
+        ]
+        tiles.append(Tile("By load and weight", motion, [note]))
+    modes = service.get("frequencies", {}).get("modes")
+    if modes:
+        lowest = Value(modes[0]["frequency"], "Hz", 4)
+        tiles.append(Tile("Lowest natural frequency", [lowest], ["Drives held."]))
+    return tiles
