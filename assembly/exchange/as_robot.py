@@ -129,7 +129,9 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             places[body.name] = name, np.eye(4)
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
-        motion = {"joint": joint.kind, "actuated": joint.actuated}
+        motion = {
+            "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits
+        }  # fmt: skip
         motion["joint_stiffness"] = springs.get(joint.name)
         name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
@@ -237,7 +239,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
         joints.append(
             Joint(
                 name, frame.joint, on[frame.parent], child, T,
-                position=float(q), actuated=frame.actuated,
+                position=float(q), actuated=frame.actuated, limits=frame.limits,
             )
         )  # fmt: skip
         on[frame.name] = child

@@ -34,6 +34,7 @@ from forcefit.inputs.errors import BadInput
 
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
          "link": ("pose", "inertial")}  # fmt: skip
+_RANGE = ("lower", "upper")
 _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
@@ -118,6 +119,9 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
     several = tag == "axis2" or joint.child("axis2") is not None
     if several and spring is not None and spring.number("", "-") > 0:
         return f"joint axis {part.tag}, not converted, though it may carry load"
+    if part.tag == "limit" and not several:
+        rest = [one.tag for one in part.children() if one.tag not in _RANGE]
+        return f"joint axis limit {', '.join(rest)}" if rest else ""
     springs_alone = all(one.tag.startswith("spring_") for one in part.children())
     held = part.tag in _HELD_OF_AXIS or (part.tag == "dynamics" and springs_alone)
     return "" if held else f"joint axis {part.tag}"
