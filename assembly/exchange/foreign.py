@@ -11,6 +11,7 @@ from assembly.exchange.as_robot import (
     points_as_joints,
     robot_of_mechanism,
 )
+from assembly.exchange.comparison import Comparison, compare
 from assembly.exchange.conversion import Conversion
 from assembly.exchange.home_pose import close_loops, loop_residual
 from assembly.exchange.loops_file import (
@@ -21,7 +22,6 @@ from assembly.exchange.loops_file import (
 )
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_reading import Comparison, compare
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.sdf import read_sdf
 from assembly.exchange.urdf import read_urdf

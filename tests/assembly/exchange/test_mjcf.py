@@ -8,7 +8,7 @@ import pytest
 
 from assembly.exchange.convert import convert
 from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_reading import compare
+from assembly.exchange.mujoco_reading import compare_here as compare
 from assembly.files.robot_file import read_robot
 from forcefit.inputs.errors import BadInput
 
