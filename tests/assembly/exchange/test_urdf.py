@@ -280,7 +280,10 @@ def test_what_a_plugin_or_a_spring_of_gazebo_may_tie_is_said(tmp_path):
     text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
         </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>
         <gazebo reference="k"><springStiffness>5</springStiffness></gazebo>"""
+    text += '<closure type="gear"><first joint="j"/><second joint="k"/></closure>'
     left_out = read_urdf(file_of(tmp_path, text, "abc")).left_out
+    tie = "closure, not converted, though it may tie or move what it names: 1"
+    assert tie in left_out
     tie = "plugin, not converted, though it may tie or move what it names: 1 (p)"
     assert tie in left_out
     assert "springStiffness, not converted, though it may carry load: 1 (k)" in left_out
