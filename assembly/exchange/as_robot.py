@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.balls import balls_at_rest
 from assembly.exchange.mechanism import (
     HERE,
     Body,
@@ -59,10 +60,9 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
-    joints = [
-        replace(joint, position=float(q))
-        for joint, q in zip(mechanism.joints, home, strict=True)
-    ]
+    pairs = zip(mechanism.joints, home, strict=True)
+    at_home = tuple(replace(joint, position=float(q)) for joint, q in pairs)
+    joints = list(balls_at_rest(at_home))
     loops = []
     for loop in mechanism.loops:
         if loop.point:
