@@ -48,12 +48,12 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         values = rows[lower if lower in (rows.dtype.names or ()) else key]
         values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
         value = float(np.median(values))
-        if np.isfinite(value):
+        if not np.isnan(value):  # infinite where the platform moves freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
     if experiment.clearance_model == "worst" and prepared.loads is None:
         for key, parts in _clearance_parts(prepared).items():
-            if key in reached:
+            if np.isfinite(reached.get(key, {}).get("reached", np.nan)):
                 reached[key]["clearances"] = parts
     return reached
 
@@ -122,18 +122,23 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
     if alone:
-        reach = ", ".join(
-            f"{k} {v['reached']:.4g} {v['unit']}{_of_text(v)}" for k, v in alone.items()
-        )
+        reach = ", ".join(f"{k} {_size_text(v)}{_of_text(v)}" for k, v in alone.items())
         lines.append(f"perfect parts, {why}: {reach}")
     advice = "" if summary.get("load") else ", or give the load of service (--load)"
     for key, one in summary.get("perfect_parts_break", {}).items():
         lines.append(
-            f"warning: perfect parts reach a {key} of {one['reached']:.4g} "
-            f"{one['unit']}, limit {one['limit']:.4g} {one['unit']}: no tolerance of "
-            f"the errors meets it; tighten the clearances{advice}"
+            f"warning: perfect parts reach a {key} {_size_text(one)}, limit "
+            f"{one['limit']:.4g} {one['unit']}: no tolerance of the errors meets it; "
+            f"tighten the clearances{advice}"
         )
     return lines
+
+
+def _size_text(one: Mapping[str, Any]) -> str:
+    """What is reached, with its unit."""
+    if np.isinf(one["reached"]):
+        return "without bound"
+    return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:

@@ -30,7 +30,7 @@ def test_softer_contacts_keep_their_sizes():
 @pytest.mark.exudyn
 @pytest.mark.parametrize("scale", [0.25, 0.125])
 def test_a_tripod_with_clearances_of_a_micrometre_is_simulated(scale):
-    """Two of five postures had no equilibrium under a load at these scales.
+    """Three of ten cases had no equilibrium under loads at these scales.
 
     Exechon: 2-UPR and SPR, overconstrained twice; clearances of 8 um, a quarter and
     an eighth.  The energy is that of the linear model, to the compliance of contacts.
