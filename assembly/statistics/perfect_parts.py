@@ -24,6 +24,8 @@ _DRAWS = 200  # positions of a random clearance model, whose median counts
 _PRECISION = (1e-9, 1e-9)  # [rad, m] of the largest pose errors
 _SHARE = 1e-3  # of the largest pose error: smaller parts are not listed
 _KEYS = ("tilt", "spin", "radial", "axial")
+_OWN = 0.02  # of the largest pose error: less is the precision of the parts
+OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative, above a limit
 
 
@@ -53,8 +55,14 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
     prepared = experiment.energies
     if experiment.clearance_model == "worst" and prepared.loads is None:
         for key, parts in _clearance_parts(prepared).items():
-            if np.isfinite(reached.get(key, {}).get("reached", np.nan)):
-                reached[key]["clearances"] = parts
+            whole = reached.get(key, {}).get("reached", np.nan)
+            if np.isfinite(whole):
+                own = whole - sum(parts.values())
+                # bounds of passive joints' own motion are no clearances of the posture
+                if np.isfinite(prepared.ranges).any() and own > _OWN * whole:
+                    parts[OWN_MOTION] = own
+                largest_first = sorted(parts.items(), key=lambda item: -item[1])
+                reached[key]["clearances"] = dict(largest_first)
     return reached
 
 
@@ -75,8 +83,7 @@ def _clearance_parts(prepared: OnePosture) -> dict[str, dict[str, float]]:
         for name, size in zip(names, sizes.tolist(), strict=True):
             by_kind[name] = by_kind.get(name, 0.0) + size
         least = _SHARE * sum(by_kind.values())
-        listed = {k: v for k, v in by_kind.items() if v > least}
-        parts[key] = dict(sorted(listed.items(), key=lambda item: -item[1]))
+        parts[key] = {k: v for k, v in by_kind.items() if v > least}
     return parts
 
 

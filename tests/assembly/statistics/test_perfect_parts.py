@@ -139,3 +139,17 @@ def test_a_platform_that_moves_freely_has_no_bound(tmp_path, run):
     )  # fmt: skip
     assert status == 0, err
     assert "perfect parts reach a translation without bound, limit 0.001 m" in text
+
+
+def test_the_bounded_motion_of_a_joint_has_its_part_too():
+    """A hinge within 1e-3 rad on the arm: 0.4 mm of it, and 0.1 mm of the radius."""
+    clearance = Clearance(radial=RADIAL, spin=1e-3)
+    frames = (
+        Frame("pin", joint="revolute", clearance=clearance),
+        Frame("tip", "pin", [ARM, 0, 0]),
+    )
+    parts = perfect_parts(experiment(Robot("arm", "tip", frames)))
+    by_kind = parts["translation"]["clearances"]
+    assert by_kind == pytest.approx(
+        {"own motion of passive joints": ARM * 1e-3, "pin.radial": RADIAL}, rel=1e-2
+    )
