@@ -118,6 +118,11 @@ class Diagnosis:
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What is said of the noise: its scale, repeats, memory."""
+        return self.traced.selected.noise.findings
+
     def summary(self) -> str:
         """The text that ``forcefit validation diagnose`` prints."""
         return self.wording(self)

@@ -63,7 +63,7 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "noise_scale": {
             "value": diagnosis.noise_scale[0],
             "std": diagnosis.noise_scale[1],
-            "findings": list(diagnosis.traced.selected.noise.findings),
+            "findings": list(diagnosis.findings),
         },
         "noise_in_time": None
         if diagnosis.noise_in_time is None

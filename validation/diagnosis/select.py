@@ -30,6 +30,7 @@ from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
 from validation.diagnosis.states import State, prediction_gain
 
 _EQUAL = 3.0  # log posterior: difference of equivalent functions
+_CLAIMED = 0.9  # probability of functions from which the best model has them
 _SAME = 1.0  # squared whitened difference of models with equal predictions
 _LISTED = 20  # models in the result
 _COMPARED = 60  # models whose predictions are compared
@@ -70,6 +71,12 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
+    learned = np.array([_functions(s) > 0 for s in states])
+    if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
+        # a function that may as well not be there is not kept
+        first = int(np.argmin(learned))
+        order = [first, *(k for k in range(len(states)) if k != first)]
+        states, weights = [states[k] for k in order], weights[order]
     best, fit = states[0], search.fit
     hypotheses: list[Hypothesis] = []
     values: list[NDArray] = []

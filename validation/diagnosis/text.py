@@ -34,7 +34,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     missing = not_measured(diagnosis.campaign)
     if missing:
         lines += ["", f"not measured: {', '.join(missing)}"]
-    lines += diagnosis.traced.selected.noise.findings
+    lines += diagnosis.findings
     if diagnosis.noise_in_time is not None:
         noise = diagnosis.noise_in_time
         lines += [

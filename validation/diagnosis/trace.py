@@ -34,6 +34,7 @@ from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.plausible import impossible_rows
+from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.registration import register
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
@@ -44,7 +45,10 @@ from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknow
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
-_TURNS = 3  # of the search, with what finite geometric errors add
+_TURNS = 6  # of the search, without gross blunders
+_BENDS = 2  # of them, with what finite geometric errors add
+_GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
+_MOST = 20  # one row in so many may be one
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
 
@@ -173,23 +177,38 @@ def trace(
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
     columns = Columns(campaign, conditions, update, odds)
-    cells = fitted[columns.row]
+    blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     for turn in range(_TURNS):
+        cells = (fitted & ~blunders)[columns.row]
         read = predict(conditions).deviation
         z = whiten(campaign, campaign.measured - read)
         cells &= np.isfinite(z)
         selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
-            campaign, declared, conditions, fitted, cells, selected, columns, finite
-        )
+            campaign, declared, conditions, fitted & ~blunders, cells, selected,
+            columns, finite,
+        )  # fmt: skip
+        traced = replace(traced, outliers=traced.outliers | blunders)
         fit = _fitted(traced)
-        if turn == _TURNS - 1:
-            break
-        bent = _with_errors(conditions, fit, complete)
+        gross = _gross(campaign, fit, traced.used)
+        few = _MOST * (gross | blunders).sum() <= fitted.sum()
+        if gross.any() and few and turn < _TURNS - 1:
+            blunders = blunders | gross
+            continue
+        bent = _with_errors(conditions, fit, complete) if bends < _BENDS else None
         if bent is None or not _differs(campaign, bent, read, fitted):
             break
-        conditions = bent
+        conditions, bends = bent, bends + 1
     return traced, fit
+
+
+def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
+    """(R,) bool, fitted rows so far off that the others must be looked at alone."""
+    left = residual_of(campaign, fit.robot) / campaign.sigma
+    left = np.where(campaign.cells & used[:, None], left, 0.0)
+    count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
+    rms = np.sqrt(np.nan_to_num(left**2).sum(axis=1) / count)
+    return np.asarray(rms > _GROSS * max(float(np.median(rms[used])), 1.0))
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:

@@ -72,7 +72,7 @@ def verdict(
     if kept.functions:
         decided = functions >= CLAIM and not rivals and set(sure) == set(names)
         return ("learned", sure) if decided else ("ambiguous", ())
-    if functions >= RIVAL:
+    if not names and functions >= RIVAL:
         return "ambiguous", ()
     if not names:
         nothing = sum(

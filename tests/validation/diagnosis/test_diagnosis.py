@@ -346,11 +346,3 @@ def test_practice_campaigns_of_another_program(tmp_path):
         if truth[name]["verdict"] == "explained":
             assert row["after"] <= 1.15 * row["floor"]
             assert row["before"] > 2 * row["floor"]
-
-
-def test_noise_that_is_more_than_stated_is_told_where_it_is_sure(diagnosed):
-    """Ten times its standard deviation above one, and worth a word."""
-    found = diagnosed("none")
-    assert "readings scatter" not in text(found)
-    noisier = replace(found, noise_scale=(1.4, 0.04))
-    assert "readings scatter 1.40 +- 0.04 times the sigma stated" in text(noisier)
