@@ -63,7 +63,9 @@ def select(
     if not np.array_equal(again, good):
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
-    return _selected(search, states, good)
+    selected = _selected(search, states, good)
+    search.fit.forget()
+    return selected
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
@@ -115,7 +117,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
         blocks=blocks,
         gain=best.score - search.begin.score,
-        states=tuple(states),
+        states=tuple(states[:_LISTED]),
     )
 
 

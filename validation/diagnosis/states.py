@@ -179,6 +179,13 @@ class Fitting:
                 z = z - self._offset[e]
         return z
 
+    def forget(self) -> None:
+        """Drop what can be computed again: models seen and products of columns."""
+        for state in self._states.values():
+            state.__dict__.pop("marginal", None)
+        for kept in (self._states, self._own, self._offset):
+            kept.clear()
+
     def modes(self) -> list[Mode]:
         """Return the combinations of nuisance parameters in use."""
         small = self.columns.nuisance

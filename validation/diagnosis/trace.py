@@ -29,7 +29,7 @@ from assembly.measurement.predict import (
 )
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
-from validation.diagnosis.columns import Columns
+from validation.diagnosis.columns import FUNCTION, Columns
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import cell_weights
@@ -46,7 +46,7 @@ from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknow
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _TURNS = 6  # of the search, without gross blunders
-_BENDS = 2  # of them, with what finite geometric errors add
+_BENDS = 1  # of them, with what finite geometric errors add
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
 _MOST = 20  # one row in so many may be one
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
@@ -176,6 +176,7 @@ def trace(
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
+    conditions = _with_its_errors(campaign, declared, conditions, fitted, complete)
     columns = Columns(campaign, conditions, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     for turn in range(_TURNS):
@@ -200,6 +201,30 @@ def trace(
             break
         conditions, bends = bent, bends + 1
     return traced, fit
+
+
+def _with_its_errors(
+    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
+    complete: Callable[[Conditions], Conditions],
+) -> Conditions:  # fmt: skip
+    """Conditions with what finite geometric errors add, before anything is searched."""
+    alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
+    columns = Columns(campaign, conditions, odds=alone)
+    cells = fitted[columns.row]
+    for _ in range(_BENDS + 1):
+        read = predict(conditions).deviation
+        z = whiten(campaign, campaign.measured - read)
+        known = cells & np.isfinite(z)
+        selected = select(columns, z[known], known)
+        traced = _traced(
+            campaign, declared, conditions, fitted, known, selected, columns, False
+        )
+        fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
+        bent = _with_errors(conditions, fit, complete)
+        if bent is None or not _differs(campaign, bent, read, fitted):
+            break
+        conditions = bent
+    return conditions
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
