@@ -14,7 +14,6 @@ from validation.diagnosis.report import _tiles
 from validation.diagnosis.sentence import (
     calibration_text,
     formula,
-    noise_text,
     open_text,
     sentence,
 )
@@ -71,16 +70,6 @@ def test_a_calibration_is_said_in_shares():
     )
     unnamed = calibration_text(replace(tally, right=float("nan")))
     assert "named it" not in unnamed
-
-
-def test_scatter_of_repeats_is_a_finding_of_its_own():
-    """What it may be is said: sigma, memory, time, or something not recorded."""
-    lack = SimpleNamespace(sigma_too_small=False, repeats=1.0)
-    one = SimpleNamespace(noise_scale=(2.0, 0.1), lack=lack)
-    assert noise_text(one) == "readings scatter 2.00 +- 0.10 times the sigma stated"
-    lack.sigma_too_small, lack.repeats = True, 2.5
-    assert "repeats 2.50 times: not repeatable" in noise_text(one)
-    assert "memory" in noise_text(one)
 
 
 def test_a_compliance_is_said_to_be_times_the_wrench():

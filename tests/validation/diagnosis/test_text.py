@@ -15,6 +15,12 @@ from validation.diagnosis.structure import Trend
 BEFORE, AFTER = Errors(3e-5, 2e-6, 7.0), Errors(1e-5, float("nan"), 1.5)
 
 
+def found(*findings):
+    """A search that says something of the noise."""
+    noise = SimpleNamespace(findings=findings)
+    return SimpleNamespace(selected=SimpleNamespace(noise=noise))
+
+
 def made(**changes):
     """Four rows of which the last two were held out, and nothing found."""
     return SimpleNamespace(**{
@@ -27,8 +33,8 @@ def made(**changes):
         "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 0.2),
         "saved": Errors(8e-6, 3e-6, 1.0),
         "with_outliers": (Errors(2e-5, 1e-6, 8.0), Errors(9e-6, 1e-6, 2.25)),
-        "noise_scale": (1.0, 0.05), "more_scatter": False, "noise_in_time": None,
-        "lack": SimpleNamespace(sigma_too_small=False, repeats=1.0), "needed": "",
+        "traced": found(), "noise_in_time": None,
+        "needed": "",
         "outliers": np.zeros(4, bool), "open": np.zeros(4, bool),
         "sequence": (Step("declared", 0, BEFORE), Step("geometry", 4.6, AFTER)),
         "trends": (), "next": None, "remarks": (),
@@ -105,8 +111,7 @@ def test_rows_that_would_decide_are_said(shown):
 
 def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
     assert not any("scatter" in line or "correlated" in line for line in shown())
-    more = shown(noise_scale=(1.5, 0.04), more_scatter=True)
-    assert "readings scatter 1.50 +- 0.04 times the sigma stated" in more
+    assert "repeats scatter" in shown(traced=found("repeats scatter"))
     (line,) = [
         line
         for line in shown(noise_in_time=NoiseInTime(0.35, 60.0, 1e-9))
