@@ -1,7 +1,8 @@
 """Public names for editors and type checkers, as in ``__init__.py``."""
 
 from assembly.exact.exact import solve_exact
-from assembly.files.robot_file import read_robot, write_robot
+from assembly.exchange.convert import convert
+from assembly.exchange.robot_files import load_robot, read_robot, write_robot
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.mobility import mobility
@@ -14,7 +15,6 @@ from assembly.platform_stiffness.deflection import load_deflection
 from assembly.platform_stiffness.matrices import PlatformStiffness
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
-from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
@@ -70,6 +70,7 @@ __all__ = [
     "bound_pose_error",
     "build_library",
     "compensate",
+    "convert",
     "crosscheck",
     "diagnose",
     "draw_errors",

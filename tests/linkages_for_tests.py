@@ -66,3 +66,31 @@ def five_bar():
         ]
     closure = (("right.tip", "left.tip"),)
     return Robot("five_bar", "right.tip", tuple(robot), closure)
+
+
+SLIDER_CRANK = 0.2, 0.3  # [m] crank and rod
+
+
+def slider_crank(angle, rod=None, error=0.0):
+    """A crank and a rod whose end slides along x, driven there.
+
+    Args:
+        angle: [rad] of the crank against the slide.
+        rod: link of the rod, rigid without one.
+        error: [m] by which the rod is too long.
+    """
+    crank, length = SLIDER_CRANK
+    down = math.asin(crank * math.sin(angle) / length)
+    end = crank * math.cos(angle) + length * math.cos(down)
+    frames = (
+        Frame("crank", joint="revolute", position=angle),
+        Frame("pin", "crank", [crank, 0, 0], joint="revolute", position=-down - angle),
+        Frame("tip", "pin", [length, 0, 0], link=rod,
+              geometric_error=[0, 0, 0, error, 0, 0]),
+        Frame("slide", rotation=[0, math.pi / 2, 0], joint="prismatic", actuated=True,
+              position=end),
+        Frame("wrist", "slide", rotation=[0, -math.pi / 2, 0], joint="revolute",
+              position=-down),
+        Frame("end", "wrist"),
+    )  # fmt: skip
+    return Robot("slider", "tip", frames, (("tip", "end"),))

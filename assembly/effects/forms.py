@@ -22,7 +22,7 @@ step       ``size``                       0 below ``at``, 1 from there on
 slow_wave  ``sine``, ``cosine``           of x in turns of ``period``
 reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; of a load or a
                                           wrench y its size
-play       ``size``                       -1 to 1: what slips ``depth`` after x turned
+slip       ``size``                       -1 to 1: what slips ``depth`` after x turned
 scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
 waves
 reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
@@ -192,7 +192,7 @@ def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDA
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
-def _play(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
     """The input is what slips after the variable, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
@@ -231,8 +231,8 @@ FORMS: dict[str, Form] = {
              _slow_wave),
         Form("reversal", "a jump where the direction turns", 2, {}, (0, 20), ("",),
              _reversal, remembers=True),
-        Form("play", "what slips after its variable turned", 1, {"depth": True}, None,
-             ("size",), _play, remembers=True),
+        Form("slip", "what slips after its variable turned", 1, {"depth": True}, None,
+             ("size",), _slip, remembers=True),
         Form("scaled_waves", "waves, times a second variable", 2, {}, (0, _MOST),
              _WAVES, _scaled_waves, least=2),
         Form("reversal_waves", "waves that turn with the direction", 2, {}, (0, _MOST),

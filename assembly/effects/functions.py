@@ -122,7 +122,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
     if form is None or not form.remembers:
         return np.column_stack([_now(conditions, first), *inputs])
     history, row = past(conditions, [first])
-    if form.name == "play":
+    if form.name == "slip":
         depth = parameters_of(function, function.components[0])["depth"]
         return history.slip(first, depth)[row, None]
     if form.name == "reversal_waves":

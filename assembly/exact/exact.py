@@ -23,6 +23,7 @@ r       ``closure_residual``  (6 K,)    logarithms of the open closures
 The problem is not convex: the solution is a local minimum, see ``docs/exact.md``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -51,11 +52,12 @@ from assembly.exact.descent import (
 from assembly.exact.equilibrium import imbalance, least_curvature
 from assembly.exact.finite_robot import CLEARANCE, LINK, SPRING, FiniteRobot
 from assembly.exact.placement import Placement, place
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.pieces import CutRobot, cut_beams
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import inverse, logarithm
 from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, closure_signs, virtual_joints
+from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.rounding import differs_from_zero
 from assembly.model.clearance import (
@@ -297,6 +299,7 @@ def solve_exact(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
     near: ExactAssembly | None = None,
+    progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear model.
 
@@ -312,6 +315,7 @@ def solve_exact(
         point: (3,) [m] of the platform, in its axes; the force goes with it.
         near: an equilibrium of the same posture under another load, from which to
             start instead.
+        progress: called with the steps taken and how many there may be.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -343,7 +347,8 @@ def solve_exact(
     def search(joints: VirtualJoints) -> ExactAssembly:
         known = near is not None and len(near.placement.x) == _count(joints)
         first = near.placement.x if near is not None and known else None
-        return ExactAssembly(posture, cut, start, *_search(joints, start, loads, first))
+        found = _search(joints, start, loads, first, progress)
+        return ExactAssembly(posture, cut, start, *found)
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
@@ -358,14 +363,16 @@ def _count(joints: VirtualJoints) -> int:
 
 
 def _search(
-    joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None
-) -> tuple[Expansion, float, int]:
+    joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
+    progress: Callable[[int, int], None],
+) -> tuple[Expansion, float, int]:  # fmt: skip
     """Step after step from a first guess; where it ends, imbalance and count."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))
     penalty, damping, near = 0.0, 0.0, False
     for count in range(1, _STEPS + 1):
+        progress(count, _STEPS)
         local = expand(current, loads, rigid)
         penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
         step = advance(local, penalty, damping, near)

@@ -15,10 +15,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.se3 import exponential, inverse
-from assembly.linear.closure import VirtualJoints, closure_signs
+from assembly.linear.closure import VirtualJoints
 from assembly.model.robot import Robot
 from stiffness.screws import rotation_matrix, transform
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.balls import balls_at_rest
 from assembly.exchange.mechanism import (
     HERE,
     Body,
@@ -59,10 +60,9 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
-    joints = [
-        replace(joint, position=float(q))
-        for joint, q in zip(mechanism.joints, home, strict=True)
-    ]
+    pairs = zip(mechanism.joints, home, strict=True)
+    at_home = tuple(replace(joint, position=float(q)) for joint, q in pairs)
+    joints = list(balls_at_rest(at_home))
     loops = []
     for loop in mechanism.loops:
         if loop.point:
@@ -129,7 +129,9 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
             places[body.name] = name, np.eye(4)
             continue
         turn = transform(np.zeros(3), onto(joint.axis))
-        motion = {"joint": joint.kind, "actuated": joint.actuated}
+        motion = {
+            "joint": joint.kind, "actuated": joint.actuated, "limits": joint.limits
+        }  # fmt: skip
         motion["joint_stiffness"] = springs.get(joint.name)
         name = joint.name
         add(name, parent, T @ turn, position=joint.position, **motion)
@@ -237,7 +239,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
         joints.append(
             Joint(
                 name, frame.joint, on[frame.parent], child, T,
-                position=float(q), actuated=frame.actuated,
+                position=float(q), actuated=frame.actuated, limits=frame.limits,
             )
         )  # fmt: skip
         on[frame.name] = child

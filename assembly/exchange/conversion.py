@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from assembly.exchange.mujoco_reading import Comparison
+from assembly.exchange.comparison import Comparison
 from assembly.model.robot import Robot
 from forcefit.inputs.errors import quoted
 

@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 
 from assembly.exchange.as_robot import RobotAndMechanism, mechanism_of_robot
 from assembly.exchange.calibrated import not_rigid, with_calibration
+from assembly.exchange.comparison import compare
 from assembly.exchange.conversion import Conversion
 from assembly.exchange.fidelity import FAITHFUL, largest_difference
 from assembly.exchange.foreign import READERS, robot_of_file
@@ -25,7 +26,6 @@ from assembly.exchange.loops_file import LoopsFile, loops_text, read_loops
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
 from assembly.exchange.mjcf_writing import mjcf_text
-from assembly.exchange.mujoco_reading import compare
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text

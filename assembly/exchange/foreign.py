@@ -4,24 +4,31 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from numpy.typing import NDArray
+
 from assembly.exchange.as_robot import (
     RobotAndMechanism,
-    guess_platform,
     points_as_joints,
     robot_of_mechanism,
 )
+from assembly.exchange.comparison import Comparison, compare
 from assembly.exchange.conversion import Conversion
 from assembly.exchange.home_pose import close_loops, loop_residual
-from assembly.exchange.loops_file import find_loops_file, read_loops, with_points
+from assembly.exchange.loops_file import (
+    LoopsFile,
+    find_loops_file,
+    read_loops,
+    with_points,
+)
 from assembly.exchange.mechanism import Mechanism
 from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_reading import Comparison, compare
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.sdf import read_sdf
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.xml_file import counted
 from assembly.files.robot_file import robot_of, robot_table
 from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.table import Table, read_toml
 
@@ -50,86 +57,119 @@ def robot_of_file(
     Raises:
         BadInput: a file breaks a rule, or a loop cannot close.
     """
-    ending = source.suffix.lower()
-    if loops is None and ending == ".urdf":
+    if loops is None and source.suffix.lower() == ".urdf":
         loops = find_loops_file(source)
     beside = None if loops is None else read_loops(loops)
     if points:
         if beside is None:
             raise BadInput(f"--points: found some, but {source} has no loops file")
         beside = with_points(beside, points)
-    read = READERS[ending]
-    mechanism, points_taken = read(source, beside), tuple[str, ...]()
+    mechanism = READERS[source.suffix.lower()](source, beside)
     comparison = Comparison("", source.name, "it was not asked")
     if ask or mechanism.unweighed:
         comparison = compare(mechanism, source)
     mechanism = _weighed(mechanism, comparison)
-    before = loop_residual(mechanism, mechanism.home)
-    home, held = mechanism.home, True
+    home, held, taken = mechanism.home, True, tuple[str, ...]()
     if mechanism.loops:
-        try:
-            home, held = close_loops(mechanism, str(source))
-        except BadInput as error:
-            if points is not None or beside is None or not beside.as_generated:
-                raise
-            mechanism = read(source, with_points(beside, ["all"]))
-            mechanism = _weighed(mechanism, comparison)
-            try:
-                home, held = close_loops(mechanism, str(source))
-            except BadInput:
-                raise error from None
-            before = loop_residual(mechanism, mechanism.home)
-            points_taken = (
-                "every loop for a point (3d): all of them are said to be 6d, which is "
-                "what generators write, and so they cannot close "
-                f"({str(error).removeprefix(f'{source}: ')}); --points says which are",
-            )
+        undecided = points is None and beside is not None and beside.as_generated
+        pairs = beside if undecided else None
+        mechanism, home, held, taken = _closed(mechanism, source, pairs)
+    before = loop_residual(mechanism, mechanism.home)
     mechanism = points_as_joints(mechanism, home)
-    if overlay is not None:
-        mechanism = _with_platform(mechanism, overlay)
-    guessed = mechanism.platform is None
+    named = None if overlay is None else _named_platform(overlay)
+    if named in mechanism.bodies:
+        mechanism = replace(mechanism, platform=named)
     placed = robot_of_mechanism(mechanism)
-    content = robot_table(placed.robot)
-    root = (
-        Table(content, str(source), "")
-        if overlay is None
-        else lay_over(content, overlay)
-    )
-    robot = robot_of(root, source.stem)
-    mechanism = placed.mechanism
-    weight = mechanism.bodies[mechanism.root].mass
-    left_out = list(mechanism.left_out)
-    if weight:
-        left_out.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
-    if guessed:
-        left_out.append(
-            f"no platform is named: {robot.platform} was taken, the end of the longest "
-            "chain (an overlay's platform says another)"
-        )
-    after = home_posture(robot).mismatch
+    robot = _laid_over(placed, source, overlay, named)
     conversion = Conversion(
         robot=robot,
         files=(),
         open_before=before,
-        open_after=after,
+        open_after=home_posture(robot).mismatch,
         drives_held=held,
         difference=0.0,
-        left_out=tuple(left_out),
-        taken=points_taken + placed.mechanism.taken,
+        left_out=_left_out(placed, mechanism.platform or named),
+        taken=taken + placed.mechanism.taken,
         comparisons=(comparison,),
     )
     return conversion, placed
 
 
-def _with_platform(mechanism: Mechanism, overlay: Path | str) -> Mechanism:
-    """The mechanism with the platform that an overlay names."""
+def _closed(
+    mechanism: Mechanism, source: Path, beside: LoopsFile | None
+) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
+    """The mechanism with a home in which its loops close.
+
+    Args:
+        mechanism: as it was read.
+        source: its file.
+        beside: the loops file if nobody may have decided the types in it: its loops
+            are taken for points where they cannot close otherwise.  None otherwise.
+
+    Returns:
+        The mechanism, its home (n,) [rad or m], whether the drives stand where the file
+        has them, and what was taken, in words.
+
+    Raises:
+        BadInput: the loops cannot close.
+    """
+    try:
+        return mechanism, *close_loops(mechanism, str(source)), ()
+    except BadInput as error:
+        if beside is None:
+            raise
+        read = READERS[source.suffix.lower()]
+        loose = read(source, with_points(beside, ["all"]))
+        loose = replace(mechanism, bodies={**loose.bodies, **mechanism.bodies},
+                        joints=loose.joints, loops=loose.loops)  # fmt: skip
+        try:
+            home, held = close_loops(loose, str(source))
+        except BadInput:
+            raise error from None
+        reason = str(error).removeprefix(f"{source}: ")
+        taken = (
+            "every loop for a point (3d): all of them are said to be 6d, which is what "
+            f"generators write, and so they cannot close ({reason}); --points says "
+            "which are",
+        )
+        return loose, home, held, taken
+
+
+def _named_platform(overlay: Path | str) -> str | None:
+    """The platform that an overlay names, None if it names none."""
     given = read_toml(overlay)
     if not given.has("platform"):
-        return mechanism
-    name = given.text("platform", expected="the name of a frame")
-    # what is no body may be a frame: that is seen where the overlay is laid over
-    guess = guess_platform(mechanism) if name not in mechanism.bodies else name
-    return replace(mechanism, platform=guess)
+        return None
+    return given.text("platform", expected="the name of a frame")
+
+
+def _laid_over(
+    placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
+    named: str | None,
+) -> Robot:  # fmt: skip
+    """The robot with an overlay; a body that it names as platform is its frame."""
+    content = robot_table(placed.robot)
+    if overlay is None:
+        return robot_of(Table(content, str(source), ""), source.stem)
+    root = lay_over(content, overlay)
+    if named is not None and named in placed.places:
+        root.content["platform"] = placed.places[named][0]
+    return robot_of(root, source.stem)
+
+
+def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
+    """What of the file no robot of frames holds, in words."""
+    mechanism = placed.mechanism
+    weight = mechanism.bodies[mechanism.root].mass
+    lines = list(mechanism.left_out)
+    if weight:
+        lines.append(f"mass of the root link {mechanism.root}: {weight:g} kg")
+    if named is None:
+        lines.append(
+            f"no platform is named: {placed.robot.platform} was taken, the end of the "
+            "longest chain (an overlay's platform says another)"
+        )
+    return tuple(lines)
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:

@@ -51,6 +51,7 @@ class Joint:
         after: (4, 4) of the child, seen from the joint after its motion.
         position: [rad or m] coordinate at home.
         actuated: whether a drive holds it.
+        limits: [rad or m] least and largest coordinate, None where it has none.
         stiffness: [N m/rad or N/m] of a spring in its freedom, 0 without one.
         rest: [rad or m] coordinate at which that spring carries nothing.
     """
@@ -64,6 +65,7 @@ class Joint:
     after: NDArray = field(default_factory=lambda: HERE)
     position: float = 0.0
     actuated: bool = False
+    limits: tuple[float, float] | None = None
     stiffness: float = 0.0
     rest: float = 0.0
 

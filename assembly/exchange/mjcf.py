@@ -40,6 +40,7 @@ _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "defa
              "tendon", "actuator")  # fmt: skip
 _READ = ("name", "type", "pos", "axis", "ref", "class")  # of a joint
 _SPRING = ("stiffness", "springref")
+_RANGE = ("range", "limited")
 _COUNTS = {"ball": 4, "free": 7}  # of a joint's numbers in a key
 
 
@@ -262,6 +263,7 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
             kind = _KINDS[given.choice("type", tuple(_KINDS), "hinge")]
             simple = kind != "ball" and len(given.optional("stiffness").split()) < 2
             read = (*_READ, *_SPRING) if simple else _READ
+            read = read if kind == "ball" else (*read, *_RANGE)
             for key in given.element.attrib:
                 if key not in read:
                     what = f"joint {key}{LOADED if key in _SPRING else ''}"
@@ -270,7 +272,7 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
         if kind in _COUNTS:
             several = several_freedoms(given, name, kind, at.offset)
         else:
-            several = [one_freedom(given, name, kind, at.offset, at.angles.unit)]
+            several = [one_freedom(given, name, kind, at.offset, at.angles)]
         reading.parts[name] = [joint.name for joint in several]
         yield from several
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exchange.mechanism import HERE, Joint, ball, motion, slides
+from assembly.exchange.mjcf_orientation import Angles
 from assembly.exchange.orientation import from_quaternion
 from assembly.exchange.xml_file import Node, placed
 from forcefit.inputs.errors import quoted
@@ -44,7 +45,7 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
 
 
 def one_freedom(
-    given: Node, name: str, kind: str, offset: NDArray, unit: float
+    given: Node, name: str, kind: str, offset: NDArray, angles: Angles
 ) -> Joint:
     """A hinge or a slide, with its spring.
 
@@ -53,7 +54,7 @@ def one_freedom(
         name: of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
-        unit: [rad] of the file's angles.
+        angles: of the file.
 
     Returns:
         The joint, its bodies left open.
@@ -61,6 +62,7 @@ def one_freedom(
     Raises:
         BadInput: a number is none, or the axis is no direction.
     """
+    unit = angles.unit
     pos = given.numbers("pos", 3, "m", _ZERO)
     anchor = offset @ placed(pos, np.eye(3))
     axis = given.unit_vector("axis", np.array([0.0, 0.0, 1.0]))
@@ -75,8 +77,21 @@ def one_freedom(
     # the coordinate at rest is ref: the joint's own zero lies before it
     return replace(
         joint, placement=anchor @ motion(joint, -ref), position=ref,
-        stiffness=stiffness, rest=rest,
+        stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
     )  # fmt: skip
+
+
+def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
+    """Range of a hinge or slide; ``limited`` absent means that a range binds."""
+    limited = node.optional("limited") or "auto"
+    binds = limited == "true" or (limited == "auto" and angles.range_limits)
+    if not node.has("range") or not binds:
+        return None
+    ends = node.text("range").split()
+    if len(ends) != 2:
+        raise node.bad("range", f"found {quoted(' '.join(ends))}, expected 2 numbers")
+    unit = angles.unit if kind == "revolute" else 1.0
+    return node.limits(ends[0], ends[1], unit)
 
 
 def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:

@@ -18,23 +18,28 @@ class Angles:
     Attributes:
         unit: [rad] of its unit.
         sequence: axes of its Euler angles; capitals stand still.
+        range_limits: whether a joint with a range is limited without saying so.
     """
 
     unit: float
     sequence: str
+    range_limits: bool = True
 
     @staticmethod
     def of(root: Node) -> "Angles":
         """As the file's compilers say."""
-        unit, sequence = "degree", "xyz"
+        unit, sequence, automatic = "degree", "xyz", "true"
         for compiler in root.children("compiler"):
             unit = compiler.choice("angle", ("degree", "radian"), unit)
             sequence = compiler.text("eulerseq", sequence)
+            automatic = compiler.text("autolimits", automatic)
             if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
                 raise compiler.bad("eulerseq", "expected three of x, y, z")
             if compiler.text("coordinate", "local") != "local":
                 raise compiler.bad("coordinate", "expected local")
-        return Angles(1.0 if unit == "radian" else math.pi / 180, sequence)
+        return Angles(
+            1.0 if unit == "radian" else math.pi / 180, sequence, automatic == "true"
+        )
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:

@@ -86,7 +86,12 @@ def _bodies(mechanism: Mechanism) -> list[str]:
         if joint.kind != "fixed":
             kind, axis = _KINDS[joint.kind], numbers(joint.axis)
             name = quoteattr(joint.name)
-            lines.append(f'{pad}  <joint name={name} type="{kind}" axis="{axis}"/>')
+            limits = ""
+            if joint.limits is not None:
+                limits = f' limited="true" range="{numbers(joint.limits)}"'
+            lines.append(
+                f'{pad}  <joint name={name} type="{kind}" axis="{axis}"{limits}/>'
+            )
         if body.mass:
             # the format refuses masses in a row, which have no inertia about it
             J = body.inertia + _SMALLEST_INERTIA * np.eye(3)

@@ -1,11 +1,11 @@
 """What MuJoCo reads in a robot's file, beside what was read here.
 
-MuJoCo is not needed; where it is installed, its own compiler and kinematics say where
-bodies stand, what they weigh and how far constraints are open, in random postures.
+Its own compiler and kinematics say where bodies stand, what they weigh and how far
+constraints are open, in random postures.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import pickle
+import sys
 from pathlib import Path
 from typing import Any
 from warnings import catch_warnings, simplefilter
@@ -13,75 +13,20 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.exchange.comparison import POSTURES, Comparison
 from assembly.exchange.mechanism import Mechanism, body_poses
 from assembly.exchange.orientation import to_quaternion
 from assembly.exchange.xml_file import read_xml
 from forcefit.inputs.errors import one_line
 from stiffness.screws import rotation_vector
 
-AGREED = 1e-9  # [rad, m, kg over the largest] what another program may differ by
-_POSTURES = 20
 _LIGHTEST = 1.01e-6  # [kg] what a body without a mass may get, to be moved at all
 _UNIT_INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """What another program read in a file, compared with what was read here.
-
-    Attributes:
-        reader: its name and version.
-        file: that both read.
-        why_not: the reason where it could not be compared, else empty.
-        bodies: how many were compared.
-        masses: of how many bodies.
-        loops: how many.
-        difference: the largest, [rad, m] or relative mass; lengths over the robot's
-            size where that is above 1 m.
-        where: of the largest difference, in words.
-        weights: [kg] and (3,) [m] of bodies whose mass only the other program knows.
-    """
-
-    reader: str
-    file: str
-    why_not: str = ""
-    bodies: int = 0
-    masses: int = 0
-    loops: int = 0
-    difference: float = 0.0
-    where: str = ""
-    weights: Mapping[str, tuple[float, NDArray]] = field(default_factory=dict)
-
-    @property
-    def agrees(self) -> bool:
-        """Whether it found the same robot; what was not compared is no difference."""
-        return self.difference <= AGREED
-
-    def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
-        keys = ("reader", "file", "why_not", "bodies", "masses", "loops", "difference",
-                "where")  # fmt: skip
-        return {key: getattr(self, key) for key in keys}
-
-    def text(self) -> str:
-        """One line for people."""
-        if self.why_not:
-            return f"{self.file} was compared with no other program: {self.why_not}"
-        what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
-        if not self.agrees:
-            return (
-                f"{self.reader} reads {self.file} otherwise: {self.where} differs by "
-                f"{self.difference:.2g}; find out which is right"
-            )
-        return (
-            f"{self.reader} reads {self.file} alike within {self.difference:.1e} in "
-            f"{_POSTURES} random postures: {what}"
-        )
-
-
-def compare(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with what MuJoCo reads in its file.
+def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
+    """Compare a mechanism with what MuJoCo reads in its file, in this process.
 
     Args:
         mechanism: as it was read, or as it was written.
@@ -90,25 +35,28 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     Returns:
         What was compared, or why nothing was.
     """
-    name = path.name
-    if path.suffix.lower() not in {".urdf", ".xml"}:
-        return Comparison("", name, f"MuJoCo reads no {path.suffix.upper()[1:]}")
-    try:
-        import mujoco
-    except ImportError:
-        return Comparison("", name, "MuJoCo is not installed")
+    import mujoco
+
     reader = f"MuJoCo {mujoco.__version__}"
     mujoco.set_mju_user_warning(lambda _: None)  # it would write a log file
     try:
         with catch_warnings():
             simplefilter("ignore")
             model, whole = _model(mujoco, path)
-        return _compared(mujoco, model, mechanism, Comparison(reader, name), whole)
+        return _compared(mujoco, model, mechanism, Comparison(reader, path.name), whole)
     except Exception as error:  # of many kinds, from C++
-        reason = (
-            f"{reader} does not read it ({one_line(' '.join(str(error).split()), 160)})"
-        )
-        return Comparison(reader, name, reason)
+        words = one_line(" ".join(str(error).split()), 160)
+        return Comparison(reader, path.name, f"{reader} does not read it ({words})")
+
+
+def main() -> None:
+    """Compare what a file of :mod:`assembly.exchange.comparison` says, in a process."""
+    given, made = Path(sys.argv[1]), Path(sys.argv[2])
+    with given.open("rb") as file:
+        mechanism, path = pickle.load(file)
+    answer = compare_here(mechanism, path)
+    with made.open("wb") as file:
+        pickle.dump(answer, file)
 
 
 def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
@@ -182,7 +130,7 @@ def _compared(
     rules = _rules(mujoco, model)
     loops = [loop for loop in mechanism.loops if loop.name in rules]
     random, data = np.random.default_rng(1), mujoco.MjData(model)
-    for _ in range(_POSTURES):
+    for _ in range(POSTURES):
         q = mechanism.home + random.uniform(-1, 1, len(mechanism.joints))
         poses = _placed(mujoco, model, data, mechanism, q)
         reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
@@ -12,12 +13,14 @@ OTHERS = (".urdf", ".xml", ".sdf")
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
-def load_robot(name: str | Path) -> Robot:
+def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
     """A built-in robot by its name, or the robot of a file of any kind.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file, a URDF (with its loops
             beside it), MJCF or SDF file.
+        close: makes of a robot as declared one whose closures hold, as
+            :mod:`assembly.kinematics.closing` does; none if absent.
 
     Returns:
         The robot; of other programs' files what was taken and what was left out is
@@ -28,7 +31,7 @@ def load_robot(name: str | Path) -> Robot:
     """
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
-        return load_declared(name)
+        return load_declared(name, close)
     from assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
@@ -39,7 +42,8 @@ def load_robot(name: str | Path) -> Robot:
         if any(word in line for word in _WEIGHTY)
     ]
     remarks = tuple(f"{path.name}: {line}" for line in said)
-    return replace(conversion.robot, remarks=(*conversion.robot.remarks, *remarks))
+    robot = conversion.robot if close is None else close(conversion.robot)
+    return replace(robot, remarks=(*robot.remarks, *remarks))
 
 
 def read_robot(path: str | Path) -> Robot:

@@ -34,6 +34,7 @@ from forcefit.inputs.errors import BadInput
 
 _HELD = {"joint": ("pose", "parent", "child", "axis", "axis2"),
          "link": ("pose", "inertial")}  # fmt: skip
+_RANGE = ("lower", "upper")
 _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
@@ -76,7 +77,7 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     ]
     mechanism = Mechanism(
         name=model.text("name", Path(path).stem), root=base, bodies=bodies,
-        joints=order, loops=tuple(closed), left_out=tuple(_left_out(frames)),
+        joints=order, loops=tuple(closed), left_out=tuple(_left_out(frames, root)),
         taken=tuple(_taken({name: words for name, (_, words) in made.items()})),
         couplings=leaders_first(couplings, str(path)),
     )  # fmt: skip
@@ -118,6 +119,9 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
     several = tag == "axis2" or joint.child("axis2") is not None
     if several and spring is not None and spring.number("", "-") > 0:
         return f"joint axis {part.tag}, not converted, though it may carry load"
+    if part.tag == "limit" and not several:
+        rest = [one.tag for one in part.children() if one.tag not in _RANGE]
+        return f"joint axis limit {', '.join(rest)}" if rest else ""
     springs_alone = all(one.tag.startswith("spring_") for one in part.children())
     held = part.tag in _HELD_OF_AXIS or (part.tag == "dynamics" and springs_alone)
     return "" if held else f"joint axis {part.tag}"
@@ -133,7 +137,7 @@ def _taken(words: dict[str, str]) -> Iterator[str]:
         yield from counted(what, names)
 
 
-def _left_out(frames: Frames) -> Iterator[str]:
+def _left_out(frames: Frames, root: Node) -> Iterator[str]:
     """What an SDF says and a robot of frames cannot hold."""
     extra: dict[str, list[str]] = {}
 
@@ -143,6 +147,14 @@ def _left_out(frames: Frames) -> Iterator[str]:
     links = {name for name, _ in frames.of("link")} - {WORLD}
     tied = {name for name, _ in frames.of("frame")}
     joints = {name for name, _ in frames.of("joint")}
+    for node in (
+        inner for world in root.children("world") for inner in world.children()
+    ):
+        if (
+            node.tag not in {"frame", "joint"}
+            and node.element is not frames.model.element
+        ):
+            add(f"{node.tag} of the world", node.optional("name"))
     for _, model in frames.of("model"):
         for node in model.node.children():
             if node.tag not in (*FRAMES, "pose", "static", "model", "include"):

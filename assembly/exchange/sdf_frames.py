@@ -143,6 +143,8 @@ def frames_of(root: Node) -> Frames:
     """
     worlds = list(root.children("world"))
     models = [m for group in (root, *worlds) for m in group.children("model")]
+    if len(models) > 1:  # the ground, say
+        models = [m for m in models if not _is_static(m)]
     if not models:  # one that is elsewhere
         given = [i for group in (root, *worlds) for i in group.children("include")]
         models = given if len(given) == 1 else []
@@ -157,6 +159,12 @@ def frames_of(root: Node) -> Frames:
             _take(frames, node, _AROUND, node.text("name"), old)
     _gather(frames, model, "", _AROUND, old)
     return frames
+
+
+def _is_static(model: Node) -> bool:
+    """Whether a model stands still."""
+    static = model.child("static")
+    return static is not None and static.content.lower() in {"true", "1"}
 
 
 def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> None:

@@ -95,7 +95,8 @@ def joint_parts(
     after = np.linalg.inv(at) @ frames.pose(child)
     if len(parts) == 1:
         ((_, one, axis),) = parts
-        joint = Joint(name, one, parent, carried, placement, axis, after)
+        limits = _limits(node) if one != "fixed" else None
+        joint = Joint(name, one, parent, carried, placement, axis, after, limits=limits)
         return [_with_spring(joint, node)], []
     return chain(name, parent, carried, placement, after, parts)
 
@@ -111,6 +112,17 @@ def _with_spring(joint: Joint, node: Node) -> Joint:
         stiffness=_number(dynamics, "spring_stiffness", 0.0),
         rest=_number(dynamics, "spring_reference", 0.0),
     )
+
+
+def _limits(node: Node) -> tuple[float, float] | None:
+    """Range of a joint of one freedom."""
+    axis = node.child("axis")
+    limit = None if axis is None else axis.child("limit")
+    if limit is None:
+        return None
+    ends = [limit.child(tag) for tag in ("lower", "upper")]
+    lower, upper = (None if end is None else end.content for end in ends)
+    return limit.limits(lower, upper)
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:

@@ -21,7 +21,7 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
     Raises:
         BadInput: it names two of them, and is of no harmless kind.
     """
-    if any(part in node.tag.lower() for part in _HARMLESS):
+    if _is_harmless(node):
         return
     named = node.names_in(owners)
     if len({owners[name] for name in named}) > 1:
@@ -29,6 +29,11 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
             "", f"found it between {quoted(named[0])} and {quoted(named[1])}: it may "
             "tie them, and is not converted; expected joints, or a file without it"
         )  # fmt: skip
+
+
+def _is_harmless(node: Node) -> bool:
+    """Whether an element is of a kind that refers to bodies and holds none."""
+    return any(part in node.tag.lower() for part in _HARMLESS)
 
 
 def may_tie(node: Node, names: Container[str]) -> str:
@@ -41,7 +46,8 @@ def may_tie(node: Node, names: Container[str]) -> str:
     Returns:
         What is added to its name.
     """
-    if node.tag == "plugin" and len(node.names_in(names)) > 1:
+    unknown = node.tag == "plugin" or not _is_harmless(node)
+    if unknown and len(node.names_in(names)) > 1:
         return ", not converted, though it may tie or move what it names"
     if node.tag == "springStiffness":  # of Gazebo, at a joint of the URDF
         return ", not converted, though it may carry load"

@@ -6,6 +6,7 @@ Sources:
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -121,7 +122,19 @@ def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
     if len(freedoms) > 1:
         return chain(name, ends[0], ends[1], placement, HERE, freedoms)
     ((_, kind, axis),) = freedoms
-    return [Joint(name, kind, ends[0], ends[1], placement, axis)], []
+    joint = Joint(name, kind, ends[0], ends[1], placement, axis)
+    return [replace(joint, limits=_limits(node))], []
+
+
+def _limits(node: Node) -> tuple[float, float] | None:
+    """Range of a joint, None of one that is continuous or says none."""
+    limit = node.child("limit")
+    if limit is None or node.text("type") in {"fixed", "continuous"}:
+        return None
+    ends = (limit.element.get("lower"), limit.element.get("upper"))
+    # absent means 0 in the format; both absent is how files say that there are none
+    lower, upper = ("0" if end is None else end for end in ends)
+    return None if ends == (None, None) else limit.limits(lower, upper)
 
 
 def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
@@ -152,7 +165,12 @@ def _left_out(
     extra: dict[str, list[str]] = {}
     for joint in joints:
         for inner in joint.children():
-            if inner.tag not in _HELD and inner.tag != "axis2":
+            if inner.tag == "limit":
+                for what in sorted(set(inner.element.keys()) - {"lower", "upper"}):
+                    extra.setdefault(f"joint limit {what}", []).append(
+                        joint.text("name")
+                    )
+            elif inner.tag not in _HELD and inner.tag != "axis2":
                 extra.setdefault(f"joint {inner.tag}", []).append(joint.text("name"))
     for link in links:
         for inner in link.children():

@@ -67,8 +67,10 @@ def _link(body: Body) -> list[str]:
 
 
 def _joint(joint: Joint) -> list[str]:
-    """``<joint>``; one that turns has no limits, so it is continuous."""
-    kind = {"revolute": "continuous"}.get(joint.kind, joint.kind)
+    """``<joint>``; one that turns without limits is continuous."""
+    kind = joint.kind
+    if kind == "revolute" and joint.limits is None:
+        kind = "continuous"
     T = joint.placement
     turn = to_roll_pitch_yaw(T[:3, :3])
     lines = [
@@ -79,8 +81,10 @@ def _joint(joint: Joint) -> list[str]:
     ]
     if joint.kind != "fixed":
         lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
-    if joint.kind == "prismatic":  # the format asks for limits here
+    if kind in {"revolute", "prismatic"}:  # the format asks for limits here
+        lower, upper = joint.limits or (-1e3, 1e3)
         lines.append(
-            '    <limit lower="-1e3" upper="1e3" effort="1e6" velocity="1e3"/>'
+            f'    <limit lower="{lower!r}" upper="{upper!r}" effort="1e6" '
+            'velocity="1e3"/>'
         )
     return [*lines, "  </joint>"]

@@ -20,6 +20,8 @@ _SKIPPED = re.compile(
     r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
 )
 
+_ENDLESS = 1e3  # [rad or m] limits as far as this bind nothing
+
 
 @dataclass(frozen=True)
 class Node:
@@ -148,6 +150,35 @@ class Node:
         """One finite number of an attribute; see :meth:`numbers`."""
         given = None if default is None else np.array([default])
         return float(self.numbers(key, 1, unit, given)[0])
+
+    def limits(
+        self, lower: str | None, upper: str | None, unit: float = 1.0
+    ) -> tuple[float, float] | None:
+        """Least and largest coordinate of a joint from two texts.
+
+        Args:
+            lower: a number, infinite or of any size; None where it is absent.
+            upper: likewise.
+            unit: by which they are multiplied.
+
+        Returns:
+            Both [rad or m], 1e6 for one that is absent or larger; None where neither
+            binds, or where they leave no range.
+
+        Raises:
+            BadInput: no number.
+        """
+        ends = []
+        for text, far in ((lower, -LARGEST_LENGTH), (upper, LARGEST_LENGTH)):
+            try:
+                value = far if text is None else unit * float(text)
+            except ValueError:
+                value = np.nan
+            if np.isnan(value):
+                raise self.bad("", f"found {describe(text)}, expected a number")
+            ends.append(float(np.clip(value, -LARGEST_LENGTH, LARGEST_LENGTH)))
+        binds = ends[0] > -_ENDLESS or ends[1] < _ENDLESS
+        return (ends[0], ends[1]) if binds and ends[0] < ends[1] else None
 
     def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
         """(3,) direction of an attribute, of length 1."""

@@ -2,7 +2,7 @@
 
 import math
 import os.path
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,15 +33,17 @@ from forcefit.inputs.table import (
 from forcefit.inputs.writing import ROBOT_MARK, write_text
 from stiffness.screws import rotation_matrix, rotation_vector
 
+Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # characters
 _MOST_FRAMES = 2000
 
 
-def read_robot(path: Path | str) -> Robot:
+def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
     """Robot of a robot file.
 
     Args:
         path: a ``.toml`` file in the public format.
+        close: makes of the robot as declared one whose closures hold; none if absent.
 
     Returns:
         The robot; its nominal closures hold in its home pose.
@@ -49,15 +51,16 @@ def read_robot(path: Path | str) -> Robot:
     Raises:
         BadInput: the file breaks a rule of the format, or a closure does not hold.
     """
-    return robot_of(read_toml(Path(path)), Path(path).stem)
+    return robot_of(read_toml(Path(path)), Path(path).stem, close)
 
 
-def robot_of(root: Table, name: str) -> Robot:
+def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     """Robot of a robot file's root table.
 
     Args:
         root: the table; paths in it are relative to the folder of ``root.file``.
         name: of the robot if the table has none.
+        close: of :func:`read_robot`.
 
     Returns:
         The robot; its nominal closures hold in its home pose.
@@ -67,6 +70,7 @@ def robot_of(root: Table, name: str) -> Robot:
     """
     robot = declared_robot(root, name)
     try:
+        robot = robot if close is None else close(robot)
         return with_spans(robot, home_posture(robot).coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None

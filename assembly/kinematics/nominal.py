@@ -41,6 +41,11 @@ class Target:
         given = self.pose if self.pose is not None else self.coordinates
         return 0 if given is None else len(given)
 
+    def rows(self, which: NDArray) -> "Target":
+        """Some of the targets."""
+        parts = (self.pose, self.coordinates)
+        return Target(*(None if part is None else part[which] for part in parts))
+
 
 def size_of(robot: Robot) -> float:
     """[m] reference length: the longest body of the robot, 1 if all are points."""

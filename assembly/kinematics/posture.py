@@ -21,7 +21,10 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.nominal import NOT_CLOSED, Target, follow
+from assembly.kinematics.closure_rates import redundant_drives
+from assembly.kinematics.modes import follow_in_mode
+from assembly.kinematics.nominal import NOT_CLOSED, Target, follow, size_of
+from assembly.kinematics.singular_posture import is_singular
 from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
@@ -31,6 +34,7 @@ from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
 _HOME_TOLERANCE = 1e-6  # [rad, m] what rounded robot files may leave open at home
+_SMALL = 1e-5  # of the reference length: the same of robots smaller than 100 mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,20 +186,61 @@ def home_posture(robot: Robot) -> Posture:
         The posture.
 
     Raises:
-        BadInput: a closure does not hold to 1e-6 rad and m; it is named.
+        BadInput: a closure does not hold to 1e-6 rad and m, or 1e-5 of the longest
+            body where that is less; it is named.
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
     track = follow(robot, robot.positions, Target(coordinates=held[None]), guess=True)
-    if not track.mismatch[0] < _HOME_TOLERANCE:
-        k = int(np.argmax(track.closure_mismatch[0]))
+    turned, shifted = _left_open(robot, track.transforms[0])
+    least = min(_HOME_TOLERANCE, _SMALL * size_of(robot))
+    beyond = ~((turned < _HOME_TOLERANCE) & (shifted < least))
+    if beyond.any():
+        excess = np.maximum(turned / _HOME_TOLERANCE, shifted / least)
+        k = int(np.argmax(np.where(beyond, np.nan_to_num(excess, nan=np.inf), 0.0)))
         a, b = robot.closures[k]
+        way_out = _way_out(robot, track.transforms[0], float(track.mismatch[0]))
         raise BadInput(
             f'{robot.name}: closure[{k + 1}] ("{a}", "{b}") does not hold in the home '
-            f"pose: off by {track.closure_mismatch[0, k]:.3g} rad or m with the "
-            f"actuated joints held, expected < {_HOME_TOLERANCE:g}"
+            f"pose: off by {_either(turned[k], shifted[k], least)}"
+            f"{way_out}; --rest NAME makes it a geometric error of a frame in that loop"
         )
     return _posture(robot, track, 0)
+
+
+def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
+    """(closures,) [rad] and [m] largest components left open in each closure."""
+    pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
+    first, second = (T[[pair[k] for pair in pairs]] for k in (0, 1))
+    between = first[:, :3, :3] @ np.swapaxes(second[:, :3, :3], -1, -2)
+    turned = np.abs(rotation_vector(between)).max(axis=-1, initial=0.0)
+    return turned, np.abs(first[:, :3, 3] - second[:, :3, 3]).max(axis=-1, initial=0.0)
+
+
+def _either(turned: float, shifted: float, least: float) -> str:
+    """The mismatch in the unit in which it is too large, and what is expected."""
+    if shifted < least:
+        return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
+    return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
+
+
+def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
+    """What redundant drives can do, where there are some."""
+    count = redundant_drives(robot, T, left_open)
+    if count <= 0:
+        return ""
+    drives = sum(f.actuated for f in robot.frames)
+    return (
+        f"; {count} of {drives} drives redundant: with --mismatch spring elastic "
+        "drives take up what does not fit"
+    )
+
+
+@lru_cache(maxsize=64)
+def home_is_singular(robot: Robot) -> bool:
+    """Whether operation modes meet at home; see :func:`is_singular`."""
+    home = home_posture(robot)
+    return is_singular(robot, home.coordinates, home.transforms)
 
 
 def place_robot(
@@ -206,7 +251,9 @@ def place_robot(
     """The posture of a nominal platform pose, or of actuated coordinates.
 
     The closures are followed from the home pose along a straight line, so the assembly
-    mode is the home pose's.  What the input leaves undetermined stays near home.
+    mode is the home pose's.  What the input leaves undetermined stays near home.  At a
+    singular home pose operation modes meet: there the platform keeps what is not given
+    as it is at home, if it can, its rotation first.
 
     Args:
         robot: any.
@@ -222,7 +269,6 @@ def place_robot(
         BadInput: both or an unknown name given, a value not finite, or out of reach;
             the message gives the distance that is missing.
     """
-    home = home_posture(robot)
     if pose and joints:
         raise BadInput("found both a pose and joints, expected one of them")
     if joints:
@@ -230,8 +276,8 @@ def place_robot(
     elif pose:
         target = pose_target(pose)
     else:
-        return home
-    track = follow(robot, home.coordinates, target)
+        return home_posture(robot)
+    track = _follow(robot, target)
     if not track.reached[0]:
         raise BadInput(f"{robot.name}: {unreached(robot, track, target, 0)}")
     return _posture(robot, track, 0)
@@ -311,7 +357,7 @@ def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
     """For each target its posture, or None and the reason."""
-    track = follow(robot, home_posture(robot).coordinates, target)
+    track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
         for i, reached in enumerate(track.reached)
@@ -323,6 +369,14 @@ def _follow_many(
     return postures, reasons
 
 
+def _follow(robot: Robot, target: Target) -> Track:
+    """Targets followed from home, in a mode where modes meet there."""
+    home = home_posture(robot)
+    pose = pose_components(home.platform)
+    singular = home_is_singular(robot)
+    return follow_in_mode(robot, home.coordinates, pose, target, singular)
+
+
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     """Why target i was not reached, with the distance that is missing."""
     if target.pose is None:
@@ -330,11 +384,15 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
         return (
             f"these joint coordinates cannot be reached: the closures stop holding "
             f"{remaining:.3g} % of the way before them; {NOT_CLOSED}"
+            f"{_way_out(robot, home_posture(robot).transforms)}"
         )
     goal = target.pose[i]
     reached = pose_components(track.transforms[i, robot.index(robot.platform)])
     given = [k for k in range(6) if np.isfinite(goal[k])]
     asked = ", ".join(f"{POSE[k]}={goal[k]:.6g}" for k in given)
+    why = NOT_CLOSED
+    if len(given) < len(POSE) and home_is_singular(robot):
+        why += "; home is a singular posture: name all six components of the pose"
     gap = np.array([
         goal[k] - reached[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
     ])
@@ -349,7 +407,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     stop = ", ".join(f"{POSE[k]}={reached[k]:.6g}" for k in given)
     return (
         f"pose {asked} cannot be reached: on the straight line from home the platform "
-        f"stops at {stop}, {' and '.join(parts)} short; {NOT_CLOSED}"
+        f"stops at {stop}, {' and '.join(parts)} short; {why}"
     )
 
 

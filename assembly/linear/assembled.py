@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import Linearisation, VirtualJoints, closure_signs
+from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import (
     FrameLoads,
     loads_on_frames,
@@ -36,11 +37,21 @@ from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
 from assembly.solvers.conic import cone_sizes
-from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
+from forcefit.inputs.display import (
+    Figures,
+    html_table,
+    largest_row,
+    numbers,
+    screw_text,
+    short_repr,
+)
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+_ROUNDED = 1e-9  # of the largest wrench
+_NOTHING = 1e-12  # [N m, N]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +84,8 @@ class Assembly:
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly solve`` prints of it."""
-        forces = np.linalg.norm(self.tip_wrenches[:, 3:], axis=1)
-        # bodies in a row carry the same force: the first, whatever rounding says
-        most = int(np.argmax(forces >= (1 - 1e-9) * forces.max()))
+        forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
+        most = largest_row(forces)  # bodies in a row carry the same force
         return {
             "pose": f"{numbers(self.posture.pose().values())} m, rad",
             **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
@@ -297,6 +307,21 @@ class Assembly:
         # inside an assembly zone the least energy is zero, and no gap relative to it
         scale = max(self.stored, 1e-4 * self.energy_without_clearance, 1e-300)
         return self.duality_gap() / scale
+
+
+def without_rounding(wrenches: NDArray) -> NDArray:
+    """Wrenches without components that are rounding of the others.
+
+    Args:
+        wrenches: (..., n, 6) [N m, N] of the n bodies of a robot.
+
+    Returns:
+        The same, 0 what is below 1e-9 of the largest of a robot, or below 1e-12.
+    """
+    sizes = np.abs(wrenches)
+    largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)
+    least = np.maximum(_ROUNDED * largest, _NOTHING)
+    return np.where(sizes < least, 0.0, wrenches)
 
 
 def all_loads(

@@ -24,6 +24,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
@@ -272,14 +273,3 @@ def checked_size(robot: Robot) -> float:
             f"most {LARGEST_LENGTH:g} [rad, m]"
         )
     return size_of(robot)
-
-
-@lru_cache(maxsize=64)
-def closure_signs(robot: Robot) -> NDArray:
-    """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
-    paths = robot.on_path.astype(int)
-    pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
-    count = len(robot.frames)
-    signs = np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)
-    signs.setflags(write=False)
-    return signs

@@ -187,6 +187,24 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     return bodies, carried
 
 
+def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
+    """A remark on gravity that acts on nothing.
+
+    Args:
+        robot: any.
+        gravity: (3,) [m/s^2] or None.
+
+    Returns:
+        One sentence, or none.
+    """
+    if gravity is None or not np.any(gravity) or _masses(robot)[:, [0, 4]].any():
+        return []
+    return [
+        'nothing has a mass: gravity changes nothing; expected "density" of links or '
+        '"mass" of frames'
+    ]
+
+
 def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
     """The part of :func:`weights` that acts along the links and counts at their tips.
 

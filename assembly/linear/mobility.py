@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import closure_signs
 from assembly.linear.thresholds import rank_of
 
 

@@ -29,12 +29,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.kinematics.nominal import Target, follow, mobile, motion_screws, size_of
+from assembly.kinematics.closure_rates import SINGULAR, closure_matrices
+from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.closure import closure_signs
 from assembly.linear.thresholds import rank_of
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.display import html_table, largest_row, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
@@ -98,10 +98,10 @@ class Singularities:
             near_kinds = []
             for kind in KINDS:
                 if getattr(self, kind)[i] < near:
-                    joint = np.abs(moving[kind][i]).argmax()
+                    joint = largest_row(np.abs(moving[kind][i]))
                     text = f"{kind}: {robot.frames[joint].name}"
                     if kind == "parallel":
-                        component = np.abs(self.parallel_screws[i]).argmax()
+                        component = largest_row(np.abs(self.parallel_screws[i]))
                         text += f", platform {SCREW[component]}"
                     near_kinds.append(text)
             texts.append("; ".join(near_kinds))
@@ -145,36 +145,16 @@ def _generic_ranks(robot: Robot) -> _Ranks:
         driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
     )
     track = follow(robot, home.coordinates, Target(coordinates=goals))
-    A, B, P = _matrices(robot, track.transforms[track.reached])
+    A, B, P = closure_matrices(robot, track.transforms[track.reached])
     rank = max(map(_rank, A))
     N = _null_space(A, rank)[0]
     motions = max(map(_rank, N @ B))
     return _Ranks(rank, motions, max(map(_rank, N @ P)))
 
 
-def _rank(A: NDArray) -> int:
-    """How many singular values are above rounding."""
-    return rank_of(np.linalg.svd(A, compute_uv=False), _RANK, noise=_RANK)
-
-
-def _matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Closures (k, 6 c, m), drives and platform (k, m, a + 6), platform (k, m, 6)."""
-    # of the m mobile joints, scaled, read at the platform's origin
-    size = size_of(robot)
-    i = robot.index(robot.platform)
-    screws = motion_screws(robot, T)
-    screws[..., 3:] += np.cross(screws[..., :3], T[:, None, i, :3, 3])
-    moves = mobile(robot)
-    slides = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
-    screws *= np.where(slides, size, 1.0) / np.array([1, 1, 1, size, size, size])
-    signs = closure_signs(robot)[:, moves]
-    A = np.einsum("cm,kms->kcsm", signs, screws[:, moves])
-    A = A.reshape(len(T), 6 * len(signs), int(moves.sum()))
-    P = screws[:, moves] * robot.on_path[i, moves, None]
-    driven = np.array([f.actuated for f in robot.frames])
-    drives = np.eye(len(robot.frames))[moves][:, driven]
-    drives = np.broadcast_to(drives, (len(T), *drives.shape))
-    return A, np.concatenate([drives, P], axis=2), P
+def _rank(A: NDArray, least: float = _RANK) -> int:
+    """How many singular values are above rounding, or above another size."""
+    return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -189,16 +169,20 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
     """The distances, with the ranks that they would have away from singularities."""
-    A, B, _ = _matrices(robot, T)
+    A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
-    drives = B.shape[2] - 6
-    W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
-    Q = Q[:, : ranks.motions]
-    # joint rates that go with the rows of Q
-    rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
-    rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
-    serial, still_platform = _least(Q[..., drives:], ranks.platform)
-    parallel, still_drives = _least(Q[..., :drives], ranks.motions)
+    measured = _drives_and_platform(N, B, ranks)
+    closure = np.where(closure > SINGULAR, closure, 0.0)
+    for i in np.flatnonzero(closure == 0.0).tolist():
+        # the closures leave more motions than elsewhere: all of them count here
+        here = slice(i, i + 1)
+        more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
+        own = _ranks_there(more[0] @ B[i], ranks)
+        for values, value in zip(
+            measured, _drives_and_platform(more, B[here], own), strict=True
+        ):
+            values[here] = value
+    serial, parallel, serial_rates, parallel_rates, screws = measured
     moves = mobile(robot)
 
     def all_joints(part: NDArray) -> NDArray:
@@ -210,10 +194,39 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
         serial=serial,
         parallel=parallel,
         closure=closure,
-        serial_joints=all_joints((still_platform[:, None] @ rates)[:, 0]),
-        parallel_joints=all_joints((still_drives[:, None] @ rates)[:, 0]),
-        parallel_screws=(still_drives[:, None] @ Q[..., drives:])[:, 0],
+        serial_joints=all_joints(serial_rates),
+        parallel_joints=all_joints(parallel_rates),
+        parallel_screws=screws,
         closure_joints=all_joints(resisting),
+    )
+
+
+def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
+    """Ranks where closures leave more motions than they generally do."""
+    motions = _rank(moved, SINGULAR)
+    # motions that move drives alone everywhere are no serial singularity here either
+    always = generic.motions - generic.platform
+    return _Ranks(generic.closures, motions, min(motions - always, 6))
+
+
+def _drives_and_platform(
+    N: NDArray, B: NDArray, ranks: _Ranks
+) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Serial and parallel distance of motions (k, r, m), their rates, a screw."""
+    drives = B.shape[2] - 6
+    W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
+    Q = Q[:, : ranks.motions]
+    # joint rates that go with the rows of Q
+    rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
+    rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
+    serial, still_platform = _least(Q[..., drives:], ranks.platform)
+    parallel, still_drives = _least(Q[..., :drives], ranks.motions)
+    return (
+        serial,
+        parallel,
+        (still_platform[:, None] @ rates)[:, 0],
+        (still_drives[:, None] @ rates)[:, 0],
+        (still_drives[:, None] @ Q[..., drives:])[:, 0],
     )
 
 

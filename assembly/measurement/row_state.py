@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.exact.dead_load import DeadLoads, dead_loads_of_rows, resultants
 from assembly.exact.finite_robot import along_own
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.se3 import (
     exponential,
@@ -27,7 +28,6 @@ from assembly.kinematics.se3 import (
     logarithm,
     turn_jacobian,
 )
-from assembly.linear.closure import closure_signs
 from assembly.linear.without_clearance import (
     Flexibility,
     at_postures,

@@ -35,7 +35,12 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.exact.placement import place
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import solve_assembly
-from assembly.platform_stiffness.deflection import DeflectionCurve, Event, mode_text
+from assembly.platform_stiffness.deflection import (
+    DeflectionCurve,
+    Event,
+    Progress,
+    mode_text,
+)
 from assembly.platform_stiffness.exact_tangent import (
     FLAT,
     part_owners,
@@ -134,6 +139,7 @@ def follow_load(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     count: int = 20,
+    progress: Progress = lambda what, done, most: None,
 ) -> DeflectionCurve:
     """Follow the path of equilibria until the load leaves a range.
 
@@ -146,6 +152,7 @@ def follow_load(
         gravity: (3,) [m/s^2] base axes.
         count: of steps of the first one's length from first to last load; steps grow
             to twice that where the path is straight.
+        progress: called with the points found and how many there may be.
 
     Returns:
         The curve; its events are ``"critical"`` loads, with the mode.
@@ -169,6 +176,7 @@ def follow_load(
     place, path = _begin(path, start, first, last)
     places, events, step, longest = [place], [], 1.0 / count, 2.0 / count
     while len(places) < _STEPS and abs(places[-1].load - first) <= span:
+        progress("points of the path", len(places), _STEPS)
         there, corrections = _advance(path, places[-1], step)
         if there is None:
             step /= 2
@@ -283,12 +291,14 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
     turns = low.rise * high.rise < 0
     # the mode that changes: the last of the falling ones on the side with more of them
     more = high if high.unstable > low.unstable else low
-    mode = more.modes[:, more.unstable - 1]
+    soft = more.unstable - 1
+    bent = more.modes[:, soft]
     what = "limit point, the load turns" if turns else "branch point, buckles"
     model = more.local.placement.model
     words = mode_text(
-        platform_moves(more.local) @ mode, mode[model.springs], path.parts, model.size
-    )
+        platform_moves(more.local) @ more.modes, soft, bent[model.springs],
+        path.parts, model.size,
+    )  # fmt: skip
     moved = float(high.local.placement.platform_screw[path.component])
     return Event(high.load, "critical", f"{what}: {words}", moved)
 

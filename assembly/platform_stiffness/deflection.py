@@ -32,7 +32,7 @@ from assembly.platform_stiffness.matrices import (
     numbers_of,
 )
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.inputs.display import html_table, largest_row, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
@@ -40,6 +40,7 @@ _CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed
 # contacts followed within a step of the load: symmetric robots have some that carry
 # rounding alone, and change with it
 _CHANGES = 8
+_STAYS = 1e-6  # of the largest motion in a mode: rounding of a platform that stays
 _JUMP = 5.0  # times what the tangents on both sides explain
 _BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
 _NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
@@ -106,6 +107,7 @@ class _Point:
     pressed: frozenset[str]
 
 
+Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
@@ -116,6 +118,7 @@ def load_deflection(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     exact: bool = False,
+    progress: Progress = lambda what, done, most: None,
 ) -> DeflectionCurve:
     """Follow the platform while one component of the load changes.
 
@@ -126,6 +129,8 @@ def load_deflection(
         load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         exact: whether with finite motions, else by problem (22).
+        progress: called at each load with the steps taken there and how many there
+            may be.
 
     Returns:
         The curve with its kinks and critical loads.
@@ -148,7 +153,11 @@ def load_deflection(
     def at(value: float, near: _Point | None) -> _Point:
         wrench = rest.copy()
         wrench[component] = value
-        return _solve(posture, value, wrench, gravity, exact, near)
+        what = f"steps at load {value:.6g}"
+        return _solve(
+            posture, value, wrench, gravity, exact, near,
+            lambda done, most: progress(what, done, most),
+        )  # fmt: skip
 
     points: list[_Point] = []
     events: list[Event] = []
@@ -177,9 +186,10 @@ def load_deflection(
 
 def _solve(
     posture: Posture, value: float, wrench: NDArray, gravity: ArrayLike | None,
-    exact: bool, near: _Point | None,
+    exact: bool, near: _Point | None, progress: Callable[[int, int], None],
 ) -> _Point:  # fmt: skip
     """The equilibrium under one load."""
+    progress(0, 1)
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity)
         names = clearance_names(linear.joints, contacts(linear)[0])
@@ -190,11 +200,13 @@ def _solve(
         else None
     )
     try:
-        equilibrium = solve_exact(posture, wrench, gravity=gravity, near=start)
+        equilibrium = solve_exact(
+            posture, wrench, gravity=gravity, near=start, progress=progress
+        )
     except SolverFailed:
         if start is None:
             raise
-        equilibrium = solve_exact(posture, wrench, gravity=gravity)
+        equilibrium = solve_exact(posture, wrench, gravity=gravity, progress=progress)
     active, force = active_clearances(equilibrium.expansion)
     # what carries rounding alone changes with it
     active &= force > _CARRIES * force.max(initial=0.0)
@@ -308,27 +320,30 @@ def _mode(point: _Point) -> str:
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
-        tangent.root[:, soft], tangent.springs[:, soft], tangent.parts, tangent.length
+        tangent.root, soft, tangent.springs[:, soft], tangent.parts, tangent.length
     )
 
 
 def mode_text(
-    screw: NDArray, springs: NDArray, parts: Sequence[Part], length: float
+    screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
     """A mode in words: how the platform moves, and what bends most.
 
     Args:
-        screw: (6,) [rad, m] of the platform, of any size.
-        springs: (m,) [sqrt(2 J)] their deformation.
+        screws: (6, k) [rad, m] of the platform in all modes, of any common size.
+        mode: which of them it is.
+        springs: (m,) [sqrt(2 J)] their deformation in it.
         parts: (m,) whose springs they are.
         length: [m] by which rotations are multiplied to be compared.
 
     Returns:
-        The screw of unit size, if the platform moves, and the part.
+        The screw of unit size, or that the platform stays, and the part.
     """
-    bent = np.square(springs)
-    part = parts[int(bent.argmax())]
-    scale = np.repeat([length, 1.0], 3)
-    size = np.linalg.norm(screw * scale)
+    part = parts[largest_row(np.square(springs))]
+    scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]
+    sizes = np.linalg.norm(screws * scale[:, None], axis=0)
+    size = sizes[mode]
+    if size <= _STAYS * sizes.max():
+        return f"inside the links, the platform stays; most in {part.frame} {part.kind}"
     way = np.where(np.abs(screw) * scale > 1e-6 * size, screw / (size or 1.0), 0.0)
     return f"platform along {numbers(way)} rad, m; most in {part.frame} {part.kind}"

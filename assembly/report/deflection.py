@@ -11,7 +11,11 @@ from assembly.linear.assemblies import failure_status
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.arc_length import follow_load
-from assembly.platform_stiffness.deflection import DeflectionCurve, load_deflection
+from assembly.platform_stiffness.deflection import (
+    DeflectionCurve,
+    Progress,
+    load_deflection,
+)
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
 from forcefit.inputs.errors import plot_label
@@ -31,6 +35,7 @@ def deflection_of(
     gravity: ArrayLike | None = None,
     exact: bool = False,
     follow: bool = False,
+    progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
     """Everything ``assembly deflection`` reports, as plain values.
 
@@ -43,6 +48,7 @@ def deflection_of(
         exact: whether with finite motions.
         follow: whether past limit points, by arc length, from the first to the last
             load; finite motions, clearances held at zero.
+        progress: called with what is done, how often, and how often at most.
 
     Returns:
         Curve and events; ``status`` is ``"ok"``, or says why there is none.
@@ -55,10 +61,13 @@ def deflection_of(
     try:
         if follow:
             curve = follow_load(
-                posture, component, loads[0], loads[-1], load, gravity, len(loads) - 1
-            )
+                posture, component, loads[0], loads[-1], load, gravity, len(loads) - 1,
+                progress,
+            )  # fmt: skip
         else:
-            curve = load_deflection(posture, component, loads, load, gravity, exact)
+            curve = load_deflection(
+                posture, component, loads, load, gravity, exact, progress
+            )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     return results | _curve_values(curve)

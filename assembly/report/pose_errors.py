@@ -12,7 +12,8 @@ from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reach import READINGS, reachable_screws
 from assembly.linear.reduction import FreeMotion
-from assembly.report.results import proof_status
+from assembly.report.first_order import singular_status
+from assembly.report.results import proof_status, status_line
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import bracket, numbers
 from forcefit.inputs.table import BadInput
@@ -63,6 +64,8 @@ def pose_error_of(
     }
     if direction is not None:
         results["direction"] = np.asarray(direction, dtype=float)
+    if singular := singular_status(posture, load, gravity):
+        return results | singular
     offset = posture.platform[:3, :3] @ results["point"]
     try:
         assembly = solve_assembly(posture, load, gravity=gravity)
@@ -120,7 +123,7 @@ def pose_error_text(results: dict[str, Any]) -> str:
     """Bounds for people: a line for each reading."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
+        lines.append(status_line(results))
     for reading, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
             lines.append(f"{reading:7s} no answer: {bounds['reason']}")

@@ -1,6 +1,6 @@
 """Results of assemblies as plain values (the keys of the public format) and as text."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,15 +8,19 @@ from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.verdict import posture_remarks
 from assembly.linear.assemblies import failure_status
 from assembly.linear.certificate import unproved, unproved_screw
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.linear.load import massless
 from assembly.linear.mobility import mobility
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.screw_bound import ScrewBound, bound_screw
 from assembly.linear.zone import zone_margin
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
+from assembly.report.first_order import first_order_status, linearisation_of
 from assembly.report.wrench_table import wrench_lines
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded, screw_text
@@ -45,7 +49,7 @@ def zone_text(zone: dict[str, Any]) -> str:
         f"zone margin: {_factor(zone['margin'])} compliant joints rigid, "
         f"{_factor(zone['margin_free'])} free (assembles rigidly up to 1)"
     )
-    return f"{line}\nnot proved: {zone['reason']}" if "reason" in zone else line
+    return f"{line}\n{status_line(zone)}" if zone.get("reason") else line
 
 
 def solution_of(
@@ -62,8 +66,10 @@ def solution_of(
 
     Returns:
         The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
-        with the solution and the gap of its certificate as ``reason``; or the kind of
-        failure, and the solution is then null.
+        with the solution and the gap of its certificate as ``reason``; or
+        ``"singular"``, with the solution at first order, which decides nothing there,
+        and that of finite motions in ``reason``; or the kind of failure, and the
+        solution is then null.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -74,7 +80,11 @@ def solution_of(
         "joints": dict(zip(names, posture.coordinates.tolist(), strict=True)),
         "nominal_mismatch": posture.mismatch,
         "mobility": vars(mobility(posture)),
-        "remarks": list(robot.remarks),
+        "remarks": [
+            *robot.remarks,
+            *posture_remarks(posture),
+            *massless(robot, gravity),
+        ],
         "load": np.zeros(6) if load is None else np.asarray(load),
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }
@@ -87,10 +97,15 @@ def solution_of(
             results["zone"].get("reason"),
             unproved(assembly) or "; ".join(unproved_screw(assembly, bound)),
         ))  # fmt: skip
+        linearisation, finite = linearisation_of(assembly, gravity)
+        forced = robot.errors.any() or results["load"].any() or gravity is not None
         return (
             results
-            | _assembly_results(assembly, bound, gravity)
+            | _assembly_results(assembly, bound)
+            | {"linearisation_error": linearisation, "worst_error": worst(assembly)}
             | proof_status("; ".join(unproved_parts))
+            # a robot without errors or loads stands there all the same
+            | (first_order_status(assembly, linearisation, finite) if forced else {})
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         status = failure_status(error)
@@ -102,9 +117,7 @@ def proof_status(reason: str) -> dict[str, str]:
     return {"status": "not proved", "reason": reason} if reason else {}
 
 
-def _assembly_results(
-    assembly: Assembly, bound: ScrewBound, gravity: ArrayLike | None
-) -> dict[str, Any]:
+def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
     """Results of a solved assembly."""
     certificate = {
         "closure_residual": assembly.closure_residual(),
@@ -117,7 +130,6 @@ def _assembly_results(
         **_screws_and_wrenches(assembly),
         "certificate": certificate,
         "ranks": assembly.ranks,
-        "linearisation_error": _linearisation_error(assembly, gravity),
     }
 
 
@@ -151,21 +163,11 @@ def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
     }
 
 
-def _linearisation_error(
-    assembly: Assembly, gravity: ArrayLike | None
-) -> dict[str, Any]:
-    """Linear minus exact solution, or why it is unknown."""
-    try:
-        exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
-    except SolverFailed as error:
-        return {"status": str(error)}
-    return {"status": "ok", **vars(exact.linearisation_error)}
-
-
 def exact_of(
     posture: Posture,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
     """Results of ``assembly exact`` as plain values.
 
@@ -173,6 +175,7 @@ def exact_of(
         posture: of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
+        progress: of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The keys of ``assembly solve`` for finite motions; ``status`` as there, or
@@ -182,7 +185,7 @@ def exact_of(
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
     }  # fmt: skip
     try:
-        assembly = solve_exact(posture, load, gravity=gravity)
+        assembly = solve_exact(posture, load, gravity=gravity, progress=progress)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     certificate = {
@@ -212,7 +215,7 @@ def exact_text(results: dict[str, Any]) -> str:
     """An exact solution for people: a few lines."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
+        lines.append(status_line(results))
     if "certificate" not in results:
         return "\n".join(lines)
     certificate = results["certificate"]
@@ -255,7 +258,7 @@ def solution_text(results: dict[str, Any]) -> str:
     if "zone" in results:
         lines.append(zone_text(results["zone"]))
     if results["status"] != "ok":
-        lines.append(f"{results['status']}: {results['reason']}")
+        lines.append(status_line(results))
     if results["energy"] is None:
         return "\n".join(lines)
     certificate = results["certificate"]
@@ -267,10 +270,16 @@ def solution_text(results: dict[str, Any]) -> str:
         f"clearance excess {certificate['clearance_excess']:.1e}, "
         f"gap {certificate['duality_gap']:.1e} J "
         f"({certificate['relative_gap']:.1e} relative)",
-        _screw_bound_text(certificate),
+        _screw_bound_text(certificate, results["worst_error"]),
         *wrench_lines(results["frames"], results["closures"]),
     ]
     return "\n".join(lines)
+
+
+def status_line(results: dict[str, Any]) -> str:
+    """Status and reason of a result that is not in order."""
+    status, reason = results["status"], results["reason"]
+    return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def remark_lines(remarks: Sequence[str]) -> list[str]:
@@ -278,20 +287,41 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
     return [f"note: {remark}" for remark in remarks]
 
 
-def _screw_bound_text(bound: dict[str, Any]) -> str:
-    """Largest distance of any platform screw of least energy from the one given."""
-    halves = ("rotation", 1e3), ("translation", 1e6)
-    (turn, shift), loose = (
-        [scale * bound[f"screw_{half}_{kind}"] for half, scale in halves]
-        for kind in ("error", "open")
+def worst(assembly: Assembly) -> dict[str, Any] | None:
+    """Certified bounds of the largest pose error, reading ``frozen`` of (27).
+
+    Args:
+        assembly: at least energy.
+
+    Returns:
+        ``rotation`` [rad] and ``translation`` [m]: at most these; None where nothing
+        is proved.
+    """
+    try:
+        bound = bound_pose_error(assembly, "frozen")
+    except (FreeMotion, SolverFailed):
+        return None
+    return {
+        "reading": "frozen", "rotation": bound.rotation_error[1],
+        "translation": bound.translation_error[1],
+    }  # fmt: skip
+
+
+def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> str:
+    """How well the screw is known, and the certified largest error with play."""
+    turn, shift = 1e3 * bound["screw_rotation_error"], bound["screw_translation_error"]
+    text = f"platform error proved to {turn:.1e} mrad, {1e6 * shift:.1e} um"
+    loose = 1e3 * bound["screw_rotation_open"], 1e6 * bound["screw_translation_open"]
+    if max(loose) <= 1e-9:
+        return text
+    text += "; at the same energy clearances leave it open: "
+    if largest is None or not np.isfinite(largest["rotation"] + largest["translation"]):
+        return text + "without bound"
+    turn, shift = largest["rotation"], largest["translation"]
+    return (
+        f"{text}at most {1e3 * turn:.3g} mrad, {1e6 * shift:.4g} um from nominal "
+        "(certified, reading frozen of assembly error)"
     )
-    text = f"platform error proved to {turn:.1e} mrad, {shift:.1e} um"
-    if max(loose) > 1e-9:
-        text += (
-            "; at the same energy clearances move it from there by up to "
-            f"{loose[0]:.4g} mrad, {loose[1]:.4g} um"
-        )
-    return text
 
 
 def _factor(value: float | None) -> str:

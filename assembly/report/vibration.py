@@ -13,6 +13,10 @@ from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers
 
+_NOMINAL = (
+    "load and gravity are left out: these are the frequencies of the nominal robot; "
+    "with --exact they count, and so does the stiffness that they give"
+)
 _NAMED = 3  # parts of a mode that people are told
 
 
@@ -41,8 +45,10 @@ def vibration_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "exact": exact,
+        "exact": exact, "remarks": [],
     }  # fmt: skip
+    if not exact and (np.any(load) or np.any(gravity)):
+        results["remarks"] = [_NOMINAL]
     try:
         modes = natural_modes(posture, count, load, gravity, exact)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -70,6 +76,7 @@ def vibration_of(
 def vibration_text(results: dict[str, Any]) -> str:
     """Frequencies for people, with the parts that bend most."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
+    lines += [f"note: {remark}" for remark in results.get("remarks", ())]
     if "modes" not in results:
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
     for mode in results["modes"]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.assembled import without_rounding
 from stiffness.screws import WRENCH
 
 
@@ -28,10 +29,9 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
 
     def table(head: str, wrenches: dict[str, NDArray]) -> list[str]:
         lines = [f"{head:{width}s}" + "".join(f"{unit:>13s}" for unit in units)]
-        for name, wrench in wrenches.items():
-            least = 1e-9 * max(float(np.abs(wrench).max()), 1e-3)
-            shown = (0.0 if abs(w) < least else float(w) for w in wrench)
-            lines.append(f"{name:{width}s}" + "".join(f"{w:13.5g}" for w in shown))
+        shown = without_rounding(np.reshape(list(wrenches.values()), (-1, 6)))
+        for name, wrench in zip(wrenches, shown.tolist(), strict=True):
+            lines.append(f"{name:{width}s}" + "".join(f"{w:13.5g}" for w in wrench))
         return lines
 
     lines = ["", "wrenches through the bodies, at each frame's origin in its axes"]

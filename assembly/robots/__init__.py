@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from assembly.files.robot_file import read_robot
+from assembly.files.robot_file import Closing, read_robot
 from assembly.model.robot import Robot
 from assembly.robots.arm6 import arm6
 from assembly.robots.delta import delta
@@ -31,11 +31,13 @@ BUILT_IN: dict[str, Callable[[], Robot]] = {
 }
 
 
-def load_robot(name: str | Path) -> Robot:
+def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
     """A built-in robot by its name, or the robot of a file.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file.
+        close: makes of the robot as declared one whose closures hold, as
+            :mod:`assembly.kinematics.closing` does; none if absent.
 
     Returns:
         The robot.
@@ -44,9 +46,10 @@ def load_robot(name: str | Path) -> Robot:
         BadInput: neither a built-in name nor a file, or the file breaks a rule.
     """
     if str(name) in BUILT_IN:
-        return BUILT_IN[str(name)]()
+        robot = BUILT_IN[str(name)]()
+        return robot if close is None else close(robot)
     path = Path(name)
     if not path.suffix and not os.path.exists(path):
         hint = nearest(str(name), BUILT_IN)
         raise BadInput(f'"{str(name)[:80]}": neither a built-in robot nor a file{hint}')
-    return read_robot(path)
+    return read_robot(path, close)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from assembly.batch.many_draws import OnePosture, prepare_energies
 from assembly.batch.many_margins import PostureMargins, prepare_margins
 from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import without_rounding
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources, draw_generator
@@ -183,7 +184,7 @@ class Experiment:
             if self.clearance_model == "uniform":
                 rows["play_mixed"] = mixed
         rows["platform_screw"] = screws
-        wrenches = self.energies.wrenches(solved.multipliers)
+        wrenches = without_rounding(self.energies.wrenches(solved.multipliers))
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
             through = wrenches[..., part] - self.energies.at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))

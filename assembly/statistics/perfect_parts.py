@@ -24,6 +24,8 @@ _DRAWS = 200  # positions of a random clearance model, whose median counts
 _PRECISION = (1e-9, 1e-9)  # [rad, m] of the largest pose errors
 _SHARE = 1e-3  # of the largest pose error: smaller parts are not listed
 _KEYS = ("tilt", "spin", "radial", "axial")
+_OWN = 0.02  # of the largest pose error: less is the precision of the parts
+OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative, above a limit
 
 
@@ -48,13 +50,19 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         values = rows[lower if lower in (rows.dtype.names or ()) else key]
         values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
         value = float(np.median(values))
-        if np.isfinite(value):
+        if not np.isnan(value):  # infinite where the platform moves freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
     if experiment.clearance_model == "worst" and prepared.loads is None:
         for key, parts in _clearance_parts(prepared).items():
-            if key in reached:
-                reached[key]["clearances"] = parts
+            whole = reached.get(key, {}).get("reached", np.nan)
+            if np.isfinite(whole):
+                own = whole - sum(parts.values())
+                # bounds of passive joints' own motion are no clearances of the posture
+                if np.isfinite(prepared.ranges).any() and own > _OWN * whole:
+                    parts[OWN_MOTION] = own
+                largest_first = sorted(parts.items(), key=lambda item: -item[1])
+                reached[key]["clearances"] = dict(largest_first)
     return reached
 
 
@@ -75,8 +83,7 @@ def _clearance_parts(prepared: OnePosture) -> dict[str, dict[str, float]]:
         for name, size in zip(names, sizes.tolist(), strict=True):
             by_kind[name] = by_kind.get(name, 0.0) + size
         least = _SHARE * sum(by_kind.values())
-        listed = {k: v for k, v in by_kind.items() if v > least}
-        parts[key] = dict(sorted(listed.items(), key=lambda item: -item[1]))
+        parts[key] = {k: v for k, v in by_kind.items() if v > least}
     return parts
 
 
@@ -122,18 +129,23 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
     if alone:
-        reach = ", ".join(
-            f"{k} {v['reached']:.4g} {v['unit']}{_of_text(v)}" for k, v in alone.items()
-        )
+        reach = ", ".join(f"{k} {_size_text(v)}{_of_text(v)}" for k, v in alone.items())
         lines.append(f"perfect parts, {why}: {reach}")
     advice = "" if summary.get("load") else ", or give the load of service (--load)"
     for key, one in summary.get("perfect_parts_break", {}).items():
         lines.append(
-            f"warning: perfect parts reach a {key} of {one['reached']:.4g} "
-            f"{one['unit']}, limit {one['limit']:.4g} {one['unit']}: no tolerance of "
-            f"the errors meets it; tighten the clearances{advice}"
+            f"warning: perfect parts reach a {key} {_size_text(one)}, limit "
+            f"{one['limit']:.4g} {one['unit']}: no tolerance of the errors meets it; "
+            f"tighten the clearances{advice}"
         )
     return lines
+
+
+def _size_text(one: Mapping[str, Any]) -> str:
+    """What is reached, with its unit."""
+    if np.isinf(one["reached"]):
+        return "without bound"
+    return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """The postures of a workspace, and an assessment of a robot's present errors there."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from importlib.metadata import version
@@ -8,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from assembly.batch.many_margins import prepare_margins
+from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import Posture, place_many
+from assembly.kinematics.verdict import SINGULAR, SINGULAR_WORDS, verdicts
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
@@ -21,26 +24,45 @@ from forcefit.inputs.table import BadInput
 from stiffness.screws import SCREW
 
 
-def grid_postures(robot: Robot, grid: str) -> list[Posture]:
-    """Postures of a grid that the robot reaches.
+def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
+    """Postures of a grid that the robot reaches and may use.
 
     Args:
         robot: any.
         grid: such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures, those out of reach left out.
+        The postures; and how many are left out, by status: out of reach, and those of
+        :func:`assembly.kinematics.verdict.verdicts`.
 
     Raises:
         BadInput: the grid is not one, or none of it is reached.
     """
     targets = grid_targets(parse_grid(grid))
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
-    postures, reasons = place_many(robot, goals_of(targets.names, robot, rows))
+    goals = goals_of(targets.names, robot, rows)
+    postures, reasons = place_many(robot, goals)
     reached = [p for p in postures if p is not None]
     if not reached:
         raise BadInput(f"grid: no posture is reached; the first: {reasons[0]}")
-    return reached
+    said = verdicts(
+        robot, Target(pose=goals[[p is not None for p in postures]]),
+        np.array([p.coordinates for p in reached]),
+        np.array([p.transforms for p in reached]),
+    )  # fmt: skip
+    usable = [p for p, (status, _) in zip(reached, said, strict=True) if not status]
+    count = Counter(status for status, _ in said if status)
+    count["out of reach"] = len(postures) - len(reached)
+    return usable, {status: n for status, n in count.items() if n}
+
+
+def left_out_text(left_out: dict[str, int]) -> str:
+    """Postures that were not judged, in one line."""
+    counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
+    text = f"postures left out: {counts}"
+    if SINGULAR in left_out:
+        text += f" ({SINGULAR_WORDS})"
+    return text
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:

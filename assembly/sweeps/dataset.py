@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.sweeps.netcdf import forgive_damaged_files, netcdf_file
+from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_file
 from assembly.sweeps.quantities import STATUSES, TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
@@ -273,6 +273,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     if not os.path.isfile(path):
         raise BadInput(f"{path}: no such file; expected a data set of a sweep")
     forgive_damaged_files()
+    check_heaps(path)
     try:
         return xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # of a damaged file HDF5 raises whatever it meets

@@ -1,8 +1,10 @@
 """NetCDF files, written whole or not at all, also when the disk is full."""
 
+import struct
 from collections.abc import Generator
 from contextlib import contextmanager
 from io import SEEK_SET, BytesIO, FileIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import unwritable, whole_file
+
+_HEAP = b"GCOL\x01\x00\x00\x00"  # HDF5's mark of a global heap, and its version
 
 
 @contextmanager
@@ -101,6 +105,33 @@ def forgive_damaged_files() -> None:
     import h5netcdf
 
     h5netcdf.File._writable = False  # until a file says otherwise
+
+
+def check_heaps(path: Path) -> None:
+    """Refuse a file whose heaps of texts are damaged: HDF5 would read them for ever.
+
+    Args:
+        path: of an HDF5 file; others pass.
+
+    Raises:
+        BadInput: an entry of a heap leads nowhere.
+    """
+    size = path.stat().st_size
+    if not size:
+        return
+    with open(path, "rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+        start = data.find(_HEAP)
+        while start >= 0:
+            (length,) = struct.unpack_from("<Q", data, start + 8)
+            end, place = start + min(length, size - start), start + 16
+            while place + 16 <= end:
+                number, _, own = struct.unpack_from("<HH4xQ", data, place)
+                # an entry, or the free space, which counts itself
+                step = 16 + -(-own // 8) * 8 if number else own
+                if step < 16:
+                    raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
+                place += step
+            start = data.find(_HEAP, start + 16)
 
 
 class _Target:

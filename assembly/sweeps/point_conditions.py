@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import apply_known
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
 from assembly.linear.assemblies import Assemblies, solve_each
-from assembly.linear.closure import closure_signs
 from assembly.linear.energy import minimise_under_loads
 from assembly.linear.load import loads_with_weight
 from assembly.measurement.conditions import Conditions, as_declared

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.kinematics.verdict import SINGULAR
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
-from assembly.linear.singularity import KINDS, find_singularities
 from assembly.linear.zone import MARGIN_READINGS, zone_margins
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import natural_modes
+from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.point_conditions import (
     assemble_rows,
@@ -29,6 +30,7 @@ from assembly.sweeps.point_conditions import (
     point_conditions,
     wrenches_of,
 )
+from assembly.sweeps.point_kinematics import note_geometry
 from assembly.sweeps.point_stiffness import (
     classical_stiffnesses,
     tangent_stiffnesses,
@@ -126,13 +128,20 @@ def _solve_variant(
     except BadInput as error:
         _fail(solved, range(first, first + count), "invalid robot", str(error))
         return
+    rows = [range(first + run.start, first + run.stop) for run in runs]
+    reached = [i for i, posture in enumerate(postures) if posture is not None]
+    said = note_geometry(
+        question, robot, goals[reached], [p for p in postures if p is not None],
+        [rows[i] for i in reached], solved.records, solved.texts["near_singularity"],
+    )  # fmt: skip
+    status_of = dict(zip(reached, said, strict=True))
     reachable = []
-    for run, posture, reason in zip(runs, postures, reasons, strict=True):
-        rows = range(first + run.start, first + run.stop)
-        if posture is None:
-            _fail(solved, rows, "out of reach", reason)
+    for i, posture in enumerate(postures):
+        status, reason = status_of.get(i, ("out of reach", reasons[i]))
+        if posture is None or status:
+            _fail(solved, rows[i], status, reason)
         else:
-            reachable += [(row, posture) for row in rows]
+            reachable += [(row, posture) for row in rows[i]]
     if not reachable:
         return
     rows_reached = np.array([row for row, _ in reachable])
@@ -191,8 +200,6 @@ def _solve_reached(
 ) -> None:  # fmt: skip
     """Solve points whose posture exists; most failures become a status here."""
     out = solved.records
-    T = np.array([posture.transforms for posture in postures])
-    _note_singularities(question, robot, T, solved, rows)
     conditions = point_conditions(question, robot, postures, errors)
     T, mismatch = conditions.transforms, conditions.mismatch
     if robot.has_effects:
@@ -271,25 +278,6 @@ def _record_wrenches(
         out["stress"][rows] = stress
         with np.errstate(divide="ignore"):
             out["safety"][rows] = question.strength / stress.max(axis=1)
-
-
-def _note_singularities(
-    question: Question, robot: Robot, T: NDArray, solved: SolvedPoints, rows: NDArray
-) -> None:
-    """Distances to singularities, and the names of those that are near."""
-    # all draws of a posture share its singularities
-    runs = list(_runs(T.reshape(len(T), -1)))
-    near = find_singularities(robot, T[[run.start for run in runs]])
-    names = near.names(robot, question.near)
-    distances = np.stack([getattr(near, kind) for kind in KINDS], axis=1)
-    condition = near.condition
-    for i, run in enumerate(runs):
-        solved.records["singular_distance"][rows[run]] = distances[i]
-        solved.records["condition"][rows[run]] = condition[i]
-        if names[i]:
-            solved.texts["near_singularity"].update(
-                dict.fromkeys(rows[run].tolist(), names[i])
-            )
 
 
 def _record_stiffness(
@@ -375,6 +363,8 @@ def _compare_finite(
         # the linear solution remains valid: only its error is unknown
         solved.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
+    if abs(difference.relative_energy) > MOST_ENERGY:
+        _fail(solved, range(row, row + 1), SINGULAR, off_by(difference.relative_energy))
     out["linearisation_rotation"][row] = np.linalg.norm(difference.rotation)
     out["linearisation_translation"][row] = np.linalg.norm(difference.translation)
     out["linearisation_energy"][row] = difference.relative_energy

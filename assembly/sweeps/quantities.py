@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly.kinematics.verdict import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.singularity import KINDS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
@@ -19,8 +20,12 @@ if TYPE_CHECKING:
 
 STATUSES = (
     "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot",
-    "no equilibrium",
+    "no equilibrium", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
 )  # fmt: skip
+# of points at which nothing was asked
+UNUSABLE = {
+    "out of reach", "invalid robot", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY
+}  # fmt: skip
 TEXTS = ("reason", "near_singularity")
 
 
@@ -161,7 +166,16 @@ def variables(question: Question) -> dict[str, Variable]:
         table["linearisation_energy"] = Variable(
             {}, "1", "energy, linear minus exact, relative to the exact one"
         )
+    table["joint_coordinate"] = Variable(
+        {"joint": _moving(question.robot)}, "rad, m",
+        "nominal, of every joint, also where the status is not ok",
+    )  # fmt: skip
     return table
+
+
+def _moving(robot: Robot) -> tuple[str, ...]:
+    """Names of the joints that are not fixed."""
+    return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:

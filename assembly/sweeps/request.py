@@ -3,6 +3,7 @@
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.effects.robot_effects import check_covariates
 from assembly.exchange.robot_files import load_robot
+from assembly.kinematics.closing import rest_in
 from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
@@ -64,6 +66,8 @@ class SweepOptions:
         tangent: ``"contact"`` or ``"exact"``: instead the K_C of what is there, its
             errors, loads and clearances.
         frequencies: how many natural frequencies.
+        rest: a frame that takes what a closure leaves open, as
+            :func:`assembly.kinematics.closing.rest_in`.
     """
 
     grid: str | None = None
@@ -84,6 +88,7 @@ class SweepOptions:
     stiffness: bool = False
     tangent: str | None = None
     frequencies: int | None = None
+    rest: str | None = None
 
 
 def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
@@ -99,7 +104,13 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
     """
-    machine = load_robot(robot)
+    rest = options.rest
+    if rest is not None and (options.vary or options.errors):
+        raise BadInput(
+            "--rest: found --vary or --errors, which replace the errors that it makes; "
+            "expected neither"
+        )
+    machine = load_robot(robot, None if rest is None else partial(rest_in, name=rest))
     check_covariates(machine, options.under)
     _check(options, machine)
     design = load_design(robot) if options.vary else None
@@ -304,5 +315,7 @@ def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
         if name not in {"ok", "out of reach"} and "reason" in data.data_vars:
             first = int(np.flatnonzero(status == name)[0])
             reasons = data.data_vars["reason"]
-            lines.append(f"{name}, for one: {reasons.values.ravel()[first]}")
+            reason = str(reasons.values.ravel()[first])
+            own = reason if reason.startswith(name) else f"{name}, for one: {reason}"
+            lines.append(own)
     return "\n".join(lines)

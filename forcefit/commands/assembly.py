@@ -14,7 +14,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
@@ -24,7 +26,7 @@ from forcefit.commands.options import (
     posture_of,
 )
 from forcefit.commands.platform_stiffness import stiffness
-from forcefit.commands.progress import one_thread
+from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.commands.statistics import statistics, tolerances
 from forcefit.commands.sweep import plot, sweep, table
 from forcefit.inputs.errors import BadInput, checked, nearest
@@ -43,6 +45,8 @@ def solve(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -51,7 +55,9 @@ def solve(
     """Close at least energy: pose error, energy, wrenches, margin."""
     from assembly.report.results import solution_of, solution_text
 
-    applied = declared_under(robot, pose, joint, load, gravity, under)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
+    )
     with one_thread():
         results = solution_of(applied.posture, applied.load, applied.gravity)
     if results["status"] == "ok" and applied.conditions.reads_otherwise:
@@ -68,12 +74,16 @@ def zone(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     json: JsonOption = None,
 ) -> None:
     """Whether clearances alone let the robot assemble; the margin."""
+    from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 
-    margins = zone_of(posture_of(robot, pose, joint))
+    posture = posture_of(robot, pose, joint, rest, mismatch)
+    margins = zone_of(posture) | singular_status(posture)
     write_json({"robot": robot, "zone": margins}, json)
     if json != "-":
         print(zone_text(margins))
@@ -86,6 +96,8 @@ def exact(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -94,9 +106,15 @@ def exact(
     """Close the robot with finite motions: closures hold exactly."""
     from assembly.report.results import exact_of, exact_text
 
-    applied = declared_under(robot, pose, joint, load, gravity, under, finite=True)
-    with one_thread():
-        results = exact_of(applied.posture, applied.load, applied.gravity)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=True, rest=rest,
+        mismatch=mismatch,
+    )  # fmt: skip
+    with one_thread(), progress_lines() as update:
+        results = exact_of(
+            applied.posture, applied.load, applied.gravity,
+            lambda done, most: update("steps", done, most),
+        )  # fmt: skip
     write_json(results, json)
     if json != "-":
         print(exact_text(results))
@@ -109,6 +127,8 @@ def error(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     reading: Annotated[
         list[str] | None,
         typer.Option(
@@ -156,7 +176,9 @@ def error(
             option = "--" + key.replace("_", "-")
             expected = f"a finite number > 0, at most {LARGEST_LENGTH:g}"
             raise BadInput(f"{option}: found {value}, expected {expected}")
-    applied = declared_under(robot, pose, joint, load, gravity, under)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
+    )
     with one_thread():
         results = pose_error_of(
             applied.posture, reading or None,

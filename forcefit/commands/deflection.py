@@ -11,12 +11,14 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
 )
-from forcefit.commands.progress import one_thread
+from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
@@ -30,6 +32,8 @@ def deflection(
     ],
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -72,12 +76,13 @@ def deflection(
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=exact or follow
-    )
-    with one_thread():
+        robot, pose, joint, load, gravity, under, finite=exact or follow,
+        rest=rest, mismatch=mismatch,
+    )  # fmt: skip
+    with one_thread(), progress_lines() as update:
         results = deflection_of(
             applied.posture, component, loads, applied.load, applied.gravity, exact,
-            follow,
+            follow, update,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":

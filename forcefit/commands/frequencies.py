@@ -9,7 +9,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
@@ -22,6 +24,8 @@ def frequencies(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -40,7 +44,10 @@ def frequencies(
     """
     from assembly.report.vibration import vibration_of, vibration_text
 
-    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        mismatch=mismatch,
+    )  # fmt: skip
     with one_thread():
         results = vibration_of(
             applied.posture, count, applied.load, applied.gravity, exact

@@ -4,6 +4,7 @@ Every error message names its option.
 """
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,6 +64,25 @@ UnderOption = Annotated[
         "--under",
         help="What the robot's effects depend on: temperature=5,time=0,approach=1; "
         "session=NAME.",
+    ),
+]
+
+
+RestOption = Annotated[
+    str | None,
+    typer.Option(
+        "--rest",
+        help="A frame in a loop that does not close at home: what is left open becomes "
+        "its geometric error.",
+    ),
+]
+
+
+MismatchOption = Annotated[
+    str | None,
+    typer.Option(
+        "--mismatch",
+        help="spring: redundant elastic drives take up what --joint leaves open.",
     ),
 ]
 
@@ -196,13 +216,18 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     return [given.get(name, 0.0) / length for name in names]
 
 
-def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> Any:
+def posture_of(
+    robot: str, pose: list[str] | None, joint: list[str] | None,
+    rest: str | None = None, mismatch: str | None = None,
+) -> Any:  # fmt: skip
     """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
 
     Args:
         robot: name or file.
         pose: of the platform.
         joint: coordinates.
+        rest: of ``--rest``.
+        mismatch: of ``--mismatch``.
 
     Returns:
         The posture, of the robot as the effects of its file make it.
@@ -212,7 +237,7 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    applied = apply_robot_effects(declared_posture(robot, pose, joint))
+    applied = apply_robot_effects(declared_posture(robot, pose, joint, rest, mismatch))
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
             f"{robot}: its effects load it; expected assembly solve or exact, or "
@@ -222,18 +247,32 @@ def posture_of(robot: str, pose: list[str] | None, joint: list[str] | None) -> A
 
 
 def declared_posture(
-    robot: str, pose: list[str] | None, joint: list[str] | None
-) -> Any:
+    robot: str, pose: list[str] | None, joint: list[str] | None,
+    rest: str | None = None, mismatch: str | None = None,
+) -> Any:  # fmt: skip
     """The posture of the options, of the robot without the effects of its file."""
     from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.posture import place_robot
+    from assembly.kinematics.closing import preloaded, rest_in
+    from assembly.kinematics.posture import home_posture, place_robot
     from assembly.model.largest import LARGEST_LENGTH
+    from assembly.model.robot import Robot
 
+    joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
+    if mismatch is not None and (mismatch != "spring" or pose):
+        found = f'"{mismatch[:60]}"' if mismatch != "spring" else "--pose"
+        raise BadInput(f"--mismatch: found {found}, expected spring, with --joint")
+
+    def close(machine: Robot) -> Robot:
+        machine = machine if rest is None else rest_in(machine, rest)
+        return machine if mismatch is None else preloaded(machine, joints)
+
+    machine = load_robot(robot, close if rest or mismatch else None)
+    if mismatch is not None:
+        return home_posture(machine)
     return place_robot(
-        load_robot(robot),
+        machine, joints=joints,
         pose=parse_assignments(pose, "--pose", LARGEST_LENGTH) if pose else None,
-        joints=parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None,
-    )
+    )  # fmt: skip
 
 
 def declared_under(
@@ -245,6 +284,8 @@ def declared_under(
     under: list[str] | None,
     *,
     finite: bool = False,
+    rest: str | None = None,
+    mismatch: str | None = None,
 ) -> Any:
     """The robot under the loads and covariates asked for, its file's effects applied.
 
@@ -256,16 +297,28 @@ def declared_under(
         gravity: in base axes.
         under: covariates of the effects.
         finite: whether the exact model is used.
+        rest: of ``--rest``.
+        mismatch: of ``--mismatch``.
 
     Returns:
         The posture, loads and conditions with the effects applied.
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
+    posture = declared_posture(robot, pose, joint, rest, mismatch)
+    g = parse_gravity(gravity)
+    note_massless(posture.robot, g)
     return apply_robot_effects(
-        declared_posture(robot, pose, joint), parse_load(load), parse_gravity(gravity),
-        parse_covariates(under), finite=finite,
-    )  # fmt: skip
+        posture, parse_load(load), g, parse_covariates(under), finite=finite
+    )
+
+
+def note_massless(robot: Any, gravity: list[float] | None) -> None:
+    """Say on stderr that gravity acts on nothing, if it does not."""
+    from assembly.linear.load import massless
+
+    for remark in massless(robot, gravity):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:

@@ -10,7 +10,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_under,
@@ -31,6 +33,8 @@ def stiffness(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
@@ -79,7 +83,10 @@ def stiffness(
         checked("--length", length, "m", above=0)
     point = parse_point(at, "--at")
     way = parse_direction(direction)
-    applied = declared_under(robot, pose, joint, load, gravity, under, finite=exact)
+    applied = declared_under(
+        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        mismatch=mismatch,
+    )  # fmt: skip
     with one_thread():
         results = stiffness_of(
             applied.posture, applied.load, applied.gravity, point, exact, length,

@@ -23,6 +23,24 @@ def one_thread() -> AbstractContextManager:
 
 
 @contextmanager
+def progress_lines() -> Generator[Any, None, None]:
+    """Progress on stderr of what is usually done at once; yields ``update``.
+
+    ``update(what, done, most)`` prints a line where two seconds have passed since the
+    last one: how many steps there will be is not known, so there is no bar.
+    """
+    last = time.monotonic()
+
+    def update(what: str, done: int, most: int) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _DELAY:
+            last = time.monotonic()
+            print(f"forcefit: {what}: {done} of at most {most}", file=sys.stderr)
+
+    yield update
+
+
+@contextmanager
 def progress_bars() -> Generator[Any, None, None]:
     """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each.
 

@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     LoadOption,
     PoseOption,
     RobotArgument,
+    note_massless,
     parse_gravity,
     parse_load,
     posture_of,
@@ -108,6 +109,8 @@ def statistics(
     from there after a kill and ends in the same file.
     """
     from assembly.model.error_distributions import read_sources
+    from assembly.report.first_order import posture_status
+    from assembly.report.results import status_line
     from assembly.statistics.experiment import Experiment, precision_for
     from assembly.statistics.importance_table import ImportanceOptions
     from assembly.statistics.monte_carlo import run_draws
@@ -133,6 +136,13 @@ def statistics(
     posture = posture_of(robot, pose, joint)
     sources = read_sources(errors, posture.robot)
     wrench, g = parse_load(load), parse_gravity(gravity)
+    note_massless(posture.robot, g)
+    if said := posture_status(posture, wrench, g):
+        whose = {"robot": posture.robot.name, "pose": posture.pose()}
+        write_json(whose | said, json)
+        if json != "-":
+            print(status_line(said))
+        raise typer.Exit(1)
     experiment = Experiment(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
@@ -239,6 +249,7 @@ def tolerances(
     from dataclasses import replace
 
     from assembly.exchange.robot_files import load_robot
+    from assembly.kinematics.verdict import SINGULAR
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
     from assembly.statistics.replay import journalled
@@ -246,6 +257,7 @@ def tolerances(
     from assembly.statistics.tolerances import (
         grid_postures,
         identity_of,
+        left_out_text,
         present_errors,
         present_text,
     )
@@ -269,9 +281,17 @@ def tolerances(
             contact_length=contact_length,
         )
     )
-    postures = grid_postures(machine, grid)
-    results: dict = {"robot": machine.name, "postures": len(postures), "grid": grid}
-    texts = []
+    postures, left_out = grid_postures(machine, grid)
+    results: dict = {
+        "robot": machine.name, "postures": len(postures), "left_out": left_out,
+        "grid": grid,
+    }  # fmt: skip
+    texts = [left_out_text(left_out)] if left_out else []
+    if not postures:
+        write_json(results, json)
+        if json != "-":
+            print(texts[0])
+        raise typer.Exit(1)
     held = ExitStack()  # keeps the journal until all is written
     with _interruptible(output), progress_bars() as update:
         if machine.errors.any():
@@ -306,7 +326,7 @@ def tolerances(
     if json != "-":
         print("\n".join(texts))
     check = results.get("allocation", {}).get("verification") or {}
-    if check.get("verdict") == "contradicted":
+    if check.get("verdict") == "contradicted" or SINGULAR in left_out:
         raise typer.Exit(1)
 
 

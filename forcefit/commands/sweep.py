@@ -11,8 +11,10 @@ from forcefit.commands.options import (
     GravityOption,
     JsonOption,
     LoadOption,
+    RestOption,
     RobotArgument,
     UnderOption,
+    note_massless,
     parse_covariates,
     parse_gravity,
     parse_load,
@@ -113,6 +115,7 @@ def sweep(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
+    rest: RestOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes on this machine.", min=1, max=1024)
     ] = None,
@@ -134,6 +137,7 @@ def sweep(
     from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.netcdf import stored_dataset
     from assembly.sweeps.point_table import write_point_table
+    from assembly.sweeps.quantities import UNUSABLE
     from assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,
@@ -159,12 +163,13 @@ def sweep(
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
-                tangent=tangent, frequencies=frequencies,
+                tangent=tangent, frequencies=frequencies, rest=rest,
             ),
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
+    note_massless(asked.question.robot, g)
     done = [0]
     solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written
@@ -193,6 +198,8 @@ def sweep(
     held.close()
     if json != "-":
         print(summary_text(summary, data))
+    if set(summary["status"]) <= UNUSABLE:
+        raise typer.Exit(1)
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":

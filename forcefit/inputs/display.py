@@ -111,6 +111,19 @@ def largest(screws: ArrayLike) -> str:
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"
 
 
+def largest_row(sizes: ArrayLike) -> int:
+    """The first of the largest numbers; equal but for rounding, 1e-9, counts as equal.
+
+    Args:
+        sizes: (k,) >= 0, k > 0.
+
+    Returns:
+        Its row, the same on every processor.
+    """
+    values = np.asarray(sizes, dtype=float)
+    return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
+
+
 def bracket(bounds: tuple[float, float], unit: str) -> str:
     """Two bounds [rad or m] in thousandths; the unit is mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]

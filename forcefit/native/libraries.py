@@ -160,11 +160,12 @@ def folder_of_compiled() -> Path | None:
     """Where compiled code is kept: the first of these folders that can be written.
 
     Returns:
-        ``$NUMBA_CACHE_DIR``, which is not tried; the folder beside this file; that of
+        ``$NUMBA_CACHE_DIR``; the folder beside this file; that of
         :func:`forcefit.inputs.cache_folder.cache_folder`; None if none can be.
     """
-    if folder := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(folder)
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given and is_writable(Path(given)):
+        return Path(given)
     return _BESIDE if is_writable(_BESIDE) else cache_folder()
 
 

@@ -49,7 +49,7 @@
   function show(figure, traces, layout) {
     const plot = figure.querySelector(".plot");
     const whole = { margin: { l: 60, r: 20, t: 20, b: 50 }, uirevision: 1,
-      legend: { orientation: "h", y: 1.12 }, ...layout };
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, ...layout };
     shown.set(figure, [traces, whole]);
     pictureSoon(figure);
     return Plotly.react(plot, traces, coloured(whole, onScreen()), SETTINGS);
@@ -91,12 +91,13 @@
     const error = (bars, axis) => bars && { ...bars,
       array: scaled(bars.array, factor(axis)),
       arrayminus: scaled(bars.arrayminus, factor(axis)) };
+    const named = spec.traces.filter(t => t.name).length;
+    const height = spec.height + (named > 4 ? 22 * Math.ceil(named / 3) : 0);
     redraw.push(() => show(figure, spec.traces.map(t => ({ ...t,
       x: scaled(t.x, factor(x)), y: scaled(t.y, factor(y)),
       error_x: error(t.error_x, x), error_y: error(t.error_y, y) })),
-      { height: spec.height, xaxis: axisLayout(x), yaxis: axisLayout(y),
-        barmode: spec.barmode,
-        showlegend: spec.traces.filter(t => t.name).length > 1 }));
+      { height, xaxis: axisLayout(x), yaxis: axisLayout(y), barmode: spec.barmode,
+        showlegend: named > 1 }));
   }
 
   // maps: a choice of quantities, the values under the pointer, all of a point by a click
@@ -285,7 +286,8 @@
         camera: { eye: { x: eye[0], y: -eye[1], z: eye[2] },
           center: { x: 0, y: 0, z: -0.06 } } };
       const plot = await show(figure, traces(k, step), { height: 560, scene: told3d,
-        margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: true });
+        margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: true,
+        legend: { orientation: "h", y: 1 } });
       if (plot.turns) return;
       plot.turns = true;
       plot.on("plotly_relayout", () => pictureSoon(figure));

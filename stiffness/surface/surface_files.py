@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,7 @@ def _in_own_process(path: Path, solid: str) -> tuple[NDArray, NDArray]:
             ) from None
         try:
             stored = np.load(io.BytesIO(made.read_bytes()), allow_pickle=False)
-        except (OSError, ValueError):
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             raise BadInput(f"{path}: not a readable {kind} file") from None
         if "refused" in stored:
             raise BadInput(str(stored["refused"]))

@@ -150,7 +150,7 @@ def _values(
     if function.form in {"lag", "creep"}:
         left = np.exp(-x / own["time_constant"])
         inputs = [1.0 - left, left]
-    elif function.form == "play":
+    elif function.form == "slip":
         inputs = [np.ones_like(x)]
     elif function.form == "reversal_waves":
         inputs = [np.ones_like(x), x]

@@ -5,18 +5,21 @@ The covariance of readings is J C J', C that of the numbers in the file
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects.functions import in_session, inputs_of, is_loaded, value_of
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
-from validation.diagnosis.responses import responses
+from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.saved_covariance import (
     COMPLIANCE,
     ERROR,
+    FUNCTION,
     Number,
     known_covariance,
 )
@@ -61,8 +64,38 @@ def _slopes(
             J[:, :, k] = response.screws[:, :, row, axis]
             if number.kind == COMPLIANCE:
                 J[:, :, k] *= response.wrenches[:, row, axis, None]
+        elif number.kind == FUNCTION and _is_direct(robot, number):
+            J[:, :, k] = _of_function(robot, conditions, response, number, std[k])
         elif std[k] > 0.0:
             middle = predict(conditions).deviation if middle is None else middle
             other = conditions_for(number.moved(robot, _STEP * std[k]))
             J[:, :, k] = (predict(other).deviation - middle) / (_STEP * std[k])
     return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _is_direct(robot: Robot, number: Number) -> bool:
+    """Whether a function is a small screw at a frame, whatever it carries."""
+    function = robot.functions[int(number.owner)]
+    frame = any(f.name == function.where for f in robot.frames)
+    return frame and not is_loaded(function)
+
+
+def _of_function(
+    robot: Robot, conditions: Conditions, response: Responses, number: Number,
+    sigma: float,
+) -> NDArray:  # fmt: skip
+    """(R, 6) change of the deviation per number of a function at a frame."""
+    one = robot.functions[int(number.owner)]
+    step = _STEP * sigma if sigma > 0.0 else 1.0
+    more = one.parameters[number.name] + step
+    other = replace(one, parameters={**one.parameters, number.name: more})
+    inputs = list(inputs_of(conditions, one).T)
+    acts = in_session(conditions, one.session)
+    row = conditions.robot.index(one.where)
+    slope = np.zeros((len(conditions), 6))
+    for component in one.components:
+        change = value_of(other, component, inputs) - value_of(one, component, inputs)
+        change = np.where(acts, change, 0.0) / step
+        axis = _AXES.index(component)
+        slope += response.screws[:, :, row, axis] * change[:, None]
+    return slope

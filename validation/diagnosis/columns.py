@@ -1,4 +1,4 @@
-"""Everything a search may use, of a campaign's design alone: no reading is seen."""
+"""Columns of all candidates, from the design of a campaign without its readings."""
 
 import math
 from collections import Counter
@@ -21,6 +21,7 @@ from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import SPANS, blocks_of
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
+from validation.diagnosis.joint_functions import joint_functions
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
@@ -31,7 +32,6 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.small_terms import small_terms
-from validation.diagnosis.together import together
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time of what counts it
@@ -43,14 +43,14 @@ class Columns:
 
     Attributes:
         campaign, conditions: of R rows.
-        row: (N,) of every cell.
-        block: (N,) its configuration, or span of time.
-        device: the measuring frame, where it is not known; else None.
-        flat: (N, f) whitened change per unknown of it, session by session.
-        library: ways in which the library's effects may act.
-        nuisance: geometry and springs.
-        functions: what may act beside them.
-        explicit: further functions with their columns.
+        row: (N,) row of every cell.
+        block: (N,) configuration or span of time of every cell.
+        device: hypothesis of an unknown measuring frame; else None.
+        flat: (N, f) its columns, by session.
+        library: elements of the library's effects.
+        nuisance: geometric errors and springs.
+        functions: candidate functions at single places.
+        explicit: elements of functions at several places.
     """
 
     def __init__(
@@ -58,13 +58,12 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Take all derivatives.
+        """Compute all derivatives.
 
         Args:
-            campaign: of which ``measured`` says what was measured, and nothing else.
-            conditions: of its rows, with the registration if that was found and with
-                what finite geometric errors add.
-            update: told what is done, how much of it and of how much.
+            campaign: of ``measured``, only the pattern of NaN is used.
+            conditions: of its rows, registered, with the second-order part.
+            update: progress callback: stage, steps done, steps in total.
             odds: factors on the prior odds of effects, of ``"function"``, and of
                 ``"geometry"`` and ``"springs"``, by name; 0 leaves something out.
         """
@@ -83,10 +82,10 @@ class Columns:
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
-        self.explicit = together(self.functions) if any_function else []
+        self.explicit = joint_functions(self.functions) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
-        """Hypotheses that show; of those that do the same, the first."""
+        """Return visible hypotheses with distinct columns."""
         listed = hypotheses(self.conditions, loaded_components(self.campaign))
         shown: dict[object, Signature] = {}
         listed = with_declared(listed, self.campaign.robot)
@@ -106,28 +105,28 @@ class Columns:
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
 
     def _prior(self, effect: str, ways: Counter[str]) -> float:
-        """Ln of the prior of one way in which an effect may act."""
+        """Return the log prior of one way in which an effect may act."""
         prior = effect_prior(len(ways), ways[effect])
         return prior + math.log(self.odds.get(effect, 1.0))
 
     def without_clocks(self) -> "Columns":
-        """The same without functions of time and effects that time alone drives."""
+        """Return the columns without functions of time and effects of time alone."""
         other = copy(self)
         timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
         other.library = [e for e in self.library if e.name not in timed]
         names = [n for n in self.functions.variables if not self._is_clock(n)]
         other.functions = self.functions.of(names)
-        other.explicit = together(other.functions) if names else []
+        other.explicit = joint_functions(other.functions) if names else []
         return other
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows follow one another and something counts the time."""
+        """Whether rows follow one another and a variable is the time."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 
     def _is_clock(self, name: str) -> bool:
-        """Whether a variable goes with time alone."""
+        """Whether a variable is the time, or proportional to it."""
         time = self.conditions.time
         if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
             return name == "time"
@@ -135,13 +134,13 @@ class Columns:
         return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
-        """(N, c) columns of single unknowns of springs that have a name."""
+        """Return (N, c) columns of library effects with a single unknown."""
         alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
         return np.hstack([np.zeros((len(self.row), 0)), *alone])
 
     @cached_property
     def flat(self) -> NDArray:
-        """(N, f) the measuring frame's columns, each session's by themselves."""
+        """(N, f) columns of the measuring frame, separate for each session."""
         if self.device is None:
             return np.zeros((len(self.row), 0))
         columns = self.tangents.at_start(self.device).columns
@@ -156,19 +155,19 @@ class Columns:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Effects to first order about values that they have together.
+        """Linearise effects at given values, all acting together.
 
         Args:
             elements: of the library.
             xs: values of the slots of each.
 
         Returns:
-            Elements whose sum, at these values, is what all of them do; those given
-            where the model has no answer.
+            Elements whose sum is exact at these values; the given ones if the model
+            has no solution there.
         """
         robot = self.campaign.robot
         public = self._public(elements, xs)
-        middle = self.together(elements, xs)
+        middle = self.combined(elements, xs)
         made = []
         for e, x in zip(elements, xs, strict=True):
             others = {name: v for name, v in public.items() if name != e.name}
@@ -177,21 +176,21 @@ class Columns:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # what all of them do together beside their tangents goes with the first
+        # the joint offset is stored with the first element
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
             for s, e, x in zip(made, elements, xs, strict=True)
         ]
 
-    def together(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
-        """(N,) what effects of the library do together, whitened."""
+    def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
+        """Return the (N,) whitened contribution of effects acting together."""
         public = self._public(elements, xs)
         if any(LIBRARY[name].clearance for name in public):
             return self.tangents.model(public) - self.tangents.declared
         changed = apply_effects(self.conditions, public)
         if np.ndim(self.conditions.second_order) == 2:
-            # what they move is finite, as the declared errors are
+            # finite motions of the changed machine
             changed = with_second_order(changed)
         whitened = whiten(self.campaign, predict(changed).deviation)
         return whitened - self.tangents.declared
@@ -199,7 +198,7 @@ class Columns:
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> dict[str, dict[str, float]]:
-        """Parameters of effects by their public names."""
+        """Return parameters by their public names."""
         robot = self.conditions.robot
         return {
             e.name: e.hypothesis.public(robot, x)
@@ -208,14 +207,14 @@ class Columns:
 
 
 def _finite(signature: Signature) -> bool:
-    """Whether the model had answers for a hypothesis."""
+    """Return whether the model has a solution for a hypothesis."""
     return bool(
         np.isfinite(signature.columns).all() and np.isfinite(signature.offset).all()
     )
 
 
 def _shows(signature: Signature) -> bool:
-    """Whether a hypothesis changes the readings; enough, without unknowns."""
+    """Return whether a hypothesis visibly changes the readings."""
     if not _finite(signature):
         return False
     squares = float(signature.offset @ signature.offset)
@@ -223,7 +222,7 @@ def _shows(signature: Signature) -> bool:
 
 
 def _print(signature: Signature) -> object:
-    """By which equal ways of one effect are known."""
+    """Return a key that hypotheses of one effect with equal columns share."""
     rng = np.random.default_rng(0)
     probe = rng.normal(size=len(signature.offset))
     size = np.maximum(np.linalg.norm(signature.columns, axis=0), 1e-300)
@@ -235,6 +234,6 @@ def _print(signature: Signature) -> object:
 
 
 def _moves_base(h: Hypothesis) -> bool:
-    """Whether a hypothesis moves the measuring frame, which is fitted anyway."""
+    """Return whether a hypothesis moves the measuring frame, which is flat."""
     device = LIBRARY[h.effect].device
     return any(name in device for slot in h.slots for name in slot.names)

@@ -1,7 +1,7 @@
-"""What a model may consist of beside geometry and springs: effects and functions.
+"""Elements of a model: effects of the library and functions.
 
-An element adds ``offset + columns d`` to the whitened readings, d its unknowns in units
-in which columns of one kind have norm one.  One size is asked for all of them.
+An element adds ``offset + columns d`` to the whitened readings.  Its unknowns d are
+scaled so that columns of one unit have norm one; they share a prior standard deviation.
 """
 
 import math
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from assembly.effects.functions import AXES
 from assembly.model.robot import Robot
 from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.gaussian import Taken, averaged_gains, likeness
+from validation.diagnosis.gaussian import Marginal, deviance, evidence_gains
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import Signature
 
-_PLAUSIBLE = 1e3  # times its plausible size: no effect is larger
-_NO_OFFSET = 1e-9  # [sigma]
+_PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
+_NO_OFFSET = 1e-9  # [sigma] below which an offset is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,18 +27,18 @@ class Element:
     """An effect of the library at certain frames, or a function.
 
     Attributes:
-        name: the effect's; ``""`` of a function.
-        columns: (N, m) whitened change of the readings per unit of an unknown.
-        scale: (m,) the unit.
-        offset: (N,) what no unknown scales; None if there is nothing.
-        lower, upper: (m,) bounds, in units.
-        given: (m,) standard deviation in units where it is known, else NaN.
-        most: [units] largest size that is plausible.
-        log_prior: ln of the probability before the readings are looked at.
+        name: of the effect; ``""`` for a function.
+        columns: (N, m) whitened change of the readings per scaled unknown.
+        scale: (m,) unknown per scaled unknown.
+        offset: (N,) contribution at d = 0; None if zero.
+        lower, upper: (m,) bounds of the scaled unknowns.
+        given: (m,) fixed prior standard deviation, or NaN.
+        most: largest plausible prior standard deviation.
+        log_prior: ln of the prior probability.
         what: the hypothesis or candidate.
-        slots: (m,) which of the hypothesis's slots; columns of a function.
-        begin: values of all slots where the unknowns are zero.
-        first: the same as it was scored at first, where it was taken again since.
+        slots: (m,) slots of the hypothesis, or unknowns of the candidate.
+        begin: values of all slots at d = 0.
+        first: the element as linearised at its start values, if this one is not.
     """
 
     name: str
@@ -57,28 +57,28 @@ class Element:
 
     @property
     def origin(self) -> "Element":
-        """The same where its unknowns begin."""
+        """The element as linearised at its start values."""
         return self.first or self
 
     @property
     def hypothesis(self) -> Hypothesis:
-        """Of an effect of the library."""
+        """Hypothesis of an effect of the library."""
         assert isinstance(self.what, Hypothesis)
         return self.what
 
     @property
     def candidate(self) -> Candidate:
-        """Of a function."""
+        """Candidate of a function."""
         assert isinstance(self.what, Candidate)
         return self.what
 
     @property
     def bounded(self) -> NDArray:
-        """(m,) whether an unknown begins at its lower bound."""
+        """(m,) whether an unknown starts at its lower bound."""
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Values of all slots, or of a function's unknowns, within their bounds."""
+        """Return values of all slots or of a function's unknowns, within bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -87,16 +87,16 @@ class Element:
 def effect_element(
     signature: Signature, robot: Robot, log_prior: float, shapes: NDArray | None = None
 ) -> Element:
-    """An effect of the library to first order.
+    """Build the element of a library effect.
 
     Args:
         signature: of the hypothesis.
         robot: whose frames it names.
         log_prior: of it.
-        shapes: (k,) values about which it was taken; absent where it begins.
+        shapes: (k,) values of linearisation; absent for the start values.
 
     Returns:
-        The element; unknowns that do not show are left at their start.
+        The element; unknowns without influence stay at their start values.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -105,13 +105,13 @@ def effect_element(
     used = shown if shapes is not None else shown & ~shape
     slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
-    # a shape may be wrong by about half of what it is
+    # prior of a nonlinear parameter: half its value
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # what is added at the start: nothing, but for effects that no unknown scales
+    # zero for all effects with unknowns
     held = np.zeros(len(begin)) if shapes is None else begin
     held = np.where(shape, held, begin)
     offset = signature.offset + signature.columns @ held
@@ -135,7 +135,7 @@ def effect_element(
 
 
 def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
-    """Unknowns of one kind share a unit."""
+    """Return a key that unknowns of the same unit share."""
     name, unknown = h.slots[slot].names[0], h.slots[slot].unknown
     last = name.rpartition(".")[2]
     joints = [f.joint for f in robot.frames if name.startswith(f"{f.name}.")]
@@ -143,7 +143,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """(m,) root mean square of the norms of all columns of a column's kind."""
+    """Return (m,) rms norms of the columns of each column's kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]
@@ -154,18 +154,18 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """A function.
+    """Build the element of a function.
 
     Args:
         candidate: of m unknowns.
         columns: (N, m) whitened change of the readings per unknown.
-        axes: (m,) component that each acts in.
-        falling: (m,) prior size of each beside the others'.
-        most: [rad or m] displacement that is plausible, for an unknown of one.
-        log_prior: of it.
+        axes: (m,) component of each unknown.
+        falling: (m,) relative prior standard deviations.
+        most: largest plausible value of an unknown.
+        log_prior: ln of the prior probability.
 
     Returns:
-        The element; None where the readings see nothing of it.
+        The element; None if the readings do not depend on it.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -180,15 +180,15 @@ def function_element(
 
 
 class Dense:
-    """Elements whose columns stand side by side, to be scored at once."""
+    """Elements with stored columns, scored in batches."""
 
     def __init__(self, elements: list[Element], cells: NDArray, root: NDArray) -> None:
-        """Sort by number of columns.
+        """Group the elements by their number of columns.
 
         Args:
-            elements: any.
-            cells: which of their rows count.
-            root: (n,) of the weights of these.
+            elements: candidates.
+            cells: (N,) mask of the fitted cells.
+            root: (n,) square roots of the weights.
         """
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
@@ -208,32 +208,36 @@ class Dense:
             bounded = np.array([m == 1 and elements[i].bounded[0] for i in own])
             self._groups.append((np.array(own), B, gram, most, bounded))
 
-    def gains(self, taken: Taken, freedom: float) -> NDArray:
-        """(len(elements),) log evidence ratio of each beside what was taken out."""
+    def gains(self, marginal: Marginal, freedom: float) -> NDArray:
+        """Return the log evidence ratio of adding each element to a model."""
         gains = np.full(len(self.elements), -np.inf)
         for own, B, gram, most, bounded in self._groups:
             m = gram.shape[1]
-            shown = (taken.across.T @ B).reshape(-1, len(own), m).transpose(1, 0, 2)
+            shown = (
+                (marginal.factor_columns.T @ B)
+                .reshape(-1, len(own), m)
+                .transpose(1, 0, 2)
+            )
             left = gram - shown.transpose(0, 2, 1) @ shown
-            along = (taken.held @ B).reshape(len(own), m)
-            gains[own] = averaged_gains(left, along, most, bounded, taken, freedom)
-        n = len(taken.held)
+            along = (marginal.held @ B).reshape(len(own), m)
+            gains[own] = evidence_gains(left, along, most, bounded, marginal, freedom)
+        n = len(marginal.held)
         for i, o in self._offsets:
-            across = taken.across.T @ o
-            Q = taken.squares - 2 * float(taken.held @ o) + float(o @ o)
-            Q -= float(across @ across)
-            change = likeness(taken.squares, n, freedom) - likeness(Q, n, freedom)
+            factor_columns = marginal.factor_columns.T @ o
+            Q = marginal.squares - 2 * float(marginal.held @ o) + float(o @ o)
+            Q -= float(factor_columns @ factor_columns)
+            change = deviance(marginal.squares, n, freedom) - deviance(Q, n, freedom)
             gains[i] = 0.5 * float(change)
         return gains
 
 
 def effect_prior(effects: int, ways: int) -> float:
-    """Ln of the prior of a way in which one of so many effects may act."""
+    """Return ln of the prior probability of one hypothesis of the library."""
     return -math.log(2.0) - math.log(max(effects, 1)) - math.log(max(ways, 1))
 
 
 def label(one: Candidate) -> str:
-    """A function in words."""
+    """Return a description of a function."""
     where = " and ".join(f"{p.where} {', '.join(p.components)}" for p in one.parts)
     of = ", ".join(one.parts[0].variables)
     given = "".join(f" {k} {v:.3g}" for k, v in one.shape.given)

@@ -1,8 +1,7 @@
-"""All functions that may act, scored together: places times forms of variables.
+"""Candidate functions, scored in batches: places times forms of variables.
 
-A column of a function is what a component does to the readings of a row times a number
-of that row, B_(rc)q = a_rc P_rq.  So its products take one pass over the readings for
-each component at a place, and one over the rows for each number:
+A column of a function is the response of a row's readings to a component, times a
+number of that row: B_(rc)q = a_rc P_rq.  Inner products therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
@@ -36,28 +35,28 @@ from validation.diagnosis.candidates import (
 )
 from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.forms_tried import CandidateShape, is_angle
-from validation.diagnosis.gaussian import Taken, averaged_gains
+from validation.diagnosis.gaussian import Marginal, evidence_gains
 from validation.diagnosis.places import Places, Weighted, Where
 
 Variables = tuple[str, ...]
-Asked = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_WIDEST = 36  # columns of a function of several components
-_LISTED = 2000  # functions that are ordered
+Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
+_WIDEST = 36  # most columns of a function of several components
+_LISTED = 2000  # best functions that are sorted
 
 
 @dataclass(frozen=True)
-class Found:
-    """A function that was scored.
+class ScoredFunction:
+    """A scored function.
 
     Attributes:
-        worth: log evidence ratio and log prior together.
-        where: number of its place.
+        score: log evidence ratio plus log prior.
+        where: index of its place.
         variables: one or two.
-        shape: the form.
-        log_prior: of it.
+        shape: form.
+        log_prior: ln of the prior probability.
     """
 
-    worth: float
+    score: float
     where: int
     variables: Variables
     shape: CandidateShape
@@ -66,7 +65,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class _Scored:
-    """Products of one form at c places, columns scaled to norm about one."""
+    """Inner products of one form at c places, columns scaled to norm about 1."""
 
     number: int
     shape: int
@@ -78,30 +77,30 @@ class _Scored:
 
 
 def _likeliest(
-    parts: Mapping[int, Sequence[_Scored]], taken: Taken, freedom: float
+    parts: Mapping[int, Sequence[_Scored]], marginal: Marginal, freedom: float
 ) -> list[tuple[float, int, int, int]]:
-    """Worth, and which variables, form and place, of all that show; best first."""
-    worths, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
+    """Return score, request, form and place of the functions, best first."""
+    scores, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
     for own in parts.values():
-        gains = averaged_gains(
+        gains = evidence_gains(
             np.concatenate([p.gram for p in own]),
             np.concatenate([p.along for p in own]),
-            np.concatenate([p.most for p in own]), False, taken, freedom,
+            np.concatenate([p.most for p in own]), False, marginal, freedom,
         )  # fmt: skip
         sizes = [len(p.where) for p in own]
-        worths.append(gains + np.repeat([p.prior for p in own], sizes))
+        scores.append(gains + np.repeat([p.prior for p in own], sizes))
         numbers = np.repeat([(p.number, p.shape) for p in own], sizes, axis=0)
         whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
-    worth, names = np.concatenate(worths), np.concatenate(whose)
-    order = [i for i in np.argsort(-worth).tolist()[:_LISTED] if np.isfinite(worth[i])]
+    score, names = np.concatenate(scores), np.concatenate(whose)
+    order = [i for i in np.argsort(-score).tolist()[:_LISTED] if np.isfinite(score[i])]
     return [
-        (float(worth[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
+        (float(score[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
         for i in order
     ]
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """(c, m) root of the mean squared norm of columns, of turns and of shifts."""
+    """Return (c, m) rms norms of the columns, of rotations and of translations."""
     diagonal = np.einsum("skk->sk", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -111,15 +110,15 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 
 
 class Functions:
-    """Places, variables and forms of a campaign's functions."""
+    """Candidate functions of a campaign."""
 
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, some: bool = True
     ) -> None:
-        """List them; what does the same to the readings counts once.
+        """List places and variables.
 
         Args:
-            campaign: of which commands, loads, covariates and sigma are read.
+            campaign: design; no measured value is used.
             sensitivities: of its rows.
             some: whether any function may act.
         """
@@ -143,7 +142,7 @@ class Functions:
         return other
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
-        """All forms of one variable or two, with ln of the prior at one place."""
+        """Return all forms of one or two variables with their log priors."""
         if len(variables) == 1:
             shapes = forms.every(self.conditions, variables[0], "compliance")
         else:
@@ -157,76 +156,76 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """Ln of the prior of a form of variables, at one place."""
+        """Return the log prior of a form at one place."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
-    def first_look(self) -> list[Asked]:
-        """Variables, and forms that show whether they count."""
+    def first_look(self) -> list[Request]:
+        """Return requests for general forms of every variable."""
         return [
             ((name,), tuple(forms.first(self.conditions, name)))
             for name in self.variables
         ]
 
-    def products(self, names: Iterable[str]) -> list[Asked]:
-        """Products of some variables with any others."""
-        asked: dict[Variables, tuple[CandidateShape, ...]] = {}
+    def products(self, names: Iterable[str]) -> list[Request]:
+        """Return requests for products of given variables with all others."""
+        requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
                 both = None
                 if other != name:
                     both = forms.of_two(self.conditions, name, other)
-                if both is not None and both[0] not in asked:
-                    asked[both[0]] = tuple(both[1])
+                if both is not None and both[0] not in requests:
+                    requests[both[0]] = tuple(both[1])
             if is_angle(self.campaign.robot, name):
-                asked[(name,)] = (forms.of_direction(name),)
-        return list(asked.items())
+                requests[(name,)] = (forms.of_direction(name),)
+        return list(requests.items())
 
     def look(
-        self, taken: Taken, weighted: Weighted, freedom: float,
-        asked: Sequence[Asked], most: int,
-    ) -> list[Found]:  # fmt: skip
-        """The best functions of some variables and forms beside what is known.
+        self, marginal: Marginal, weighted: Weighted, freedom: float,
+        requests: Sequence[Request], most: int,
+    ) -> list[ScoredFunction]:  # fmt: skip
+        """Return the functions that improve a model most.
 
         Args:
-            taken: what is known, and what is left, in the cells of ``weighted``.
-            weighted: places.
-            freedom: of the noise's scale.
-            asked: variables with their forms.
-            most: functions of each variable or pair.
+            marginal: model, in the cells of ``weighted``.
+            weighted: responses at all places.
+            freedom: degrees of freedom of the noise scale's prior.
+            requests: variables with their forms.
+            most: number of functions for each request.
 
         Returns:
-            Functions, best first.
+            Scored functions, best first.
         """
         if not len(self.places):
             return []
         row, component = weighted.cells
-        count = taken.across.shape[1]
+        count = marginal.factor_columns.shape[1]
         U = np.zeros((len(weighted.rows), 6, count))
-        U[row, component] = taken.across
+        U[row, component] = marginal.factor_columns
         held = np.zeros((len(weighted.rows), 6))
-        held[row, component] = taken.held
+        held[row, component] = marginal.held
         through = weighted.answers.transpose(1, 0, 2) @ U
         on = np.einsum("src,rc->sr", weighted.answers, held)
         parts: dict[int, list[_Scored]] = {}
-        for number, (variables, shapes) in enumerate(asked):
+        for number, (variables, shapes) in enumerate(requests):
             for one in self._blocks(number, weighted, variables, shapes, through, on):
                 parts.setdefault(one.along.shape[1], []).append(one)
-        best: list[Found] = []
+        best: list[ScoredFunction] = []
         each: dict[int, int] = {}
-        for worth, number, k, where in _likeliest(parts, taken, freedom):
+        for score, number, k, where in _likeliest(parts, marginal, freedom):
             each[number] = each.get(number, 0) + 1
             if each[number] <= most:
-                variables, shapes = asked[number]
+                variables, shapes = requests[number]
                 prior = self.prior(variables, shapes[k])
-                best.append(Found(worth, where, variables, shapes[k], prior))
+                best.append(ScoredFunction(score, where, variables, shapes[k], prior))
         return best
 
     def _blocks(
         self, number: int, weighted: Weighted, variables: Variables,
         shapes: Sequence[CandidateShape], through: NDArray, on: NDArray,
     ) -> Iterator[_Scored]:  # fmt: skip
-        """Products of all forms of variables at all places."""
+        """Compute inner products of all forms of a request at all places."""
         columns = [self._numbers(variables, s)[weighted.rows] for s in shapes]
         ends = np.cumsum([0, *(c.shape[1] for c in columns)])
         P = np.hstack(columns)
@@ -257,12 +256,12 @@ class Functions:
                 yield _Scored(number, k, where, left, b * scale, most, prior)
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """(R, q) columns of a form, falling as their prior does."""
+        """Return (R, q) columns of a form, scaled by their relative prior."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
-    def candidate(self, found: Found) -> Candidate:
-        """The function that was scored."""
+    def candidate(self, found: ScoredFunction) -> Candidate:
+        """Return the candidate of a scored function."""
         return self._at(self.places.names[found.where], found.variables, found.shape)
 
     @staticmethod
@@ -273,7 +272,7 @@ class Functions:
         return Candidate((part,), place[0][2], shape)
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Parts of candidates at other places that do the same to the readings."""
+        """Return the parts of candidates at other places with equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -283,7 +282,7 @@ class Functions:
         return [self._at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """A candidate with its columns."""
+        """Return the element of a candidate; None if it is not visible."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)

@@ -8,7 +8,7 @@ symbol  code            shape    meaning
 ======  ==============  =======  =====================================================
 G       ``matrix``      (k, k)   inner products of columns, z last
 M                       (p, p)   1 + S G S of what is eliminated
-U       ``across``      (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - U U'
+U       ``factor_columns``      (n, p)   X S L^-T with L L' = M, so that C^-1 = 1 - U U'
 Q       ``squares``              z' C^-1 z
 ======  ==============  =======  =====================================================
 
@@ -29,33 +29,33 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.special import gammaln, log_ndtr
 
-SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] what a block may do to readings
+SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)  # [sigma] prior contributions to readings
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # of the largest product: directions of a block lost to rounding
+_SEEN = 1e-8  # least eigenvalue of a scaled candidate that is not rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Products:
-    """Inner products of columns, some of them eliminated.
+    """Inner products of columns, some of which are eliminated.
 
     Attributes:
         matrix: (k, k), the readings last.
-        log_det: ln det C of what was eliminated.
+        log_det: ln det C of the eliminated columns.
     """
 
     matrix: NDArray
     log_det: float = 0.0
 
     def eliminate(self, columns: NDArray, prior_std: NDArray | float) -> "Products":
-        """What is left when some unknowns are marginalised.
+        """Marginalise some of the unknowns.
 
         Args:
-            columns: their numbers.
-            prior_std: of each, about zero; inf is a flat prior, whose columns must be
-                independent, and adds nothing to ``log_det``.
+            columns: indices of their columns.
+            prior_std: prior standard deviations; inf is a flat prior, whose columns
+                must be independent and add nothing to ``log_det``.
 
         Returns:
-            Products with C^-1 between; those of the columns eliminated are zero.
+            Inner products with C^-1 as metric; zero for the eliminated columns.
         """
         own = np.asarray(columns)
         std = np.broadcast_to(np.asarray(prior_std, dtype=float), own.shape)
@@ -71,13 +71,13 @@ class Products:
         return Products(left, self.log_det + log_det)
 
     def log_evidence(self, count: int, freedom: float = math.inf) -> float:
-        """Ln p(z) of n readings, all unknowns eliminated."""
+        """Return ln p(z) of n readings after all unknowns are eliminated."""
         return log_evidence(float(self.matrix[-1, -1]), self.log_det, count, freedom)
 
     def posterior(
         self, columns: NDArray, prior_std: NDArray | float
     ) -> tuple[NDArray, NDArray]:
-        """Mean and covariance of unknowns, all that was eliminated beside them."""
+        """Return posterior mean and covariance of unknowns that are not eliminated."""
         own = np.asarray(columns)
         std = np.broadcast_to(np.asarray(prior_std, dtype=float), own.shape)
         precision = np.diag(std**-2.0)
@@ -88,88 +88,88 @@ class Products:
 def log_evidence(
     squares: float, log_det: float, count: int, freedom: float = math.inf
 ) -> float:
-    """Ln p(z) of n readings, from z' C^-1 z and ln det C; tau about 1."""
+    """Return ln p(z) of n readings from z' C^-1 z and ln det C."""
     if math.isinf(freedom):
         return -0.5 * (squares + log_det + count * math.log(2 * math.pi))
     constant = gammaln((freedom + count) / 2) - gammaln(freedom / 2)
     constant -= count / 2 * math.log(freedom * math.pi) + log_det / 2
-    return float(constant - likeness(squares, count, freedom) / 2)
+    return float(constant - deviance(squares, count, freedom) / 2)
 
 
-def likeness(squares: NDArray | float, count: int, freedom: float) -> NDArray | float:
-    """-2 ln of the part of the density of z that depends on z' C^-1 z."""
+def deviance(squares: NDArray | float, count: int, freedom: float) -> NDArray | float:
+    """Return -2 ln p(z) without the terms that do not depend on z' C^-1 z."""
     return (freedom + count) * np.log1p(np.asarray(squares) / freedom)
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
-    """What columns leave: the fast path for many candidates at once.
+class Marginal:
+    """A model with its unknowns marginalised, for scoring many candidates.
 
     Attributes:
-        across: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
+        factor_columns: (n, p) U, so that B'C^-1 B = B'B - (U'B)'(U'B).
         held: (n,) C^-1 z.
         squares: z' C^-1 z.
     """
 
-    across: NDArray
+    factor_columns: NDArray
     held: NDArray
     squares: float
 
 
-def take_out(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Taken:
-    """What columns (n, k) of prior std (k,), and orthonormal flat ones, leave."""
+def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
+    """Marginalise columns (n, k) of prior std (k,); flat: (n, f), orthonormal."""
     X = columns * std
     M = X.T @ X
     M[np.diag_indices(len(M))] += 1.0
     L = np.linalg.cholesky(M)
     U = solve_triangular(L, X.T, lower=True, check_finite=False).T
     held = z - U @ (U.T @ z)
-    return Taken(np.hstack([flat, U]), held, float(z @ held))
+    return Marginal(np.hstack([flat, U]), held, float(z @ held))
 
 
 def leave_block_out(
-    taken: Taken, blocks: NDArray, tau: float = 1.0
+    marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Readings of each block foretold by a fit to all others, sizes held.
+    """Predict each block of readings by a fit to all others, exactly.
 
     Args:
-        taken: of n readings.
-        blocks: (n,) whose each reading is.
-        tau: of the noise.
+        marginal: of n readings.
+        blocks: (n,) block of each reading.
+        tau: scale of the noise.
 
     Returns:
-        (n,) errors, and (number of blocks,) ln densities.
+        (n,) prediction errors and (blocks,) ln predictive densities.
     """
-    errors, densities = np.empty_like(taken.held), []
+    errors, densities = np.empty_like(marginal.held), []
     for name in np.unique(blocks):
         own = np.flatnonzero(blocks == name)
-        U = taken.across[own]
+        U = marginal.factor_columns[own]
         left = np.eye(len(own)) - U @ U.T
-        errors[own] = np.linalg.solve(left, taken.held[own])
+        errors[own] = np.linalg.solve(left, marginal.held[own])
         size = np.linalg.slogdet(left)[1] - len(own) * math.log(2 * math.pi * tau**2)
-        square = float(errors[own] @ taken.held[own]) / tau**2
+        square = float(errors[own] @ marginal.held[own]) / tau**2
         densities.append(0.5 * (size - square))
     return errors, np.array(densities)
 
 
-def averaged_gains(
+def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
-    taken: Taken, freedom: float,
+    marginal: Marginal, freedom: float,
 ) -> NDArray:  # fmt: skip
-    """Log evidence ratios of blocks of columns, the size of each averaged over a grid.
+    """Return log evidence ratios of candidates, averaged over prior sizes.
 
     Args:
-        gram: (c, m, m) B'C^-1 B of c blocks, columns scaled to norm about 1.
+        gram: (c, m, m) B'C^-1 B of c candidates, columns scaled to norm about 1.
         along: (c, m) B'C^-1 z.
-        most: (c,) largest size that is plausible, in the same scale.
-        bounded: (c,) whether its one unknown cannot be negative.
-        taken: what is known.
-        freedom: of the noise's scale.
+        most: (c,) largest plausible prior standard deviation, in that scale.
+        bounded: (c,) whether the single unknown cannot be negative.
+        marginal: what is known.
+        freedom: degrees of freedom of the noise scale's prior.
 
     Returns:
-        (c,) -inf where nothing plausible shows.
+        (c,) logarithms; -inf where no plausible size is visible.
     """
-    count = len(taken.held)
+    count = len(marginal.held)
     if gram.shape[1] == 1:
         values, turned = gram[:, 0], along
     else:
@@ -180,10 +180,10 @@ def averaged_gains(
     squares = np.where(seen, turned**2, 0.0)
     t2 = SIZES[:, None, None] ** 2
     grown = 1 + t2 * values
-    left = taken.squares - (squares * t2 / grown).sum(axis=2)
-    left = np.maximum(left, 1e-9 * taken.squares)
-    base = likeness(taken.squares, count, freedom)
-    gains = 0.5 * (base - likeness(left, count, freedom) - np.log(grown).sum(axis=2))
+    left = marginal.squares - (squares * t2 / grown).sum(axis=2)
+    left = np.maximum(left, 1e-9 * marginal.squares)
+    base = deviance(marginal.squares, count, freedom)
+    gains = 0.5 * (base - deviance(left, count, freedom) - np.log(grown).sum(axis=2))
     if gram.shape[1] == 1 and np.any(bounded):
         spread = np.sqrt(t2[:, :, 0] / grown[:, :, 0])
         tau = np.sqrt((freedom + left) / (freedom + count))
@@ -197,13 +197,13 @@ def averaged_gains(
     return np.where(sizes > 0, average, -np.inf)
 
 
-def size_cost(determined: float) -> float:
-    """What a size costs that was chosen best instead of averaged, by Laplace.
+def size_penalty(determined: float) -> float:
+    """Return the penalty of an optimised prior size (Laplace approximation).
 
     Args:
-        determined: number of well determined unknowns that share it.
+        determined: number of well determined unknowns that share the size.
 
     Returns:
-        Logarithm of the maximum over the average, of a range of :data:`SIZES`.
+        Logarithm of the ratio of maximum and average over the range of sizes.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

@@ -13,26 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-FREEDOM = 20.0  # of the prior of tau: a stated sigma is worth as many readings
-_BLUNDERS = 2e-4  # of the readings, before they are looked at
-_WIDTH = 30.0  # times tau
-_LEFT_OUT = 1e-12  # weight of a blunder
-_CLEAR = 10.0  # times tau: what no effect does to a few readings alone
-_MANY = 0.03  # more far off than this share are no blunders but an effect
-_UNLIKE = 4.0  # standard deviations from the stated sigma
-_CLOSE = 0.2  # of ln tau: a sigma is hardly known better
-_CHANCE = 1e-4  # of repeats that scatter as much by chance
-_MEDIAN = 0.4549  # of the chi-square of one degree of freedom
+FREEDOM = 20.0  # degrees of freedom of the prior of tau^2 about 1
+_BLUNDERS = 2e-4  # prior probability of a blunder
+_WIDTH = 30.0  # standard deviation of blunders over tau
+_LEFT_OUT = 1e-12  # relative precision of a blunder
+_CLEAR = 10.0  # residual over tau: least of a blunder before a model is fitted
+_MANY = 0.03  # largest share of blunders; more outliers indicate an effect
+_UNLIKE = 4.0  # standard deviations of tau from 1 that are reported
+_CLOSE = 0.2  # least ln tau that is reported: accuracy of a stated sigma
+_CHANCE = 1e-4  # p-value below which repeats are not repeatable
+_MEDIAN = 0.4549  # median of chi-square with one degree of freedom
 
 
 @dataclass(frozen=True)
 class Noise:
-    """What is left, beside what was stated.
+    """Estimated noise.
 
     Attributes:
         tau: true over stated sigma.
         tau_std: its standard deviation.
-        findings: what else is to be said of it, in words.
+        findings: sentences for the user.
     """
 
     tau: float
@@ -40,17 +40,16 @@ class Noise:
     findings: tuple[str, ...] = ()
 
 
-def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Probability of every reading that it is no blunder.
+def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
+    """Return the probability that each reading is no blunder.
 
     Args:
-        squares: (n,) expected squared residuals, with what the fit does not know.
+        squares: (n,) expected squared residuals.
 
-        clearly: whether blunders must be far off, as where effects may be left.
+        clearly: require large residuals, because effects are not fitted yet.
 
     Returns:
-        (n,) 1 of those that are likelier good; ones where so many are far off that it
-        is no matter of blunders.
+        (n,) 1 if a reading is more likely good; all 1 if there are too many outliers.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -63,17 +62,17 @@ def good_readings(squares: NDArray, *, clearly: bool = False) -> NDArray:
     return share
 
 
-def weights_of(good: NDArray) -> NDArray:
-    """(n,) weights of readings; a blunder has none, however far off it is."""
+def cell_weights(good: NDArray) -> NDArray:
+    """Return (n,) relative precisions: 1 of a good reading, hardly any of a blunder."""
     return np.maximum(good, _LEFT_OUT)
 
 
-def scatter_of_repeats(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """How much readings of the same thing differ, whatever the model.
+def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
+    """Return the scatter of repeated readings.
 
     Args:
-        z: (n,) whitened readings.
-        group: (n,) number of what each is a reading of.
+        z: (n,) whitened residual.
+        group: (n,) readings with the same number are repeats.
 
     Returns:
         [sigma] root mean square within groups, and its degrees of freedom.
@@ -88,33 +87,34 @@ def scatter_of_repeats(z: NDArray, group: NDArray) -> tuple[float, int]:
 def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool
 ) -> tuple[str, ...]:
-    """What noise has to say for itself.
+    """Return findings about the noise.
 
     Args:
-        tau: true over stated sigma, by what a model leaves.
+        tau: true over stated sigma.
         tau_std: its standard deviation.
-        repeats: :func:`scatter_of_repeats`, of what is left.
-        memory: whether the model depends on the rows before.
+        repeats: of :func:`repeat_scatter`, from the residual.
+        memory: whether the model depends on earlier rows.
 
     Returns:
         Sentences; none where all is as stated.
     """
     told = []
     if abs(np.log(tau)) > max(_UNLIKE * tau_std / tau, _CLOSE):
-        told.append(f"what is left is {tau:.2g} times the stated sigma")
+        told.append(f"the residual is {tau:.2g} times the stated sigma")
     rms, freedom = repeats
     if freedom and float(chi2.sf(rms**2 * freedom, freedom)) < _CHANCE:
         told.append(
             f"not repeatable: rows of one configuration and load differ by {rms:.2g} "
-            "times the stated sigma, by memory, time or something not recorded"
+            "times the stated sigma; possible causes: memory, time, or an unrecorded "
+            "variable"
         )
     if memory:
-        told.append("memory: what is read depends on the rows before")
+        told.append("memory: the readings depend on the order of the rows")
     return tuple(told)
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:
-    """Posterior mean of tau, and its standard deviation."""
+    """Return the estimate of tau and its standard deviation."""
     freedom = FREEDOM + count
     tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
     return float(tau), float(tau / np.sqrt(2 * freedom))

@@ -1,7 +1,7 @@
-"""Geometry and springs beside everything else: columns, groups and limits.
+"""Nuisance parameters: geometric errors of frames and springs of joints.
 
-Random springs stand for what is spread over many joints.  A spring that does what one
-unknown of a named effect does is that effect, and is none of them.
+Random springs describe compliance that is spread over many joints.  A spring with the
+same column as a single unknown of a library effect is removed: it is that effect.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
 
-_SAME = 1 - 1e-6  # cosine of columns that are the same
+_SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +22,9 @@ class Nuisance:
     Attributes:
         columns: (N, k) whitened change of the readings per unknown.
         group: (k,) 0 and 1 rotations and translations of frames, 2 and 3 of springs.
-        given: (k,) standard deviation that is declared, NaN where it is asked for.
-        most: (k,) largest size that is plausible.
-        frame, axis: (k,) which unknown it is.
+        given: (k,) declared standard deviation, or NaN.
+        most: (k,) largest plausible standard deviation.
+        frame, axis: (k,) row of the frame and component of the screw.
     """
 
     columns: NDArray
@@ -36,24 +36,24 @@ class Nuisance:
 
     @property
     def spring(self) -> NDArray:
-        """(k,) whether it is a spring, which cannot be negative."""
+        """(k,) whether it is a spring; its compliance cannot be negative."""
         return self.group >= 2
 
     @property
     def declared(self) -> bool:
-        """Whether geometric errors are there whatever the readings say."""
+        """Whether the robot declares tolerances; geometric errors are then in use."""
         return bool(np.isfinite(self.given).any())
 
 
 def nuisance(terms: Sequence[SmallTerm], named: NDArray) -> Nuisance:
-    """Small terms side by side, without springs that have a name.
+    """Collect the nuisance parameters, without springs that are library effects.
 
     Args:
-        terms: geometry and springs, either or none.
+        terms: of geometry, of springs, both or none.
         named: (N, c) columns of single unknowns of library effects.
 
     Returns:
-        Unknowns in the order of the terms.
+        The parameters in the order of the terms.
     """
     unit = named / np.maximum(np.linalg.norm(named, axis=0), 1e-300)
     kept = []

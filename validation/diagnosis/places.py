@@ -1,7 +1,8 @@
-"""Places at which a function may act, with what each does to the readings.
+"""Places at which a function can act, with the responses of the readings.
 
-A place is a component of a screw at a frame, at the base, in the reading or of the
-load, or several components at one place.  Those that do the same count once.
+A place is a component of a screw at a frame, at the base or in the reading, a component
+of the load, or several components at the same frame.  Places with equal responses are
+listed once.
 """
 
 from dataclasses import dataclass, field
@@ -23,24 +24,24 @@ from validation.diagnosis.gaussian import SIZES
 from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
 
 Where = tuple[str, str, str]  # place, component, kind
-_PROBES = 3  # random directions by which equal places are known
-_DIGITS = 6
-_HEAVY = 10.0  # times the largest load: an unknown one is smaller
-_FORCE = 1000.0  # [N] likewise, where none is recorded
-_REMEMBERED = 8  # columns of forms whose products are kept
+_PROBES = 3  # random projections that identify equal responses
+_DIGITS = 6  # of a projection that must agree
+_HEAVY = 10.0  # largest unrecorded force over the largest recorded one
+_FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
+_REMEMBERED = 8  # most columns of a form whose products are cached
 
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """Places in some of the cells, weighted.
+    """Weighted responses at all places, in selected cells.
 
     Attributes:
-        rows: those that have such a cell.
-        answers: (S, R, 6) zero in other cells.
-        squares: (S, R).
-        beside: (pairs, R) products of components of one combination.
-        cells: their rows and components.
-        known: products of columns of a form at all places, and of pairs of these.
+        rows: (R,) rows with a selected cell.
+        answers: (S, R, 6) responses, zero in other cells.
+        squares: (S, R) sums of squares over the cells of a row.
+        beside: (pairs, R) the same of two components of a combination.
+        cells: row and component of the selected cells.
+        known: cache of inner products by form.
     """
 
     rows: NDArray
@@ -51,7 +52,7 @@ class Weighted:
     known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
 
     def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
-        """(S, m, m) B'B at all places and (pairs, m, m), of columns P (R, m)."""
+        """Return B'B (S, m, m) at all places and (pairs, m, m) of columns (R, m)."""
         if key in self.known:
             return self.known[key]
         m = columns.shape[1]
@@ -64,21 +65,21 @@ class Weighted:
 
 
 class Places:
-    """Places of a campaign's robot that the readings see.
+    """Places of a campaign's robot that the readings depend on.
 
     Attributes:
-        names: components of each.
-        members: S single components, by number, of each.
-        equal: of each single component, others that do the same.
-        most: largest plausible unknown of each.
-        sizes: of each number of components: which places, members, and which turn.
+        names: components of each place.
+        members: indices of the S single components of each place.
+        equal: other components with the same response.
+        most: largest plausible unknown of each place.
+        sizes: by number of components: places, members, and which are rotations.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List them.
+        """List the places.
 
         Args:
-            campaign: of which commands, loads and sigma are read.
+            campaign: design; no measured value is used.
             sensitivities: of its rows.
         """
         self._campaign, self._sensitivities = campaign, sensitivities
@@ -105,7 +106,7 @@ class Places:
         return len(self.names)
 
     def _listed(self) -> tuple[list[Where], list[tuple[Where, ...]]]:
-        """Components at places, and several at one."""
+        """Return single components and combinations."""
         singles: list[Where] = [("load", force, "screw") for force in LOADS[3:]]
         combined = [tuple(singles)]
         for kind, (part, *others) in places_of(self._campaign.robot, [""]):
@@ -117,7 +118,7 @@ class Places:
         return sorted(singles, key=self._preference), combined
 
     def _list_singles(self, singles: list[Where]) -> None:
-        """Components that show, each once."""
+        """List single components with distinct responses."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
         rng = np.random.default_rng(0)
         probes = rng.normal(size=(_PROBES, *over_sigma.shape))
@@ -142,7 +143,7 @@ class Places:
         self._answers = np.array(answers).reshape(len(answers), *over_sigma.shape)
 
     def _list_combinations(self, combined: list[tuple[Where, ...]]) -> None:
-        """Several components at one place, those that the readings see."""
+        """List combinations of components of one frame."""
         known = {frozenset(members) for members in self.members}
         for own in combined:
             shown = [w for w in own if w in self.number]
@@ -154,7 +155,7 @@ class Places:
                 self.equal.append([])
 
     def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Drives' own motions first, then other frames, then base and reading."""
+        """Return the sort key: drives' own motions, other frames, other places."""
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
@@ -162,7 +163,7 @@ class Places:
         return kind != "screw", not own, frame is None
 
     def plausible(self, where: Where) -> float:
-        """Plausible size of an unknown: displacement, or per wrench there."""
+        """Return the largest plausible unknown: displacement, compliance or force."""
         name, component, kind = where
         conditions = self._sensitivities.conditions
         if name == "load":
@@ -178,14 +179,14 @@ class Places:
         return most / size if size > 0 else 0.0
 
     def weighted(self, cells: NDArray, root: NDArray) -> Weighted:
-        """Places in some cells.
+        """Return weighted responses in selected cells.
 
         Args:
-            cells: (N,) mask over the measured cells.
-            root: (n,) of the weights of these.
+            cells: (N,) mask of the measured cells.
+            root: (n,) square roots of the weights.
 
         Returns:
-            What each does to the readings there.
+            Responses of all places.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)
@@ -199,7 +200,7 @@ class Places:
         return Weighted(rows, answers, squares, beside, (row, component))
 
     def joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
-        """(c, s m, s m) products of combinations of s components."""
+        """Return (c, s m, s m) inner products of combinations of s components."""
         c, s = members.shape
         m = whole.shape[1]
         B = np.zeros((c, s, m, s, m))

@@ -1,10 +1,10 @@
-"""Prior standard deviations of groups of unknowns, where the readings are likeliest.
+"""Prior standard deviations of groups of unknowns by maximum evidence.
 
 With posterior mean mu and covariance V of the unknowns of a group and s their size,
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-zero where s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, taken with a limit.
+zero where s^2 = sum mu^2 / sum (1 - V/s^2): MacKay's step, marginal with a limit.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -16,27 +16,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from validation.diagnosis.gaussian import likeness, size_cost
+from validation.diagnosis.gaussian import deviance, size_penalty
 
 _STEPS = 25
-_SETTLED = 0.03  # change of ln s
-_LEAP = 4.0  # times that a size may change in a step
-_BEGIN = 4.0  # [sigma] what a group's unknowns may do at first
-_LEAST, _MOST = 1e-2, 1e6  # [sigma] likewise
+_SETTLED = 0.03  # change of ln s that ends the iteration
+_LEAP = 4.0  # largest factor of change in a step
+_BEGIN = 4.0  # [sigma] contribution of a group's unknowns at the start
+_LEAST, _MOST = 1e-2, 1e6  # [sigma] limits of that contribution
 
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Unknowns with the sizes of their priors at the likeliest.
+    """Optimised prior standard deviations and the posterior.
 
     Attributes:
         std: (k,) of every unknown, in units of the noise's scale tau.
-        of_group: by group.
+        of_group: standard deviations by group.
         mean: (k,) posterior.
         covariance: (k, k) likewise, over tau^2.
         squares: z' C^-1 z.
         log_det: ln det C.
-        cost: of having chosen the sizes.
+        cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
     """
 
     std: NDArray
@@ -49,7 +49,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) 1 of what the readings say alone, 0 of what the prior says."""
+        """(k,) 1 for an unknown that the readings determine, 0 for the prior."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)
@@ -59,21 +59,21 @@ def best_sizes(
     gram: NDArray, along: NDArray, squares: float, count: int, freedom: float,
     group: NDArray, given: NDArray, most: NDArray, start: dict[int, float],
 ) -> Sizes:  # fmt: skip
-    """Sizes of all groups.
+    """Optimise the prior standard deviations of all groups.
 
     Args:
         gram: (k, k) inner products of columns.
-        along: (k,) with the readings.
-        squares: of the readings.
-        count: n of them.
-        freedom: of the noise's scale.
-        group: (k,) number of the group; those of a given size are of none.
-        given: (k,) size, NaN where it is asked for.
-        most: (k,) largest size that is plausible.
-        start: sizes to begin with, by group.
+        along: (k,) inner products with the readings.
+        squares: sum of squares of the readings.
+        count: n, number of readings.
+        freedom: degrees of freedom of the noise scale's prior.
+        group: (k,) group of each unknown.
+        given: (k,) fixed standard deviation, or NaN.
+        most: (k,) largest plausible standard deviation.
+        start: start values by group.
 
     Returns:
-        The sizes, and the posterior.
+        Standard deviations and posterior.
     """
     free = np.isnan(given)
     own = {int(g): np.flatnonzero((group == g) & free) for g in np.unique(group[free])}
@@ -99,10 +99,10 @@ def best_sizes(
         left = max(squares - float(std * along @ x), 1e-12 * squares)
         log_det = 2 * float(np.log(np.diag(factor[0])).sum())
         determined = 1 - (inverse**2).sum(axis=0)
-        now = -0.5 * (float(likeness(left, count, freedom)) + log_det)
+        now = -0.5 * (float(deviance(left, count, freedom)) + log_det)
         if now > worth:
             worth = now
-            cost = sum(size_cost(float(determined[w].sum())) for w in own.values())
+            cost = sum(size_penalty(float(determined[w].sum())) for w in own.values())
             inverse *= std
             best = Sizes(
                 std, dict(size), std * x, inverse.T @ inverse, left, log_det, cost

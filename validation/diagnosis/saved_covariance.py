@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.function import Function
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
@@ -131,17 +132,28 @@ def covariance_of(
         moved = x.copy()
         moved[k] += _STEP * std[k]
         other = unknowns.robot_at(moved)
-        there = np.array([_value(n, other) for n in numbers])
-        J[:, k] = np.where(np.isfinite(there), there - middle, 0.0) / (_STEP * std[k])
+        there = np.array([_value(n, other, robot) for n in numbers])
+        J[:, k] = (there - middle) / (_STEP * std[k])
     return SavedCovariance(tuple(numbers), J @ C @ J.T)
 
 
-def _value(number: Number, robot: Robot) -> float:
-    """A number's value, NaN in a robot that lacks it."""
-    try:
+def _value(number: Number, robot: Robot, saved: Robot) -> float:
+    """A number's value in a robot near the saved one, 0 where it is not there."""
+    if number.kind != FUNCTION:
         return number.of(robot)
-    except (KeyError, IndexError):
-        return float("nan")
+    # a robot nearby may have one function more, of numbers that are zero in the saved
+    own = saved.functions[int(number.owner)]
+    alike = [f for f in saved.functions if _names(f) == _names(own)]
+    there = [f for f in robot.functions if _names(f) == _names(own)]
+    place = next(k for k, f in enumerate(alike) if f is own)
+    if place >= len(there):
+        return 0.0
+    return float(there[place].parameters.get(number.name, 0.0))
+
+
+def _names(function: Function) -> tuple[object, ...]:
+    """What tells functions of a file apart."""
+    return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(unknowns: Unknowns, robot: Robot) -> list[Number]:

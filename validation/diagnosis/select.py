@@ -1,8 +1,9 @@
-"""The search of a diagnosis: effects and functions together, in one currency.
+"""Select a model of the deviations: effects of the library and functions.
 
-A model is a set of elements beside geometry and springs (:mod:`.states`); the search
-(:mod:`.search`) sees many.  All that were seen have their weights: the likeliest is
-described, and every name has the probability of the models that contain it.
+A model is a set of elements with or without geometric errors and springs
+(:mod:`.states`).  The search (:mod:`.search`) visits many.  Every visited model has a
+posterior weight.  The result describes the best one; the probability of a name is the
+sum of the weights of the models that contain it.
 """
 
 from collections.abc import Sequence
@@ -20,20 +21,20 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
     findings,
-    good_readings,
+    probability_good,
+    repeat_scatter,
     scale,
-    scatter_of_repeats,
 )
 from validation.diagnosis.search import Search, Update, names_of
 from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
-from validation.diagnosis.states import State, foretold
+from validation.diagnosis.states import State, prediction_gain
 
-_EQUAL = 3.0  # log posterior: functions that do as well
-_SAME = 1.0  # squared whitened difference of models that say the same
-_LISTED = 20  # models
-_HEARD = 60  # models that are compared
-_FEWEST = 5  # blocks, from which functions must foretell
-_SURE = 2.0  # standard errors by which one must foretell blocks left out
+_EQUAL = 3.0  # log posterior: difference of equivalent functions
+_SAME = 1.0  # squared whitened difference of models with equal predictions
+_LISTED = 20  # models in the result
+_COMPARED = 60  # models whose predictions are compared
+_FEWEST = 5  # blocks: with fewer, functions are not cross-validated
+_SURE = 2.0  # standard errors: least gain of a function in cross-validation
 
 
 def select(
@@ -44,20 +45,20 @@ def select(
 
     Args:
         columns: of all N measured cells.
-        z: (n,) whitened residual of the cells fitted.
-        cells: (N,) mask of these; no other readings are known here.
-        update: told what is done, how much of it and of how much.
+        z: (n,) whitened residual of the fitted cells.
+        cells: (N,) mask of the fitted cells; no other reading is used.
+        update: progress callback: stage, steps done, steps in total.
 
     Returns:
-        The best model, and how likely it and the others are.
+        The best model, and the posterior probabilities.
     """
     good = np.ones(len(z))
     search = Search(columns, z, cells, good)
-    begin = good_readings(search.begin.expected_squares(), clearly=True)
+    begin = probability_good(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
         good, search = begin, Search(columns, z, cells, begin)
     states = search.run(update)
-    again = good_readings(states[0].expected_squares())
+    again = probability_good(states[0].expected_squares())
     if not np.array_equal(again, good):
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
@@ -65,8 +66,8 @@ def select(
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
-    """The answer from all models seen."""
-    states = _confirmed(search, _unlike(states))
+    """Build the result from all visited models."""
+    states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     best, fit = states[0], search.fit
@@ -114,7 +115,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
 def _findings(
     search: Search, best: State, scale: tuple[float, float], good: NDArray
 ) -> tuple[str, ...]:
-    """What repeats, memory and the scale say of the noise."""
+    """Return findings about the noise: scale, repeatability, memory."""
     columns, fit = search.columns, search.fit
     row, component = (axis[fit.cells] for axis in np.nonzero(columns.campaign.cells))
     repeat = columns.campaign.repeat[row]
@@ -123,14 +124,14 @@ def _findings(
         point = np.unique(columns.campaign.point, return_inverse=True)[1][row]
     group = (repeat * (point.max(initial=0) + 1) + point) * 6 + component
     kept = good > 0.5
-    repeats = scatter_of_repeats(best.left[kept], group[kept])
+    repeats = repeat_scatter(best.left[kept], group[kept])
     forms = {e.candidate.shape.form for e in best.elements if not e.name}
     memory = any(FORMS[form].remembers for form in forms)
     return findings(*scale, repeats, memory=memory)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
-    """Of an effect; finite motions beside others are part of these, and no claim."""
+    """Return the probability of an effect; finite motions count only alone."""
     has = [
         any(e.name == name for e in s.elements)
         and (len(s.elements) == 1 or not LIBRARY[name].finite)
@@ -140,16 +141,16 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Models without the likeliest whose functions foretell nothing."""
+    """Remove the best models whose functions fail cross-validation."""
     blocks = search.columns.block[search.fit.cells]
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # one by one, and all of them: two may hide one another's faults
+        # each one, and all together: two functions can compensate each other
         rests = [tuple(x for x in best.elements if x is not e) for e in learned]
         rests.append(tuple(x for x in best.elements if x.name))
         gains = [
-            foretold(best, search.fit.state(rest, best.mode, best), blocks)
+            prediction_gain(best, search.fit.state(rest, best.mode, best), blocks)
             for rest in rests
             if learned
         ]
@@ -163,18 +164,22 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
     return states
 
 
-def _unlike(states: Sequence[State]) -> list[State]:
-    """Models without those that say of the readings what a likelier one says.
+def _merged(states: Sequence[State]) -> list[State]:
+    """Merge models of equal predictions; the one with fewer functions is kept.
 
-    A function that does what an effect does is that effect: the one with fewer
-    functions stays.
+    A function with the same columns as an effect of the library is that effect.
 
     Returns:
         Models, best first.
     """
     every = sorted(states, key=lambda s: -s.score)
-    bare = [s for s in every if not _functions(s)]  # what stays if none is confirmed
-    ordered = [*every[:_HEARD], *(s for s in bare[:_LISTED] if s not in every[:_HEARD])]
+    bare = [
+        s for s in every if not _functions(s)
+    ]  # kept in case no function is confirmed
+    ordered = [
+        *every[:_COMPARED],
+        *(s for s in bare[:_LISTED] if s not in every[:_COMPARED]),
+    ]
     kept: list[State] = []
     for state in ordered:
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
@@ -196,7 +201,7 @@ def _functions(state: State) -> int:
 
 
 def _same(one: State, other: State) -> bool:
-    """Whether two models differ by nothing that the readings could show."""
+    """Return whether two models predict the same readings."""
     if not one.elements or not other.elements:
         return one.elements == other.elements
     difference = one.fitted - other.fitted
@@ -204,7 +209,7 @@ def _same(one: State, other: State) -> bool:
 
 
 def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
-    """Models by their names, likeliest first."""
+    """Return the models by their names, best first."""
     total: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
     for state, weight in zip(states, weights, strict=True):
         effects = tuple(sorted(e.name for e in state.elements if e.name))
@@ -217,7 +222,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], best: State, k: int, probability: float
 ) -> Learned:
-    """A function of the best model, and what does as well."""
+    """Return a function of the best model with its equivalents."""
     e = best.elements[k]
     rest = set(best.elements) - {e}
     equal = list(search.functions.equivalents(e.candidate))

@@ -1,5 +1,6 @@
-"""What the search of a diagnosis found."""
+"""Result of the model selection of a diagnosis."""
 
+import math
 from dataclasses import dataclass
 
 from numpy.typing import NDArray
@@ -12,14 +13,14 @@ from validation.diagnosis.states import State
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """A function that was found.
+    """A learned function.
 
     Attributes:
         candidate: where, of what, in which form.
-        equivalent: places and variables that do as well.
-        gain: logarithm of how much likelier it makes the readings.
-        std: (m,) prior size of its unknowns, as :class:`.Sensitivities` counts them.
-        probability: that some function of this variable acts.
+        equivalent: other places and variables with the same predictions.
+        gain: log posterior minus that of the model without it.
+        std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
+        probability: of all models with a function of these variables.
     """
 
     candidate: Candidate
@@ -31,7 +32,7 @@ class Learned:
 
 @dataclass(frozen=True, eq=False)
 class SmallPrior:
-    """Geometry and springs in use.
+    """Nuisance parameters in use and their prior.
 
     Attributes:
         spring: (k,) bool.
@@ -47,12 +48,12 @@ class SmallPrior:
 
 @dataclass(frozen=True)
 class Model:
-    """A model by its names.
+    """A model and its probability.
 
     Attributes:
-        effects: of the library.
-        functions: each in words.
-        probability: after the readings were looked at.
+        effects: names of the library's effects.
+        functions: descriptions.
+        probability: posterior.
     """
 
     effects: tuple[str, ...]
@@ -62,18 +63,18 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """What a search found.
+    """Result of :func:`.select.select`.
 
     Attributes:
         hypotheses: of the best model, the measuring frame first where it is not known.
-        values: (k,) of their unknowns, one hypothesis after the other.
+        values: (k,) estimates of their unknowns, in the order of the hypotheses.
         functions: of the best model.
-        prior: geometry and springs in use.
-        noise: its scale.
-        weights: (n,) probability of every cell that it is no blunder.
-        models: the likely ones, best first.
-        probability: of every effect of the library that some model has.
-        unknowns: [-] well determined, the measuring frame's among them.
+        prior: nuisance parameters in use.
+        noise: scale and findings.
+        weights: (n,) probability that a cell is no blunder.
+        models: by names, best first.
+        probability: of each effect of the library in any visited model.
+        unknowns: [-] number of well determined unknowns, with the measuring frame.
         blocks: configurations, or spans of time.
         gain: log posterior of the best model over the model without elements.
         states: models that were seen, best first.
@@ -94,5 +95,10 @@ class Selected:
 
     @property
     def enough(self) -> bool:
-        """Whether there are more blocks of rows than a model needs unknowns."""
+        """Whether the blocks exceed the unknowns by two."""
         return self.blocks >= self.unknowns + 2
+
+    @property
+    def blocks_wanted(self) -> int:
+        """Least number of blocks for these unknowns."""
+        return math.ceil(self.unknowns) + 2

@@ -1,7 +1,7 @@
-"""Forms in which a function may depend on one variable or two, and their priors.
+"""Forms of functions of one or two variables, and their prior probabilities.
 
-Every family of forms that a variable may have is as likely as any other; within it
-forms share, waves the less the more of them there are in a turn.
+All families of forms of a variable have the same prior probability.  The forms of a
+family share it; the share of waves falls with their order.
 """
 
 import math
@@ -14,11 +14,11 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
 from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle
 
-_DEPTHS = 0.03, 0.1, 0.3, 1.0  # of a variable's range: what slips after it
+_DEPTHS = 0.03, 0.1, 0.3, 1.0  # of slip, relative to the variable's range
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
-_HIGH = 12  # waves a turn that are looked for one by one
+_HIGH = 12  # highest order of waves that is tried alone
 _CLOCKS = "time", "cov.time"
-_JUMPS, _MANY_JUMPS = 10, 91  # levels of time at which something may jump
+_JUMPS, _MANY_JUMPS = 10, 91  # numbers of times at which a step is tried
 _ANGLE = ("0.cosine", "1.sine", "1.cosine")
 
 
@@ -28,7 +28,7 @@ def _waves(*orders: int) -> CandidateShape:
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Forms general enough to show whether a variable counts at all."""
+    """Return general forms that show whether a variable matters."""
     if name == "approach":
         return [CandidateShape("powers", ("1",))]
     powers = CandidateShape("powers", ("0", "1", "2", "3"))
@@ -41,7 +41,7 @@ def first(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
-    """All forms of one variable."""
+    """Return all forms of one variable."""
     shapes = list(all_shapes(conditions, name, kind))
     if is_angle(conditions.robot, name):
         shapes += [_waves(k) for k in range(9, _HIGH + 1)]
@@ -53,7 +53,7 @@ def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
 
 
 def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
-    """A jump at so many levels, as many rows between two as between others."""
+    """Return steps at quantiles of a variable."""
     x = variable(conditions, name)
     levels = np.unique(np.quantile(x, np.linspace(0.05, 0.95, count)))
     return [CandidateShape("step", ("size",), (("at", float(v)),)) for v in levels]
@@ -62,24 +62,25 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
 def _reversals(
     conditions: Conditions, name: str, depths: Sequence[float] = _DEPTHS
 ) -> list[CandidateShape]:
-    """Forms that remember from where a variable came."""
+    """Return forms with memory: reversal and slip."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
-    plays = [
-        CandidateShape("play", ("size",), (("depth", depth * size),))
+    slips = [
+        CandidateShape("slip", ("size",), (("depth", depth * size),))
         for depth in depths
     ]
-    return [CandidateShape("reversal", ("0",)), *plays]
+    return [CandidateShape("reversal", ("0",)), *slips]
 
 
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Products of two variables, the variables in the order in which forms have them.
+    """Return the forms of a product of two variables.
 
     Returns:
-        The variables and forms; None where a product says nothing new.
+        The variables in the order of the forms, and the forms; None if the product
+        is not useful.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == {"time", "cov.time"}:
@@ -106,7 +107,7 @@ def of_two(
 
 
 def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """What is softer in some places of a turn than in others."""
+    """Return forms of a compliance that varies over a turn."""
     if not is_angle(conditions.robot, name):
         return []
     names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
@@ -114,12 +115,12 @@ def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def of_direction(name: str) -> CandidateShape:
-    """Backlash that varies around a turn of the same joint."""
+    """Return the form of backlash that varies over a turn."""
     return CandidateShape("reversal_waves", _ANGLE)
 
 
 def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
-    """(len(shapes),) ln of the prior of each among all forms of its variables."""
+    """Return the log prior of each form among all forms of its variables."""
     weight = np.array([_weight(shape) for shape in shapes])
     families = [shape.form for shape in shapes]
     total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
@@ -128,7 +129,7 @@ def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
 
 
 def _weight(shape: CandidateShape) -> float:
-    """Of a form within its family."""
+    """Return the relative prior of a form in its family."""
     if shape.form.endswith("waves"):
         orders = [
             abs(int(part)) for name in shape.names for part in name.split(".")[:-1]
@@ -138,7 +139,7 @@ def _weight(shape: CandidateShape) -> float:
 
 
 def falling(shape: CandidateShape, count: int) -> NDArray:
-    """(count,) prior size of a form's columns beside one another's."""
+    """Return (count,) relative prior standard deviations of a form's columns."""
     if shape.form != "waves" or count != len(shape.names):
         return np.ones(count)
     order = np.array([

@@ -1,6 +1,9 @@
-"""A model of the search: its elements, geometry and springs, sizes, and its score.
+"""Models of the search and their log posterior.
 
-score = ln p(z) at the sizes found - their cost + bounds + ln prior of the model
+A model has elements (effects and functions) and, in use or not, geometric errors and
+springs:
+
+    score = ln p(z) - cost of optimised standard deviations + bounds + ln prior
 """
 
 import math
@@ -15,34 +18,34 @@ from scipy.special import log_ndtr
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
 from validation.diagnosis.gaussian import (
-    Taken,
+    Marginal,
+    deviance,
     leave_block_out,
-    likeness,
-    take_out,
+    marginalise,
 )
 from validation.diagnosis.noise import FREEDOM, scale
 from validation.diagnosis.prior_sizes import Sizes, best_sizes
 
-Mode = tuple[bool, bool]  # whether geometry, whether springs are in use
-MORE = math.log(2.0)  # an element more is half as likely
-IN_USE = math.log(10.0), math.log(10.0)  # geometry, springs: one campaign in ten
-_GROUPS = 4
-_RANK = 1e-9
-_GLANCED = 500  # rows by which functions are looked for first, drawn once
+Mode = tuple[bool, bool]  # geometric errors in use, springs in use
+MORE = math.log(2.0)  # prior odds of one element fewer
+IN_USE = math.log(10.0), math.log(10.0)  # prior odds against geometry, springs
+_GROUPS = 4  # of nuisance parameters
+_RANK = 1e-9  # relative singular value of a dependent column
+_SAMPLE = 500  # rows, drawn once, by which functions are scored first
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A model, its sizes at the likeliest.
+    """A model with optimised prior standard deviations.
 
     Attributes:
         elements: effects and functions.
         mode: whether geometry and springs are in use.
-        used: (k,) unknowns of geometry and springs in use.
-        sizes: of these and of the elements' unknowns.
+        used: (k,) mask of the nuisance parameters in use.
+        sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
         tau: true over stated sigma.
-        fit: whose cells and weights.
+        fit: readings and weights.
     """
 
     elements: tuple[Element, ...]
@@ -54,89 +57,88 @@ class State:
     fit: "Fitting"
 
     @cached_property
-    def taken(self) -> Taken:
-        """What is left beside this model."""
+    def marginal(self) -> Marginal:
+        """Model with its unknowns marginalised, in the fitted cells."""
         f, z = self.fit, self.fit.readings(self.elements)
         columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
         X = np.hstack(columns)
-        return take_out(X, self.sizes.std, z, f.flat)
+        return marginalise(X, self.sizes.std, z, f.flat)
 
     @cached_property
-    def glance(self) -> Taken:
-        """The same in the rows of a first look."""
+    def sample_marginal(self) -> Marginal:
+        """Model with its unknowns marginalised, in the sampled rows."""
         f = self.fit
-        if f.glanced.all():
-            return self.taken
+        if f.sampled.all():
+            return self.marginal
         columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
-        X, z = np.hstack(columns)[f.glanced], f.readings(self.elements)[f.glanced]
-        flat = np.linalg.qr(f.flat[f.glanced])[0]
+        X, z = np.hstack(columns)[f.sampled], f.readings(self.elements)[f.sampled]
+        flat = np.linalg.qr(f.flat[f.sampled])[0]
         X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
-        return take_out(X, self.sizes.std, z, flat)
+        return marginalise(X, self.sizes.std, z, flat)
 
     @cached_property
     def fitted(self) -> NDArray:
-        """(n,) what the model adds to the readings, whitened and weighted."""
+        """(n,) contribution of the model to the readings, whitened and weighted."""
         f = self.fit
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
         return X @ self.sizes.mean + (f.z - f.readings(self.elements))
 
     @cached_property
     def left(self) -> NDArray:
-        """(n,) residual, unweighted."""
+        """(n,) whitened residual, unweighted."""
         f = self.fit
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
         return (f.readings(self.elements) - X @ self.sizes.mean) / f.root
 
     def own(self, k: int) -> slice:
-        """Unknowns of the k-th element among all."""
+        """Return the slice of the k-th element's unknowns."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
 
     def expected_squares(self) -> NDArray:
-        """(n,) squared residuals of the cells unweighted, with what is not known."""
+        """Return the (n,) expected squared residuals, unweighted."""
         f = self.fit
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / f.weights
 
 
-def foretold(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
-    """How much better a model foretells blocks of rows that it was not fitted to.
+def prediction_gain(one: State, other: State, blocks: NDArray) -> tuple[float, float]:
+    """Return the gain in log predictive density of one model over another.
 
     Args:
-        one: that model.
-        other: of the same readings.
-        blocks: (n,) whose each reading is.
+        one: model.
+        other: another model of the same readings.
+        blocks: (n,) block of each reading; each is predicted by a fit to the others.
 
     Returns:
-        Sum of differences of ln densities at the first one's tau, sizes held, and its
-        standard error from block to block.
+        Sum of the differences over blocks and its standard error.
     """
-    densities = [leave_block_out(s.taken, blocks, one.tau)[1] for s in (one, other)]
+    densities = [leave_block_out(s.marginal, blocks, one.tau)[1] for s in (one, other)]
     gains = densities[0] - densities[1]
     return float(gains.sum()), float(gains.std(ddof=1) * np.sqrt(len(gains)))
 
 
 class Fitting:
-    """Readings of some cells with weights; models of them."""
+    """Weighted readings of the fitted cells, and models of them."""
 
     def __init__(
         self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray
     ) -> None:
-        """Weight, and take out the measuring frame.
+        """Apply the weights and project out the measuring frame.
 
         Args:
             columns: of all N cells.
-            z: (n,) whitened residual of those fitted.
-            cells: (N,) mask of these.
-            weights: (n,) precision of each beside that of a good one.
+            z: (n,) whitened residual of the fitted cells.
+            cells: (N,) mask of the fitted cells.
+            weights: (n,) relative precision, 1 for a good reading.
         """
         self.columns, self.cells, self.weights = columns, cells, weights
         rows = columns.row[cells]
         number = np.unique(rows, return_inverse=True)[1]
         order = np.random.default_rng(0).permutation(number.max(initial=0) + 1)
-        self.glanced = order[number] < _GLANCED
+        self.sampled = order[number] < _SAMPLE
         self.root = np.sqrt(weights)
         flat = columns.flat[cells] * self.root[:, None]
         flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
@@ -156,18 +158,18 @@ class Fitting:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def own(self, e: Element) -> NDArray:
-        """(n, m) an element's columns in the cells fitted."""
+        """Return an element's (n, m) columns in the fitted cells."""
         return self._products(e)[0]
 
     def _products(self, e: Element) -> tuple[NDArray, NDArray, NDArray]:
-        """An element's columns, and their products with themselves and small ones."""
+        """Return an element's columns and their inner products."""
         if e not in self._own:
             B = self._without_flat(e.columns[self.cells] * self.root[:, None])
             self._own[e] = B, B.T @ B, self.small.T @ B
         return self._own[e]
 
     def readings(self, elements: Sequence[Element]) -> NDArray:
-        """(n,) readings without what no unknown of the elements scales."""
+        """Return the (n,) readings minus the offsets of the elements."""
         z = self.z
         for e in elements:
             if e.offset is not None:
@@ -178,7 +180,7 @@ class Fitting:
         return z
 
     def modes(self) -> list[Mode]:
-        """Ways in which geometry and springs may be in use."""
+        """Return the combinations of nuisance parameters in use."""
         small = self.columns.nuisance
         springs = [False, True] if small.spring.any() else [False]
         geometry = [False, True] if (~small.spring).any() else [False]
@@ -188,15 +190,15 @@ class Fitting:
     def state(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None = None
     ) -> State:
-        """A model with the likeliest sizes.
+        """Return the model with optimised standard deviations.
 
         Args:
-            elements: of it.
-            mode: whether geometry and springs are in use.
-            start: from whose sizes to go on.
+            elements: effects and functions.
+            mode: nuisance parameters in use.
+            start: model whose standard deviations are the start values.
 
         Returns:
-            The model, found once.
+            The model, from a cache.
         """
         key = frozenset(elements), mode
         if key not in self._states:
@@ -204,7 +206,7 @@ class Fitting:
         return self._states[key]
 
     def best(self, elements: tuple[Element, ...], start: State) -> State:
-        """The best of a model's modes that differ from another's in one at most."""
+        """Return the best mode among those that differ in one group at most."""
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
         states = [self.state(elements, m, start) for m in near]
@@ -213,7 +215,7 @@ class Fitting:
     def _fitted(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None
     ) -> State:
-        """Sizes found, springs that would be negative left out."""
+        """Optimise standard deviations; remove springs of negative compliance."""
         small = self.columns.nuisance
         used = np.where(small.spring, mode[1], mode[0])
         begin: dict[int, float] = {}
@@ -230,14 +232,17 @@ class Fitting:
         made = [self._products(e) for e in elements]
         E = np.hstack([np.zeros((len(z), 0)), *(B for B, _, _ in made)])
         counts = [B.shape[1] for B, _, _ in made]
-        across = np.hstack([np.zeros((len(self._gram), 0)), *(c for _, _, c in made)])
+        factor_columns = np.hstack([
+            np.zeros((len(self._gram), 0)),
+            *(c for _, _, c in made),
+        ])
         inner, with_z = E.T @ E, E.T @ z
         small_z = self.small.T @ z
         element = np.repeat(np.arange(len(elements)), counts)
         given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
         most = np.repeat([e.most for e in elements], counts)
         while True:
-            beside = across[used]
+            beside = factor_columns[used]
             gram = np.block([
                 [self._gram[np.ix_(used, used)], beside],
                 [beside.T, inner],
@@ -262,9 +267,9 @@ class Fitting:
     def _score(
         self, elements: Sequence[Element], sizes: Sizes, used: NDArray, tau: float
     ) -> float:
-        """Log posterior of a model, up to a constant."""
+        """Return the log posterior up to a constant."""
         small = self.columns.nuisance
-        evidence = float(likeness(sizes.squares, self.count, FREEDOM)) + sizes.log_det
+        evidence = float(deviance(sizes.squares, self.count, FREEDOM)) + sizes.log_det
         score = -0.5 * evidence - sizes.cost
         for spring, cost in ((False, IN_USE[0]), (True, IN_USE[1])):
             declared = small.declared and not spring

@@ -32,14 +32,14 @@ from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.hypotheses import Hypothesis
-from validation.diagnosis.noise import weights_of
+from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.registration import register
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.states import foretold
+from validation.diagnosis.states import prediction_gain
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
 
 Update = Callable[[str, int, int], None]
@@ -201,7 +201,7 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
         return whole
     timeless = select(columns.without_clocks(), z, cells, update)
     blocks = columns.block[cells]
-    gain, error = foretold(whole.states[0], timeless.states[0], blocks)
+    gain, error = prediction_gain(whole.states[0], timeless.states[0], blocks)
     return whole if gain > _CLEARLY * error else timeless
 
 
@@ -211,7 +211,7 @@ def _traced(
 ) -> Traced:  # fmt: skip
     """What was found, with the sigma that was believed and rows that are blunders."""
     weights = np.ones(len(columns.row))
-    weights[cells] = weights_of(selected.weights)
+    weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
     sigma[campaign.cells] *= selected.noise.tau / np.sqrt(weights)
     good = np.ones(len(columns.row))

@@ -59,6 +59,7 @@ from validation.multibody.open_robot import (
 
 LINKS = ("beam", "spring")
 TIME_LIMIT = 600.0  # [s] for one simulation; the slowest took 26 on an idle core
+_FINEST = 1e-10  # [m, rad, -] no tolerance is smaller
 # tried in turn; with contacts closures must not be much softer than these, and a rod
 # between two spherical joints may roll by radians under its weight unless it is held
 _TIGHT = (
@@ -66,12 +67,12 @@ _TIGHT = (
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
 # a joint without contact is undetermined within its clearance: rounding of forces moves
-# it by 1e-3 m in the first, by 1e-7 m in the second, which is a little smoother.  At
-# small scales clearances are of that size too, and softer contacts round forces less
+# it by 1e-3 m in the first, by 1e-7 m in the third, which is a little smoother.  At
+# small scales clearances are of that size too; softer contacts round forces less
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
-    Regularisation(1e9, IDLE_STIFFNESS, narrow=5e-4, tolerance=1e-6),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
+    Regularisation(1e9, IDLE_STIFFNESS, narrow=5e-4, tolerance=1e-6),
     Regularisation(1e11, IDLE_STIFFNESS),
     Regularisation(1e11, HOLDING_STIFFNESS),
 )
@@ -234,6 +235,9 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build, solve, read, and give the memory back."""
     robot = case.posture.robot
+    # accepted steps stay as small beside the clearances at every scale
+    tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
+    regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
     model.deadline = started + limit
     try:

@@ -95,7 +95,8 @@ def simulated_tangent(
     case = _case(posture, model, load, gravity)
     # where no spring is bent its law does not matter, and Exudyn's own is faster
     bent = is_bent(posture.robot.errors, load, gravity)
-    tried = WITH_CLEARANCES[:2] if model.clearances else _REGULARISATIONS
+    hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
+    tried = hard[:2] if model.clearances else _REGULARISATIONS
     ways = [replace(one, conservative=bent) for one in tried]
     answer = _first(case, ways, 0, steps, started, time_limit)
     for load_steps in _SMALLER_STEPS:

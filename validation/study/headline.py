@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assembly.kinematics.verdict import BEYOND_LIMITS, SINGULAR
 from validation.study.study import StudyResults
 
 WORST = "frozen"  # reading of (27): all clearance motions without spring deformation
@@ -59,6 +60,11 @@ def verdict(results: StudyResults) -> str:
         Plain text.
     """
     solution = results.solution
+    if solution["status"] == BEYOND_LIMITS:
+        return f"Beyond the limits of its joints: {solution['reason']}."
+    if solution["status"] == SINGULAR:
+        reason = solution["reason"]
+        return f"{reason[0].upper()}{reason[1:]}. {_checks_text(results)}"
     if solution["status"] != "ok":
         return f"No answer at this pose: {solution['status']}, {solution['reason']}."
     parts = (_assembly_text(results) + ".", _pose_error_text(results))

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from assembly.linear.assembled import Assembly, without_rounding
 from assembly.linear.zone import ASSEMBLABLE
+from forcefit.inputs.display import largest_row
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_json, write_text
 from forcefit.page.page import Page, Provenance, Tile, command_line, page
@@ -161,13 +163,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
             *(["; over the map ", *_bound(over)] if over is not None else []), ".",
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
-    force = max(
-        (float(np.linalg.norm(results.assembly.tip_wrenches[i, 3:])), frame.name)
-        for i, frame in enumerate(results.robot.frames)
-    )
-    tiles.append(Tile("Force to close it", [Value(force[0], "N")], [
-        f"largest, at {force[1]}; energy ", Value(results.assembly.energy, "J"), ".",
-    ]))  # fmt: skip
+    tiles.append(_force_tile(results.assembly))
     tiles += service_tile(results.service)
     passed = sum(v == "passed" for v in results.verdicts.values())
     note = [f"{'; '.join(covered(results))}. " if covered(results) else ""]
@@ -175,6 +171,22 @@ def _tiles(results: StudyResults) -> list[Tile]:
         note.append(f"Not checked: {', '.join(results.unchecked)}.")
     answer = f"{passed} of {len(results.verdicts)} passed"
     return [*tiles, Tile("Independent checks", [answer], note)]
+
+
+def _force_tile(assembly: Assembly) -> Tile:
+    """The largest force through a body, and the couple where it is a couple."""
+    wrenches = without_rounding(assembly.tip_wrenches)
+    shown: list[str | Value] = []
+    names = []
+    for part, unit in ((slice(3, 6), "N"), (slice(0, 3), "N m")):
+        sizes = np.linalg.norm(wrenches[:, part], axis=1)
+        row = largest_row(sizes)
+        names.append(assembly.posture.robot.frames[row].name)
+        shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
+    return Tile("Force and couple to close it", shown, [
+        f"largest, at {names[0]} and {names[1]}; energy ",
+        Value(assembly.energy, "J"), ".",
+    ])  # fmt: skip
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:

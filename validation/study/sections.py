@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.assembled import without_rounding
 from assembly.linear.error_body import ErrorBody, error_body
 from assembly.linear.reach import reachable_screws
 from assembly.report.scene import robot_scene
@@ -176,10 +177,12 @@ def _pose_error(results: StudyResults) -> str:
 def _wrenches(results: StudyResults) -> str:
     """Wrench through each elastic link."""
     frames = results.solution["frames"]
+    elastic = [f.name for f in results.robot.frames if f.link is not None]
+    wrenches = without_rounding(
+        np.reshape([frames[name]["wrench"] for name in elastic], (-1, 6))
+    )
     rows = [
-        [f.name, *frames[f.name]["wrench"]]
-        for f in results.robot.frames
-        if f.link is not None
+        [name, *wrench] for name, wrench in zip(elastic, wrenches.tolist(), strict=True)
     ]
     names = ("MX", "MY", "MZ", "FX", "FY", "FZ")
     head: list[str | Column] = [

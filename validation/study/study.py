@@ -17,6 +17,7 @@ from assembly.linear.reach import READINGS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.report.first_order import posture_status
 from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of
@@ -151,7 +152,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         stiffness, robot = _compare_links(study, progress)
     posture = place_robot(robot, pose=study.pose)
     progress("assembly", 0, 1)
-    solution = solution_of(posture)
+    solution = solution_of(posture) | posture_status(posture)
     solved = solution["status"] == "ok"
     assembly = solve_assembly(posture) if solved else None
     error = pose_error_of(posture, READINGS)["error"] if solved else None

@@ -337,7 +337,7 @@ def test_what_moves_the_base_moves_a_frame_below_all_others(robot, new):
     assert found.transforms[:, int(new) :] == pytest.approx(given.transforms)
 
 
-def test_which_joints_may_have_friction_and_which_play():
+def test_which_joints_may_have_friction_and_which_slip():
     """A spring of their own, however soft; no play but a spin that is declared."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (

@@ -101,7 +101,7 @@ def test_variables_that_forms_may_have():
     """As docs/robot_files.md says: what remembers by itself has one, a reversal two."""
     assert {name: form.most for name, form in FORMS.items()} == {
         "powers": 2, "waves": 2, "spline": 2, "lag": 1, "creep": 1, "step": 1,
-        "slow_wave": 1, "reversal": 2, "play": 1, "scaled_waves": 2,
+        "slow_wave": 1, "reversal": 2, "slip": 1, "scaled_waves": 2,
         "reversal_waves": 2,
     }  # fmt: skip
 

@@ -206,7 +206,7 @@ def test_a_reversal_follows_the_row_before():
 def test_what_slips_follows_its_drive_by_a_depth():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
-    slack = at_drive({"size": 1e-5, "depth": 0.5}, "play", ("q.drive",))
+    slack = at_drive({"size": 1e-5, "depth": 0.5}, "slip", ("q.drive",))
     expected = 1e-5 * np.array([-1.0, 0.0, 0.0, -0.6, 0.8])  # by hand
     assert seen(rows, slack)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
 

@@ -59,7 +59,7 @@ def test_waves_that_are_scaled_divide_by_their_second_variable_alone():
 
 
 def test_a_depth_has_the_unit_of_what_slips():
-    found = units("drive", ("tx",), ("load.fz",), "play", ["size", "depth"])
+    found = units("drive", ("tx",), ("load.fz",), "slip", ["size", "depth"])
     assert found == ["m", "N"]
 
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.exact.exact import solve_exact
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.kinematics.se3 import (
     left_jacobian,
 )
-from assembly.linear.closure import closure_signs
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import joint_compliances, link_compliances
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot

@@ -15,9 +15,10 @@ from assembly.exact.finite_robot import (
     nominally_carried,
 )
 from assembly.exact.placement import place
+from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.closure import closure_signs, virtual_joints
+from assembly.linear.closure import virtual_joints
 from assembly.model.links import joint_compliances, link_compliances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from stiffness.screws import rotation_matrix, transform

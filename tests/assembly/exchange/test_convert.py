@@ -391,3 +391,15 @@ def test_a_platform_that_an_overlay_names_is_not_said_to_be_missing(given, tmp_p
     assert answer.robot.platform == given
     assert "no platform is named" not in answer.text()
     assert "no platform is named" in convert(source, tmp_path / "robot.toml").text()
+
+
+def test_a_platform_may_have_the_name_of_its_joint(tmp_path):
+    """MJCF often gives both one name; only the body can be the platform."""
+    source, overlay = tmp_path / "robot.xml", tmp_path / "overlay.toml"
+    source.write_text(
+        '<mujoco><worldbody><body name="wrist"><joint name="wrist"/>'
+        '<geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    overlay.write_text('platform = "wrist"\n')
+    answer = convert(source, tmp_path / "robot.toml", overlay=overlay)
+    assert answer.robot.platform == "wrist.link"

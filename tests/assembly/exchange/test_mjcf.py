@@ -8,7 +8,7 @@ import pytest
 
 from assembly.exchange.convert import convert
 from assembly.exchange.mjcf import read_mjcf
-from assembly.exchange.mujoco_reading import compare
+from assembly.exchange.mujoco_reading import compare_here as compare
 from assembly.files.robot_file import read_robot
 from forcefit.inputs.errors import BadInput
 
@@ -182,6 +182,25 @@ def test_other_files_are_included(tmp_path):
     file_of(tmp_path, '<worldbody><include file="robot.xml"/></worldbody>')
     with pytest.raises(BadInput, match="found files more than 10 deep"):
         read_mjcf(path)
+
+
+def test_a_free_body_is_free_however_it_is_turned_at_home(run, tmp_path):
+    """A loop turns it by 90 degrees about y, where three turns in a row are singular.
+
+    A slide and a weld leave one freedom, and the weld holds no more than it must.
+    """
+    path = file_of(tmp_path, """<worldbody><body name="p">[M]<freejoint/>
+        <site name="s"/></body><body name="l">[M]<joint name="d" type="slide"/>
+        <site name="t" pos="0.3 0 1" euler="0 90 0"/></body></worldbody><equality>
+        <weld site1="s" site2="t"/></equality><actuator><motor joint="d"/></actuator>
+        """)  # fmt: skip
+    answer = convert(path, tmp_path / "robot.toml")
+    assert answer.open_after < 1e-12
+    status, _, _ = run("assembly", "solve", tmp_path / "robot.toml", "--json",
+                       tmp_path / "o.json")  # fmt: skip
+    assert status == 0
+    mobility = json.loads((tmp_path / "o.json").read_text())["mobility"]
+    assert (mobility["freedoms"], mobility["overconstraint"]) == (1, 0)
 
 
 def test_a_body_that_nothing_ties_is_said_to_float(tmp_path):

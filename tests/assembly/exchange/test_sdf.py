@@ -33,7 +33,8 @@ def four_bar(extra=""):
 <link name="rocker"><pose>{x} {y} 0 0 0 0</pose></link>
 <frame name="tool" attached_to="coupler"><pose>{COUPLER} 0 0 0 0 0</pose></frame>
 <joint name="drive" type="revolute"><parent>world</parent><child>crank</child>
- <axis><xyz>0 0 1</xyz><limit><lower>-1</lower></limit></axis></joint>
+ <axis><xyz>0 0 1</xyz>
+  <limit><lower>-1</lower><upper>2</upper><effort>9</effort></limit></axis></joint>
 <joint name="pin_a" type="revolute"><parent>crank</parent><child>coupler</child>
  <axis><xyz expressed_in="__model__">0 0 1</xyz></axis></joint>
 <joint name="pin_b" type="revolute"><pose relative_to="tool">0 0 0 0 0 0</pose>
@@ -58,7 +59,8 @@ def test_a_four_bar_closes_by_its_own_joints(tmp_path):
     answer, robot = converted(tmp_path, four_bar())
     assert answer.open_before < 1e-12
     assert len(robot.closures) == 1
-    assert "joint axis limit: 1 (drive)" in answer.left_out
+    assert "joint axis limit effort: 1 (drive)" in answer.left_out
+    assert robot.frame("drive").limits == (-1.0, 2.0)
     for angle in (0.0, 0.3, 1.0):
         posture = place_robot(robot, joints={"drive": angle})
         T = posture.transforms[robot.index("coupler")]

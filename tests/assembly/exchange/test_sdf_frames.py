@@ -118,6 +118,19 @@ def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
+def test_what_stands_still_beside_the_robot_is_passed_over(tmp_path):
+    path = tmp_path / "robot.sdf"
+    ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
+    arm = joint("j", "base", "arm")
+    path.write_text(
+        f"""<sdf version="1.9"><world name="w">{ground}<model name="m">
+        <link name="base"/><link name="arm"/>{arm}</model></world></sdf>"""
+    )
+    mechanism = read_sdf(path)
+    assert set(mechanism.bodies) == {"base", "arm"}
+    assert "model of the world: 1 (ground)" in mechanism.left_out
+
+
 def test_a_joint_may_share_a_link_s_name(tmp_path):
     mechanism = model(
         tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'

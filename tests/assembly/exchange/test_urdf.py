@@ -112,6 +112,29 @@ def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
     assert coupler[:3, 3] == pytest.approx(crank, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("flag", "expected"),
+    [
+        ("", [1, 0, 0]),
+        ("<use_parent_model_frame>1</use_parent_model_frame>", [0, 0, 1]),
+    ],
+)
+def test_an_axis_in_gazebo_is_seen_from_the_child_or_the_model(
+    flag, expected, tmp_path
+):
+    """The child is turned by 90 degrees about y, which takes its z to x."""
+    turned = f'<origin xyz="0 0 1" rpy="0 {np.pi / 2} 0"/>'
+    text = joint("j", "a", "b", turned + Z) + joint("k", "a", "c", Z)
+    text += f"""<gazebo><joint name="l" type="revolute"><parent>c</parent>
+        <child>b</child><axis><xyz>0 0 1</xyz>{flag}</axis></joint></gazebo>"""
+    mechanism = read_urdf(file_of(tmp_path, text, "abc"))
+    closing = mechanism.joints[-1]
+    poses = body_poses(mechanism, np.zeros(len(mechanism.joints)))
+    found = (poses[closing.parent] @ closing.placement)[:3, :3] @ closing.axis
+    assert found == pytest.approx(expected, abs=1e-12)
+    assert mechanism.loops[0].second == "b"
+
+
 @pytest.mark.parametrize("kind", CLOSING)
 def test_no_part_of_a_closing_joint_is_taken_for_the_platform(kind, tmp_path):
     """The coupler is the end of the longest chain, whatever closes its loop."""
@@ -257,7 +280,10 @@ def test_what_a_plugin_or_a_spring_of_gazebo_may_tie_is_said(tmp_path):
     text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
         </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>
         <gazebo reference="k"><springStiffness>5</springStiffness></gazebo>"""
+    text += '<closure type="gear"><first joint="j"/><second joint="k"/></closure>'
     left_out = read_urdf(file_of(tmp_path, text, "abc")).left_out
+    tie = "closure, not converted, though it may tie or move what it names: 1"
+    assert tie in left_out
     tie = "plugin, not converted, though it may tie or move what it names: 1 (p)"
     assert tie in left_out
     assert "springStiffness, not converted, though it may carry load: 1 (k)" in left_out

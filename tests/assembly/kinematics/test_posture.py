@@ -150,7 +150,7 @@ def test_the_posture_reports_the_worst_closure_that_rounding_leaves():
     robot = Robot(
         "gaps", "a",
         (Frame("a"), Frame("b", translation=[3e-7, 0, 0]),
-         Frame("c", translation=[0, 5e-7, 0])),
+         Frame("c", translation=[0, 5e-7, 0]), Frame("arm", translation=[1.0, 0, 0])),
         (("a", "b"), ("a", "c")),
     )  # fmt: skip
     assert home_posture(robot).mismatch == pytest.approx(5e-7, rel=1e-6)

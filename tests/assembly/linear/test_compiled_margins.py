@@ -47,7 +47,7 @@ def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rn
         assert_same_margin(
             batch, 0, Zone(*reference_margin(replace(home, robot=robot), compliant))
         )
-    assert compiled > 15
+    assert compiled
 
 
 def test_margin_of_one_joint_is_gap_over_play_in_a_batch():

@@ -170,3 +170,29 @@ def test_contacts_that_change_with_rounding_end_within_a_step():
     assert {event.kind for event in events} <= {"contact", "release"}
     assert 1 <= len(events) <= 8
     assert len(asked) <= 2 + 8 * 14
+
+
+def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
+    """Pinned at both ends, the platform on a slide along it: pi^2 E I / L^2.
+
+    Sixteen pieces buckle earlier by a share that falls with the square of their number.
+    """
+    E, width, height = 7e10, 0.01, 0.02
+    beam = BeamLink({"width": width, "height": height}, E, 0.3, up=(0, 0, 1), pieces=16)
+    turn = [0, np.pi / 2, 0]
+    frames = (
+        Frame("foot", joint="revolute"),
+        Frame("top", "foot", [1.0, 0, 0], joint="revolute", link=beam),
+        Frame("tip", "top"),
+        Frame("slide", translation=[1.0, 0, 0], rotation=turn, joint="prismatic"),
+        Frame("end", "slide", rotation=[0, -np.pi / 2, 0]),
+    )
+    robot = Robot("column", "tip", frames, (("tip", "end"),))
+    euler = np.pi**2 * E * height * width**3 / 12
+    loads = [0.0, -0.9 * euler, -1.2 * euler]
+    curve = load_deflection(home_posture(robot), 3, loads, exact=True)
+    (event,) = (e for e in curve.events if e.kind == "critical")
+    assert event.load == pytest.approx(-euler, rel=0.01)
+    assert (
+        event.what == "buckles: inside the links, the platform stays; most in top link"
+    )

@@ -11,11 +11,13 @@ from assembly.robots import load_robot
 from assembly.statistics.tolerances import (
     grid_postures,
     identity_of,
+    left_out_text,
     present_errors,
     present_text,
 )
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
+from tests.three_upu_for_tests import three_upu
 from tests.tolerances_for_tests import plan_for
 
 K, PLAY = 1e6, 1e-4  # [N/m], [m]
@@ -110,7 +112,7 @@ def test_what_fits_by_clearance_alone_stores_no_energy_and_none_is_told_if_rigid
 
 def test_a_grid_has_the_postures_that_are_reached():
     robot = load_robot("irsbot2")
-    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
+    postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-9.5:-0.5:9")
     places = [(p.pose()["tx"], p.pose()["tz"]) for p in postures]
     np.testing.assert_allclose(places, [(x, -0.5) for x in (-0.1, 0.0, 0.1)], atol=1e-9)
     with pytest.raises(BadInput, match="^grid: no posture is reached; the first: "):
@@ -137,3 +139,13 @@ def test_allocations_share_results_only_where_everything_is_the_same():
     ]  # fmt: skip
     told = {str(sorted(one.items())) for one in [own, *others]}
     assert len(told) == len(others) + 1
+
+
+def test_postures_that_may_not_be_used_are_left_out_and_counted():
+    """Above the centre of a 3-UPU the locked platform turns; beside it, it does not."""
+    postures, left_out = grid_postures(
+        three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"
+    )
+    assert [round(p.pose()["tx"], 6) for p in postures] == [-0.02, 0.02]
+    assert left_out == {"singular": 1}
+    assert "first order decides nothing" in left_out_text(left_out)

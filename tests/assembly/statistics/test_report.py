@@ -134,7 +134,7 @@ def test_the_robot_of_the_page_is_a_draw_solved_alone():
 
 def test_margins_over_a_grid_are_a_map_and_the_largest_a_robot():
     robot = irsbot2_with(NUMBERS["cases"][0])
-    postures = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1")
+    postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1")
     present = present_errors(postures)
     (drawn,) = parse(margin_map(postures, present)).figures
     values = np.array(drawn["layers"][0]["values"])
@@ -152,6 +152,6 @@ def test_margins_over_a_grid_are_a_map_and_the_largest_a_robot():
 def test_a_line_of_postures_is_a_curve_and_one_posture_no_map():
     robot = irsbot2_with(NUMBERS["cases"][0])
     for grid, figures in (("tx=-0.1:0.1:0.1,tz=-0.5", 1), ("tx=0,tz=-0.5", 0)):
-        postures = grid_postures(robot, grid)
+        postures, _ = grid_postures(robot, grid)
         shown_map = margin_map(postures, present_errors(postures))
         assert len(parse(shown_map).figures) == figures

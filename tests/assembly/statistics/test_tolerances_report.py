@@ -54,7 +54,7 @@ def test_what_to_tighten_does_not_depend_on_a_bound_that_is_not_active(loosest):
     """Prices are 1 / 1e-3 and 1 / 1e-4: the length has 10 of 11 parts of the price."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["What to tighten"]
-    assert (answer, note[:4]) == ("length", "91 %")
+    assert (answer, note[:4]) == ("length", "91\u00a0%")
 
 
 def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
@@ -62,7 +62,7 @@ def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
     answer, note = tiles(shown([1e-3, 1e-4], [3.0, 1.0], cost="logarithm"))[
         "What to tighten"
     ]
-    assert (answer, note[:4]) == ("angle", "75 %")
+    assert (answer, note[:4]) == ("angle", "75\u00a0%")
     answer, _ = tiles(shown([1e-3, 1e-4], [1.0, 1.0], cost="logarithm"))[
         "What to tighten"
     ]
@@ -119,7 +119,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert taken["price_without"] == pytest.approx(1.0 / LIMIT, rel=2e-3)
     assert "clearances alone take 0.1 of the 0.3 mm of translation" in text
     content = page.read_text("utf-8")
-    assert tiles(content)["Clearances take"][0] == "33 %"
+    assert tiles(content)["Clearances take"][0] == "33\u00a0%"
     asked = {row[0].text: row[1] for row in parse(content).table("asked")[1:]}
     assert asked["platform position error, at most"].value == LIMIT
     assert asked["errors"].text == "uniform within plus or minus their tolerance"

@@ -6,8 +6,10 @@ import resource
 import h5py
 import numpy as np
 import pytest
+import xarray
 
-from assembly.sweeps.netcdf import netcdf_file
+from assembly.sweeps.dataset import open_dataset, save_dataset
+from assembly.sweeps.netcdf import check_heaps, netcdf_file
 from forcefit.inputs.table import BadInput
 
 SIZE = 6_500_000  # bytes of the file below, about
@@ -54,3 +56,16 @@ def test_a_disk_that_is_large_enough_takes_the_file(tmp_path):
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(2 * SIZE, path) == 0
     assert path.stat().st_size == pytest.approx(SIZE, rel=0.3)
+
+
+def test_file_whose_heap_of_texts_is_damaged_is_refused_at_once(tmp_path):
+    """HDF5 steps from entry to entry; over a free space of size 0 for ever."""
+    path = tmp_path / "x.nc"
+    texts = {f"a{k}": f"a text of some length, number {k}" for k in range(9)}
+    save_dataset(xarray.Dataset({"x": ("y", np.arange(3.0), texts)}), path)
+    check_heaps(path)
+    content = path.read_bytes()
+    entry = content.index(b"GCOL") + 16
+    path.write_bytes(content[:entry] + bytes(16) + content[entry + 16 :])
+    with pytest.raises(BadInput, match="damaged heap"):
+        open_dataset(path)

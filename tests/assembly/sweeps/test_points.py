@@ -1,14 +1,17 @@
 """What a sweep finds at its points is what one posture at a time gives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from assembly.exact.exact import solve_exact
 from assembly.files.robot_file import write_robot
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.model.error_distributions import read_sources
+from assembly.model.robot import BeamLink
 from assembly.robots import load_robot
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.parameters import load_design
@@ -18,7 +21,9 @@ from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
+from tests.linkages_for_tests import SLIDER_CRANK, slider_crank
 from tests.robots_for_tests import NUMBERS, irsbot2_with
+from tests.three_upu_for_tests import BASE, HEIGHT, PLATFORM, three_upu
 
 GRID = "tx=-0.2:0.2:0.2,tz=-0.5:-0.4:0.1"
 ERRORS = """
@@ -246,3 +251,52 @@ def test_figures_need_only_the_data_set(tmp_path):
         figure_of(data, {"tz": 1.0})
     with pytest.raises(BadInput, match="found a single point"):
         figure_of(data, {"draw": 1, "tx": 0.0, "ty": 0.12})
+
+
+def test_sweep_across_a_singular_line_marks_it_and_keeps_the_joints():
+    """Above its centre the locked 3-UPU turns; its legs' lengths are Pythagoras'."""
+    robot = three_upu(seed=1)
+    data = sweep_poses(robot, parse_grid("tx=-0.02:0.02:0.02,ty=0,tz=0.45"))
+    assert data["status"].values.ravel().tolist() == ["ok", "singular", "ok"]
+    assert np.isnan(data["energy"].values.ravel()).tolist() == [False, True, False]
+    length = data["joint_coordinate"].sel(joint="leg1.slide").values.ravel()
+    expected = np.hypot(BASE - PLATFORM - np.array([-0.02, 0.0, 0.02]), HEIGHT)
+    assert length == pytest.approx(expected, abs=1e-9)
+
+
+def test_sweep_names_the_far_side_of_a_singularity():
+    """On the five-bar's axis the far arms are one line at 84.85 mm."""
+    data = sweep_poses(load_robot("five_bar"), parse_grid("tx=0,ty=0.08:0.09:0.01"))
+    assert data["status"].values.ravel().tolist() == ["beyond_singularity", "ok"]
+    reason = str(data["reason"].values.ravel()[0])
+    assert reason == "not connected to home without passing a singularity"
+
+
+def test_sweep_marks_postures_beyond_the_joints_limits():
+    """Along x the orthoglide's x slide moves as its platform does: p_x - r_x = L."""
+    robot = load_robot("orthoglide")
+    home = home_posture(robot).coordinates[robot.index("x.slide")]
+    frames = tuple(
+        replace(f, limits=(home - 0.05, home + 0.02)) if f.name == "x.slide" else f
+        for f in robot.frames
+    )
+    x = np.array([-0.051, -0.05, 0.0, 0.02, 0.021])
+    axes = {"tx": x, "ty": np.zeros(1), "tz": np.zeros(1)}
+    data = sweep_poses(replace(robot, frames=frames), axes)
+    moved = data["joint_coordinate"].sel(joint="x.slide").values.ravel() - home
+    assert moved == pytest.approx(x, abs=1e-9)
+    beyond = ["beyond_limits", "ok", "ok", "ok", "beyond_limits"]
+    assert data["status"].values.ravel().tolist() == beyond
+    assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
+
+
+def test_point_that_finite_motions_change_by_half_has_no_first_order_verdict():
+    """A short rod near its dead centre: first order sees none of its energy."""
+    rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
+    robot = slider_crank(0.3, rod, error=-2e-4)
+    reach = sum(SLIDER_CRANK)
+    targets = grid_targets({"q.slide": np.array([reach - 1e-5, reach - 0.02])})
+    question = Question(robot, components=targets.names, linearisation=True)
+    data = sweep_in_memory(Sweep(question, targets))
+    assert data["status"].values.tolist() == ["singular", "ok"]
+    assert "off by 100 % of the energy" in str(data["reason"].values[0])

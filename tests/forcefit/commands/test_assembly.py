@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from assembly.exact.exact import solve_exact
+from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
+from tests.three_upu_for_tests import three_upu
 
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
@@ -212,3 +214,90 @@ def test_the_certificate_of_solve_covers_the_screw(run):
     found = json.loads(out)["certificate"]
     assert 0 < found["screw_rotation_error"] < 1e-6
     assert found["screw_rotation"] >= found["screw_rotation_open"] > 1e-5
+
+
+SOURCES = """
+[[errors]]
+frames = ["slide"]
+most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
+"""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("statistics", "--errors", "errors.toml", "--draws", "20"),
+     ("tolerances", "--grid", "tx=0,ty=0,tz=0.45"), ("error",), ("zone",),
+     ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
+)  # fmt: skip
+def test_no_command_has_a_first_order_verdict_at_a_singular_posture(
+    run, tmp_path, monkeypatch, words
+):
+    monkeypatch.chdir(tmp_path)
+    write_robot(three_upu(seed=1), tmp_path / "snu.toml")
+    (tmp_path / "errors.toml").write_text(SOURCES)
+    command, *options = words
+    status, out, _ = run("assembly", command, "snu.toml", *options)
+    assert status == 1
+    assert "first order decides nothing" in out
+
+
+def test_statistics_beyond_the_limits_of_a_joint_say_so(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    robot = load_robot("orthoglide")
+    frames = tuple(
+        replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
+        for f in robot.frames
+    )
+    write_robot(replace(robot, frames=frames), tmp_path / "r.toml")
+    (tmp_path / "errors.toml").write_text(SOURCES)
+    words = ["--errors", "errors.toml", "--draws", "20", "--pose", "tx=0.05,ty=0,tz=0"]
+    status, out, _ = run("assembly", "statistics", "r.toml", *words)
+    assert (status, out) == (
+        1, "beyond_limits: x.slide at -0.26 m, limits -0.4 to -0.3\n"
+    )  # fmt: skip
+
+
+GAP = """
+name = "gap"
+platform = "tip"
+[[frame]]
+name = "tip"
+parent = "base"
+translation = [1.0, 0.0, 0.0]
+link = { beam = { radius = 0.01, theory = "euler" }, young = 7e10, poisson = 0.3 }
+[[frame]]
+name = "post"
+parent = "base"
+translation = [1.0, 1e-4, 0.0]
+[[closure]]
+frames = ["tip", "post"]
+"""
+
+
+def test_rest_of_a_closure_bends_the_link_that_it_is_given_to(run, tmp_path):
+    """A beam clamped at both ends, one shifted by d: 12 E I / L^3 d^2 / 2."""
+    (tmp_path / "gap.toml").write_text(GAP)
+    status, _, err = run("assembly", "solve", tmp_path / "gap.toml")
+    assert status == 2
+    assert "off by 0.0001 m" in err
+    assert "--rest NAME makes it a geometric error" in err
+    status, out, _ = run("assembly", "solve", tmp_path / "gap.toml", "--rest", "tip")
+    assert status == 0
+    expected = 12 * 7e10 * np.pi * 0.01**4 / 4 * 1e-8 / 2
+    energy = float(out.split("energy: ")[1].split()[0])
+    assert energy == pytest.approx(expected, rel=1e-4)
+    words = ["--rest", "tip", "--grid", "tx=1", "-o", tmp_path / "x.nc"]
+    assert run("assembly", "sweep", tmp_path / "gap.toml", *words)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(["solve", "five_bar", "--rest", "ankle"], '--rest: no frame "ankle"'),
+     (["solve", "five_bar", "--mismatch", "glue"], '--mismatch: found "glue"'),
+     (["solve", "five_bar", "--mismatch", "spring", "--pose", "tx=0"],
+      "--mismatch: found --pose, expected spring, with --joint")],
+)  # fmt: skip
+def test_ways_out_of_open_closures_refuse_what_they_cannot_use(run, words, message):
+    status, out, err = run("assembly", *words)
+    assert (status, out) == (2, "")
+    assert message in err

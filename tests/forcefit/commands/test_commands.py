@@ -112,7 +112,7 @@ def test_sweep_writes_netcdf_and_a_figure(run, robot_file, tmp_path):
                          "--figure", figure)  # fmt: skip
     assert (status, out.strip()) == (0, "ok: 4")
     with xarray.open_dataset(out_file) as data:
-        sizes = {"tx": 2, "tz": 2, "screw": 6, "bound": 2, "kind": 3}
+        sizes = {"tx": 2, "tz": 2, "screw": 6, "bound": 2, "kind": 3, "joint": 24}
         assert dict(data.sizes) == sizes
     assert figure.read_bytes().startswith(b"\x89PNG")
 

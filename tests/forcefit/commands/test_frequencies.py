@@ -2,7 +2,11 @@
 
 import json
 
+import numpy as np
 import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.model.robot import BeamLink, Frame, Robot
 
 
 def test_frequencies_come_slowest_first_with_who_bends(run):
@@ -22,3 +26,21 @@ def test_a_robot_without_mass_is_bad_input(run):
     assert status == 2
     assert out == ""
     assert 'irsbot2: found no mass that moves; expected "density"' in err
+
+
+def test_frequencies_without_exact_say_that_gravity_is_left_out(run, tmp_path):
+    """A compound pendulum swings at sqrt(m g l / I) / (2 pi); nominally it does not."""
+    pendulum = Robot("pendulum", "tip", (
+        Frame("pivot", joint="revolute", rotation=[np.pi / 2, 0, 0]),
+        Frame("tip", "pivot", [0, -1.0, 0], mass=2.0,
+              link=BeamLink({"radius": 0.02}, 2e11, 0.3)),
+    ))  # fmt: skip
+    write_robot(pendulum, tmp_path / "p.toml")
+    words = ["frequencies", tmp_path / "p.toml", "--gravity", "z=-9.81", "--count", "1"]
+    _, out, _ = run("assembly", *words)
+    assert "load and gravity are left out" in out
+    _, out, _ = run("assembly", *words, "--exact")
+    assert "left out" not in out
+    assert float(out.split("\n")[1].split()[0]) == pytest.approx(
+        np.sqrt(9.81) / (2 * np.pi), rel=1e-3
+    )

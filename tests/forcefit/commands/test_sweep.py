@@ -196,7 +196,7 @@ def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
     file, picture = tmp_path / "x.nc", tmp_path / "x.png"
     words = ["--grid", "tx=5:6:0.5,ty=7:8:0.5", "-o", file, "--figure", picture]
     status, out, err = run("assembly", "sweep", "five_bar", *words)
-    assert (status, out) == (0, "out of reach: 9\n")
+    assert (status, out) == (1, "out of reach: 9\n")
     assert "Warning" not in err
     assert run("assembly", "plot", file, "-o", picture, "--at", "tx=5")[0] == 0
 

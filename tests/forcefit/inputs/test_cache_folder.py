@@ -86,6 +86,16 @@ def test_nothing_is_kept_where_no_folder_can_be_written(nothing, monkeypatch):
     assert libraries._kept_at("assembly/linear/lanes.cpp")[1] is None
 
 
+def test_compiled_code_is_kept_where_numba_is_told_if_that_can_be_written(
+    nothing, monkeypatch
+):
+    monkeypatch.setattr(libraries, "_BESIDE", nothing / "beside")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(nothing / "mine"))
+    assert libraries.folder_of_compiled() == nothing / "mine"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(nothing / "home" / "mine"))
+    assert libraries.folder_of_compiled() == nothing / "beside"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("temporary", [True, False])
 def test_a_read_only_installation_without_a_home_works(tmp_path, temporary):

@@ -7,10 +7,10 @@ from scipy.stats import multivariate_normal, multivariate_t
 from validation.diagnosis.gaussian import (
     SIZES,
     Products,
-    averaged_gains,
+    evidence_gains,
     leave_block_out,
     log_evidence,
-    take_out,
+    marginalise,
 )
 
 
@@ -77,8 +77,8 @@ def test_a_flat_prior_leaves_the_sum_of_squares_of_least_squares(draw):
 def test_blocks_left_out_are_foretold_as_by_refits(draw):
     X, std, z = draw
     blocks = np.repeat(np.arange(8), 5)
-    taken = take_out(X, std, z, np.zeros((40, 0)))
-    errors, densities = leave_block_out(taken, blocks)
+    marginal = marginalise(X, std, z, np.zeros((40, 0)))
+    errors, densities = leave_block_out(marginal, blocks)
     for k in range(8):
         own, rest = blocks == k, blocks != k
         P = X[rest].T @ X[rest] + np.diag(std**-2.0)
@@ -93,11 +93,14 @@ def test_flat_columns_are_projected_out_exactly(draw):
     X, std, z = draw
     flat = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 3)))[0]
     without = np.eye(40) - flat @ flat.T
-    taken = take_out(without @ X, std, without @ z, flat)
+    marginal = marginalise(without @ X, std, without @ z, flat)
     large = np.append(np.full(3, 1e5), std)
-    other = take_out(np.hstack([flat, X]), large, z, np.zeros((40, 0)))
+    other = marginalise(np.hstack([flat, X]), large, z, np.zeros((40, 0)))
     B = np.random.default_rng(1).normal(size=(40, 2))
-    gram = [B.T @ B - (t.across.T @ B).T @ (t.across.T @ B) for t in (taken, other)]
+    gram = [
+        B.T @ B - (t.factor_columns.T @ B).T @ (t.factor_columns.T @ B)
+        for t in (marginal, other)
+    ]
     assert gram[0] == pytest.approx(gram[1], abs=1e-7)
 
 
@@ -107,11 +110,11 @@ def test_gain_is_the_evidence_averaged_over_sizes(draw, columns):
     rng = np.random.default_rng(5)
     B = np.linalg.qr(rng.normal(size=(40, columns)))[0]
     z = z + 6 * B[:, 0]
-    taken = take_out(X, std, z, np.zeros((40, 0)))
-    shown = taken.across.T @ B
-    gram, along = (B.T @ B - shown.T @ shown)[None], (B.T @ taken.held)[None]
-    found = averaged_gains(gram, along, np.array([np.inf]), False, taken, 20.0)
-    known = log_evidence(taken.squares, 0.0, 40, 20.0)
+    marginal = marginalise(X, std, z, np.zeros((40, 0)))
+    shown = marginal.factor_columns.T @ B
+    gram, along = (B.T @ B - shown.T @ shown)[None], (B.T @ marginal.held)[None]
+    found = evidence_gains(gram, along, np.array([np.inf]), False, marginal, 20.0)
+    known = log_evidence(marginal.squares, 0.0, 40, 20.0)
     each = []
     for size in SIZES:
         G = _products(np.hstack([X, B]), z)
@@ -130,11 +133,11 @@ def test_a_bounded_unknown_gains_the_ratio_of_half_normals():
     rng = np.random.default_rng(2)
     B = np.linalg.qr(rng.normal(size=(n, 1)))[0]
     z = b * B[:, 0]
-    taken = take_out(np.zeros((n, 0)), np.zeros(0), z, np.zeros((n, 0)))
+    marginal = marginalise(np.zeros((n, 0)), np.zeros(0), z, np.zeros((n, 0)))
     huge = 1e9  # degrees of freedom: the scale is known
     most = np.array([SIZES[0]])
-    found = averaged_gains(
-        np.ones((1, 1, 1)), np.full((1, 1), b), most, True, taken, huge
+    found = evidence_gains(
+        np.ones((1, 1, 1)), np.full((1, 1), b), most, True, marginal, huge
     )
     x = np.linspace(0, 12 * SIZES[0], 200001)
     prior = 2 / SIZES[0] / np.sqrt(2 * np.pi) * np.exp(-(x**2) / 2 / SIZES[0] ** 2)
@@ -144,9 +147,9 @@ def test_a_bounded_unknown_gains_the_ratio_of_half_normals():
 
 def test_what_cannot_plausibly_show_is_worth_nothing(draw):
     X, std, z = draw
-    taken = take_out(X, std, z, np.zeros((40, 0)))
+    marginal = marginalise(X, std, z, np.zeros((40, 0)))
     least = np.array([0.5 * SIZES[0]])
-    found = averaged_gains(
-        np.ones((1, 1, 1)), np.ones((1, 1)), least, False, taken, 20.0
+    found = evidence_gains(
+        np.ones((1, 1, 1)), np.ones((1, 1)), least, False, marginal, 20.0
     )
     assert found[0] == -np.inf

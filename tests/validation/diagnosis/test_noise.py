@@ -5,9 +5,9 @@ import pytest
 
 from validation.diagnosis.noise import (
     findings,
-    good_readings,
+    probability_good,
+    repeat_scatter,
     scale,
-    scatter_of_repeats,
 )
 
 
@@ -15,14 +15,14 @@ def test_blunders_are_told_from_noise():
     rng = np.random.default_rng(0)
     z = rng.normal(size=600)
     z[[5, 77, 300]] += [40.0, -25.0, 12.0]
-    good = good_readings(z**2)
+    good = probability_good(z**2)
     assert set(np.flatnonzero(good < 0.5)) == {5, 77, 300}
 
 
 def test_noise_alone_hardly_has_blunders():
     rng = np.random.default_rng(1)
     called = [
-        (good_readings(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
+        (probability_good(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
     ]
     # beyond 4.4 sigma lies one reading in 80 000: one campaign of 600 in 130
     assert np.mean(called) < 0.03
@@ -31,7 +31,7 @@ def test_noise_alone_hardly_has_blunders():
 def test_many_readings_far_off_are_no_blunders():
     z = np.random.default_rng(2).normal(size=600)
     z[:60] += 30.0
-    assert (good_readings(z**2) == 1).all()
+    assert (probability_good(z**2) == 1).all()
 
 
 @pytest.mark.parametrize("true", [0.5, 1.0, 3.0])
@@ -44,13 +44,13 @@ def test_scale_follows_what_is_left(true):
 
 def test_repeats_scatter_by_their_own_mean():
     z = np.array([1.0, 3.0, 10.0, 10.0, 7.0])
-    rms, freedom = scatter_of_repeats(z, np.array([4, 4, 2, 2, 9]))
+    rms, freedom = repeat_scatter(z, np.array([4, 4, 2, 2, 9]))
     assert freedom == 2
     assert rms == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("tau", "repeats", "told"), [
-    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["left"]), (0.4, (0.5, 40), ["left"]),
+    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["residual"]), (0.4, (0.5, 40), ["residual"]),
     (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
 ])  # fmt: skip
 def test_noise_is_told_of_where_it_is_not_as_stated(tau, repeats, told):

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import multivariate_t
 
-from validation.diagnosis.gaussian import size_cost
+from validation.diagnosis.gaussian import size_penalty
 from validation.diagnosis.prior_sizes import best_sizes
 
 
@@ -51,4 +51,4 @@ def test_a_chosen_size_costs_what_laplace_says():
     for gamma in (1.0, 6.0):
         u = np.linspace(-5.18, 5.18, 100001)
         average = np.log(np.trapezoid(np.exp(-gamma * u**2), u) / 10.36)
-        assert size_cost(gamma) == pytest.approx(-average, abs=2e-3)
+        assert size_penalty(gamma) == pytest.approx(-average, abs=2e-3)

@@ -105,8 +105,8 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
         columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
     ]
     dense = Dense(made, search.fit.cells, search.fit.root)
-    alone = dense.gains(search.empty[-1].taken, FREEDOM)
-    together = np.array([f.worth - f.log_prior for f in looked])
+    alone = dense.gains(search.empty[-1].marginal, FREEDOM)
+    together = np.array([f.score - f.log_prior for f in looked])
     assert len(looked) > 50
     assert together == pytest.approx(alone, rel=1e-6)
 

@@ -1,9 +1,9 @@
-"""Effects of a model taken again about what was found, all of them together.
+"""Linearise the effects of a model again at their estimates, all together.
 
-A tangent taken where effects begin misses what they do to one another, what bends in
-their shapes (a time constant, an exponent), and finite motions.  So the model is asked
-what the effects of a state do together; where that differs from the sum of tangents,
-these are taken again there.
+Derivatives at the start values miss three things: products of two effects, nonlinear
+parameters (a time constant, an exponent), and finite motions.  The prediction with all
+effects of a model is therefore compared with the sum of their linear contributions;
+where they differ, all derivatives are computed again at the estimates.
 """
 
 import numpy as np
@@ -13,27 +13,27 @@ from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
 from validation.diagnosis.states import Fitting, State
 
-_ROUNDS = 3
-_MOVED = 0.3  # log posterior: a model has settled
-_LINEAR = 0.5  # squared whitened difference of what is linear enough
-_SHIFT = 3.0  # times that a shape may change in a round
+_ROUNDS = 3  # of linearisation
+_MOVED = 0.3  # log posterior: change that ends the iteration
+_LINEAR = 0.5  # squared whitened error of a linearisation that is accepted
+_SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
 
 
-class Settling:
-    """Models about their own values, each found once."""
+class Relinearisation:
+    """Linearisations of models at their estimates, with a cache."""
 
     def __init__(self, columns: Columns, fit: Fitting) -> None:
-        """Begin with none.
+        """Start with an empty cache.
 
         Args:
             columns: of all N cells.
-            fit: readings of those fitted.
+            fit: of the fitted cells.
         """
         self.columns, self.fit = columns, fit
         self._about: dict[object, list[Element] | None] = {}
 
-    def settled(self, state: State) -> State:
-        """A model about its own values, where that differs from what was assumed."""
+    def relinearised(self, state: State) -> State:
+        """Return a model whose linearisation holds at its estimates."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
             if elements is None:
@@ -44,7 +44,7 @@ class Settling:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Elements about a model's values; None where they add up to them already."""
+        """Return elements linearised at the estimates; None if that changes nothing."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -73,23 +73,23 @@ class Settling:
         return tuple(elements)
 
     def _misses(self, effects: list[Element], xs: list[NDArray]) -> float:
-        """Squared whitened difference of what effects do and the sum of tangents."""
+        """Return the squared whitened error of the linearisation."""
         linear = np.zeros(len(self.fit.cells))
         for e, x in zip(effects, xs, strict=True):
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)
             if e.offset is not None:
                 linear += e.offset
-        miss = (self.columns.together(effects, xs) - linear)[self.fit.cells]
+        miss = (self.columns.combined(effects, xs) - linear)[self.fit.cells]
         return float(miss @ miss)
 
 
 def _has_shapes(e: Element) -> bool:
-    """Whether an effect's shapes are among its unknowns."""
+    """Return whether the nonlinear parameters are among the unknowns."""
     return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
 
 
 def _within(e: Element, x: NDArray) -> NDArray:
-    """Values of an effect, its shapes no farther than a round may take them."""
+    """Return values with nonlinear parameters limited to one round's change."""
     for j, slot in enumerate(e.hypothesis.slots):
         if slot.shape:
             x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)

@@ -1,7 +1,7 @@
-"""Functions at several places at once, and cubic laws of a joint's wrench.
+"""Functions that act at several places, and cubic springs.
 
-Beams that all swell, drives that all have backlash: one function of one form, each
-place with numbers of its own.
+Examples: all beams swell with humidity; all drives have backlash.  The form is the same
+at all places; each place has its own coefficients.
 """
 
 import math
@@ -15,18 +15,18 @@ from validation.diagnosis.forms_tried import CandidateShape, is_angle
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.gaussian import SIZES
 
-_CUBIC = CandidateShape("powers", ("2",))  # of a compliance: times its own wrench
+_CUBIC = CandidateShape("powers", ("2",))  # compliance proportional to wrench^2
 Parts = tuple[CandidatePart, ...]
 
 
-def together(functions: Functions) -> list[Element]:
-    """Functions that act at several places, and those of a joint's own wrench.
+def joint_functions(functions: Functions) -> list[Element]:
+    """Return functions at several places and cubic springs.
 
     Args:
         functions: of a campaign.
 
     Returns:
-        Those that the readings can see, with their columns.
+        Elements that the readings depend on.
     """
     listed: list[tuple[Candidate, float]] = []
     for kind, parts, tried in (*_by_kind(functions), *_at_drives(functions)):
@@ -38,7 +38,7 @@ def together(functions: Functions) -> list[Element]:
 
 
 def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
-    """A joint that gives with the third power of what it carries."""
+    """Return cubic springs at all joints."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
@@ -51,7 +51,7 @@ def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Beams together, and drives each with its own coordinate."""
+    """Return functions of all beams, and of all drives' own coordinates."""
     conditions = functions.conditions
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
@@ -64,7 +64,7 @@ def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateS
 def _at_drives(
     functions: Functions,
 ) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Drives together, of what all share; and backlash around the turn of each."""
+    """Return functions of all drives: shared variables, and backlash over a turn."""
     conditions, robot = functions.conditions, functions.campaign.robot
     own = [(f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated]
     if len(own) < 2:

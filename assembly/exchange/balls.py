@@ -1,0 +1,44 @@
+"""Ball joints as three turns, none of them at home, so that they are not singular."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.exchange.mechanism import Joint, motion
+
+
+def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
+    """Joints in which passive balls stand at zero where they were turned at home.
+
+    A ball is three turns, which lose a freedom where the second is a right angle; what
+    it is turned by at home goes into its placement.
+
+    Args:
+        joints: at home.
+
+    Returns:
+        The same joints in the same pose; only coordinates of balls that a reader made
+        differ, their three turns standing one after another.
+    """
+    at_rest = list(joints)
+    for i in range(len(joints) - 2):
+        turns = joints[i : i + 3]
+        if _is_ball(turns) and any(turn.position for turn in turns):
+            T = joints[i].placement
+            for turn in turns:
+                T = T @ motion(turn, turn.position)
+            at_rest[i : i + 3] = (replace(turn, position=0.0) for turn in turns)
+            at_rest[i] = replace(at_rest[i], placement=T)
+    return tuple(at_rest)
+
+
+def _is_ball(turns: tuple[Joint, ...]) -> bool:
+    """Whether three joints are the turns of a passive ball joint of a file."""
+    name = turns[0].name.removesuffix(".rx")
+    made = {f"{name}.after_rx", f"{name}.rx.after"}  # by chain(), and of MJCF
+    return (
+        turns[0].child in made
+        and [turn.name for turn in turns] == [f"{name}.r{axis}" for axis in "xyz"]
+        and all(turn.kind == "revolute" and not turn.actuated for turn in turns)
+        and all(np.array_equal(turn.placement, np.eye(4)) for turn in turns[1:])
+    )

@@ -1,0 +1,167 @@
+"""Robots whose nominal closures do not hold: what is left open becomes an error.
+
+Published dimensions are rounded, and so are the coordinates of redundant drives.  A
+frame's body, or the elastic drives, then take up what the closures leave open.  The
+robot's nominal geometry closes afterwards; its geometric errors make it the robot that
+was given.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import closure_matrices, redundant_drives
+from assembly.kinematics.nominal import Target, follow, mobile
+from assembly.kinematics.posture import joint_target
+from assembly.model.robot import Robot
+from forcefit.inputs.table import BadInput, nearest
+from stiffness.screws import rotation_matrix, rotation_vector, transform
+
+_OPEN = 1e-9  # [rad, m] what is left open where closures hold
+_SMALL = 0.1  # [rad, m] a geometric error is a small motion
+
+
+def rest_in(robot: Robot, name: str) -> Robot:
+    """The robot with what its closure leaves open as a geometric error of a frame.
+
+    Args:
+        robot: whose passive joints are moved as near to closing as they come, its
+            drives at their ``position``.
+        name: of a frame in the loop that does not close.
+
+    Returns:
+        The robot whose nominal geometry closes; with its errors it is the one given.
+
+    Raises:
+        BadInput: no such frame, it is in no loop that is open, or the rest is no small
+            motion.
+    """
+    if name not in (names := [f.name for f in robot.frames]):
+        raise BadInput(f'--rest: no frame "{name[:60]}"{nearest(name, names)}')
+    driven = [f.actuated for f in robot.frames]
+    held = np.where(driven, robot.positions, np.nan)
+    track = follow(robot, robot.positions, Target(coordinates=held[None]), guess=True)
+    T, row = track.transforms[0], robot.index(name)
+    robot = _positioned(robot, track.coordinates[0])
+    for k, pair in enumerate(robot.closures):
+        a, b = (robot.index(end) for end in pair)
+        sides = robot.on_path[a, row], robot.on_path[b, row]
+        if track.closure_mismatch[0, k] > _OPEN and sides[0] != sides[1]:
+            to, at = (T[b], T[a]) if sides[0] else (T[a], T[b])
+            own = np.linalg.inv(T[row])
+            return _corrected(robot, row, own @ to @ np.linalg.inv(at) @ T[row])
+    raise BadInput(
+        f'--rest: frame "{name[:60]}" is in no loop that is open; expected one between '
+        "the two frames of a closure that does not hold"
+    )
+
+
+def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
+    """The robot whose frame ends at X of where it did, and errs by the inverse."""
+    frame = robot.frames[row]
+    body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
+    error = frame.geometric_error
+    D = np.linalg.inv(X) @ transform(error[3:], rotation_matrix(error[:3]))
+    screw = np.concatenate([rotation_vector(D[:3, :3]), D[:3, 3]])
+    if np.abs(screw).max() > _SMALL:
+        raise BadInput(
+            f"--rest: frame {frame.name}: closing needs {np.abs(screw).max():.3g} rad "
+            f"or m, expected a small motion, < {_SMALL:g}"
+        )
+    moved = replace(
+        frame, translation=body[:3, 3], rotation=rotation_vector(body[:3, :3]),
+        geometric_error=screw,
+    )  # fmt: skip
+    frames = (*robot.frames[:row], moved, *robot.frames[row + 1 :])
+    turned = float(np.abs(rotation_vector(X[:3, :3])).max())
+    remark = (
+        f"what the closure leaves open, {np.abs(X[:3, 3]).max():.3g} m and "
+        f"{turned:.3g} rad, is a geometric error of {frame.name}"
+    )
+    return replace(robot, frames=frames, remarks=(*robot.remarks, remark))
+
+
+def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
+    """The robot at drive coordinates that do not fit, its elastic drives preloaded.
+
+    Args:
+        robot: with redundant drives that are elastic.
+        joints: coordinates [rad or m] of drives by frame; others keep their
+            ``position``.
+
+    Returns:
+        The robot whose home pose is the nearest that closes; each drive errs by the
+        difference to what was asked of it, which its spring takes up.
+
+    Raises:
+        BadInput: an unknown drive; coordinates that none near by fit; a drive that
+            differs and is rigid.
+    """
+    target = joint_target(robot, joints or {})
+    assert target.coordinates is not None
+    asked = target.coordinates[0]
+    driven = np.array([f.actuated for f in robot.frames])
+    free = Target(coordinates=np.full((1, len(asked)), np.nan))
+    home = follow(robot, robot.positions, free, guess=True)
+    leading = np.where(_independent(robot, home.transforms), asked, np.nan)
+    near = follow(robot, home.coordinates[0], Target(coordinates=leading[None]))
+    start = np.where(driven, asked, near.coordinates[0])
+    there = follow(robot, start, free, guess=True)
+    differs = np.where(driven, asked - there.coordinates[0], 0.0)
+    closes = near.reached[0] and there.mismatch[0] <= _OPEN
+    if not closes or np.abs(differs).max() > _SMALL:
+        raise BadInput(
+            f"{robot.name}: no posture near these drive coordinates closes; expected "
+            "coordinates that fit but for their rounding"
+        )
+    closed = _positioned(robot, there.coordinates[0])
+    frames = []
+    for frame, value in zip(closed.frames, differs.tolist(), strict=True):
+        error = frame.geometric_error.copy()
+        error[frame.own_axis] += value
+        own = frame.own_stiffness
+        if abs(value) > _OPEN and (own is None or np.isinf(own)):
+            raise BadInput(
+                f"--mismatch spring: drive {frame.name} is rigid and {value:.3g} rad "
+                "or m away; expected a joint_stiffness about its own axis"
+            )
+        frames.append(replace(frame, geometric_error=error))
+    count = redundant_drives(robot, there.transforms[0])
+    most = int(np.abs(differs).argmax())
+    remark = (
+        f"{count} of {int(driven.sum())} drives redundant; their springs take up to "
+        f"{abs(differs[most]):.3g} rad or m, at {robot.frames[most].name}"
+    )
+    return replace(closed, frames=tuple(frames), remarks=(*robot.remarks, remark))
+
+
+def _positioned(robot: Robot, q: NDArray) -> Robot:
+    """The robot with other coordinates at home."""
+    moves = mobile(robot)
+    frames = tuple(
+        replace(frame, position=float(value)) if moving else frame
+        for frame, value, moving in zip(robot.frames, q, moves, strict=True)
+    )
+    return replace(robot, frames=frames)
+
+
+def _independent(robot: Robot, T: NDArray) -> NDArray:
+    """(n,) bool: drives that together hold the robot, the first in its file."""
+    A = closure_matrices(robot, T)[0][0]
+    driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
+    loose = ~driven
+    for column in np.flatnonzero(driven)[::-1]:
+        # a drive may be left free where the others hold it through the closures
+        others = np.append(np.flatnonzero(loose), column)
+        if _rank(A[:, others]) > _rank(A[:, loose]):
+            loose[column] = True
+    chosen = np.zeros(len(robot.frames), dtype=bool)
+    chosen[np.flatnonzero(mobile(robot))[~loose]] = True
+    return chosen
+
+
+def _rank(A: NDArray) -> int:
+    """Number of singular values that are not rounding."""
+    return int(np.linalg.matrix_rank(A, tol=1e-6)) if A.size else 0

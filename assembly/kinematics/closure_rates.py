@@ -1,0 +1,96 @@
+"""Closures at first order: rates of the joints, with drives free or locked."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import mobile, motion_screws, size_of
+from assembly.model.robot import Robot
+
+# relative size of a singular value of closures that counts as none: they hold to 1e-10,
+# and beside a singularity a posture is known only to some root of that
+SINGULAR = 1e-6
+_NOISE = 30.0  # of it, times what closures leave open
+
+
+@lru_cache(maxsize=64)
+def closure_signs(robot: Robot) -> NDArray:
+    """(closures, n) +1 on a closure's first chain, -1 on its second, 0 where shared."""
+    paths = robot.on_path.astype(int)
+    pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
+    count = len(robot.frames)
+    signs = np.array([paths[a] - paths[b] for a, b in pairs]).reshape(-1, count)
+    signs.setflags(write=False)
+    return signs
+
+
+def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Velocities of closures, drives and platform for unit rates of the mobile joints.
+
+    Args:
+        robot: of n frames, m of them mobile, a driven, with c closures.
+        T: (k, n, 4, 4) frames seen from the base.
+
+    Returns:
+        (k, 6 c, m) of the closures, (k, m, a + 6) of the drives and the platform,
+        (k, m, 6) of the platform; lengths in reference lengths, read at the platform's
+        origin in base axes.
+    """
+    size = size_of(robot)
+    i = robot.index(robot.platform)
+    screws = motion_screws(robot, T)
+    screws[..., 3:] += np.cross(screws[..., :3], T[:, None, i, :3, 3])
+    moves = mobile(robot)
+    slides = np.array([f.joint == "prismatic" for f in robot.frames])[:, None]
+    screws *= np.where(slides, size, 1.0) / np.array([1, 1, 1, size, size, size])
+    signs = closure_signs(robot)[:, moves]
+    A = np.einsum("cm,kms->kcsm", signs, screws[:, moves])
+    A = A.reshape(len(T), 6 * len(signs), int(moves.sum()))
+    P = screws[:, moves] * robot.on_path[i, moves, None]
+    driven = np.array([f.actuated for f in robot.frames])
+    drives = np.eye(len(robot.frames))[moves][:, driven]
+    drives = np.broadcast_to(drives, (len(T), *drives.shape))
+    return A, np.concatenate([drives, P], axis=2), P
+
+
+def locked_closures(robot: Robot, T: NDArray) -> NDArray:
+    """Velocities of closures for unit rates of the joints that no drive holds.
+
+    Args:
+        robot: of n frames, p of them passive joints, with c closures.
+        T: (k, n, 4, 4) frames seen from the base.
+
+    Returns:
+        (k, 6 c, p), scaled and read as :func:`closure_matrices`.
+    """
+    passive = np.array([not f.actuated for f in robot.frames])[mobile(robot)]
+    return closure_matrices(robot, T)[0][:, :, passive]
+
+
+def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
+    """(k,) ranks of :func:`locked_closures`."""
+    values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
+    return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
+
+
+def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
+    """How many drives a robot has beyond those that hold it.
+
+    Args:
+        robot: of n frames.
+        T: (n, 4, 4) frames seen from the base.
+        left_open: [rad, m] by closures there: singular values of its size are none.
+
+    Returns:
+        Their number: the rank of all closures minus that with the drives locked.
+    """
+    least = max(SINGULAR, _NOISE * left_open)
+    ranks = []
+    for A in (
+        closure_matrices(robot, T[None])[0][0],
+        locked_closures(robot, T[None])[0],
+    ):
+        values = np.linalg.svd(A, compute_uv=False)
+        ranks.append(int((values > least * values[:1]).sum()))
+    return ranks[0] - ranks[1]

@@ -1,0 +1,110 @@
+"""Postures on the far side of a singularity: no way from home avoids it.
+
+With drives locked, the closures' matrix A (6 c, p) of the passive joints has rank r at
+all postures but the singular ones.  Between bases of its range and of its row space,
+carried along a path from home, it is a square matrix with a determinant; a change of
+its sign is a singularity that was crossed.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import SINGULAR, locked_closures
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.posture import Posture, home_posture, pose_components
+from assembly.kinematics.singular_posture import rank_near
+from assembly.model.robot import Robot
+
+_ALIKE = 0.3  # product of the cosines between two bases that one step may join
+_STEPS = (
+    4,
+    32,
+)  # of a path on which they turn farther; more where the first does not do
+
+
+def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
+    """Which postures lie on the far side of a singularity, seen from home.
+
+    Args:
+        robot: of n frames.
+        target: k poses or joint coordinates that were reached from home.
+        T: (k, n, 4, 4) frames there.
+
+    Returns:
+        (k,) bool.  None where home is singular itself: it has no side.
+    """
+    home = home_posture(robot)
+    start = locked_closures(robot, home.transforms[None])
+    rank = home_rank(robot)
+    values = np.linalg.svd(start[0], compute_uv=False)
+    if not rank or values[rank - 1] <= SINGULAR * values[0]:
+        return np.zeros(len(T), dtype=bool)
+    ends = locked_closures(robot, T)
+    signs, alike = _compared(start, ends, rank)
+    for steps in _STEPS:
+        unsure = np.flatnonzero(alike < _ALIKE)
+        if not unsure.size:
+            break
+        signs[unsure], alike[unsure] = _along(
+            robot, home, target.rows(unsure), steps, rank, ends[unsure]
+        )
+    return signs < 0
+
+
+@lru_cache(maxsize=16)
+def home_rank(robot: Robot) -> int:
+    """Rank of the locked closures at home or near by."""
+    home = home_posture(robot)
+    return rank_near(robot, home.coordinates, home.transforms)
+
+
+def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
+    """Signs of B (k, m, p) between the bases of A, and how alike both bases are.
+
+    Returns:
+        (k,) signs of the determinants; (k,) 1 where both bases span the same, 0 where
+        a direction is lost.
+    """
+    U, _, Vt = np.linalg.svd(A)
+    U, V = U[..., :rank], np.swapaxes(Vt[:, :rank], -1, -2)
+    sign, size = np.linalg.slogdet(np.swapaxes(U, -1, -2) @ B @ V)
+    if rank == B.shape[2]:
+        product = np.linalg.slogdet(np.swapaxes(B, -1, -2) @ B)[1] / 2
+    elif rank == B.shape[1]:
+        product = np.linalg.slogdet(B @ np.swapaxes(B, -1, -2))[1] / 2
+    else:
+        values = np.linalg.svd(B, compute_uv=False)[:, :rank]
+        product = np.log(values.clip(1e-300)).sum(axis=1)
+    return sign, np.exp(np.minimum(size - product, 0.0))
+
+
+def _along(
+    robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
+) -> tuple[NDArray, NDArray]:
+    """The same with bases carried along the paths from home; the least alike."""
+    before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
+    signs, alike = np.ones(len(ends)), np.ones(len(ends))
+    for k in range(1, steps + 1):
+        A = ends
+        if k < steps:
+            track = follow(robot, home.coordinates, _part(home, target, k / steps))
+            A = locked_closures(robot, track.transforms)
+            # a part of the way that is not reached alone is left out
+            A = np.where(track.reached[:, None, None], A, before)
+        sign, near = _compared(before, A, rank)
+        signs, alike, before = signs * sign, np.minimum(alike, near), A
+    return signs, alike
+
+
+def _part(home: Posture, target: Target, part: float) -> Target:
+    """The target at a part of the straight line from home to it."""
+
+    def between(start: NDArray, end: NDArray | None) -> NDArray | None:
+        return None if end is None else start + part * (end - start)
+
+    return Target(
+        between(pose_components(home.platform), target.pose),
+        between(home.coordinates, target.coordinates),
+    )

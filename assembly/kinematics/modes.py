@@ -1,0 +1,69 @@
+"""Ways from a singular home pose, where several operation modes meet.
+
+There the closures and a pose given in part, or the drives, do not say which mode the
+robot takes: rounding would choose.  Here the platform keeps what was not given as it is
+at home, if it can: first all of it, then its rotation, then its translation.
+"""
+
+from dataclasses import fields
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.nominal import Target, follow
+from assembly.kinematics.track import Track
+from assembly.model.robot import Robot
+
+_CLOSED = 1e-8  # [rad, m] most that closures and pose may leave open in a mode
+# components [tx ty tz rx ry rz] that stay, in the order in which they are tried
+_KEPT = (range(6), range(3, 6), range(3))
+
+
+def follow_in_mode(
+    robot: Robot, home: NDArray, pose: NDArray, target: Target, singular: bool
+) -> Track:
+    """Follow the closures from home to many targets, in a mode where modes meet.
+
+    Args:
+        robot: of n frames.
+        home: (n,) [rad or m] coordinates of the home pose.
+        pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
+        target: k poses or sets of coordinates.
+        singular: whether modes meet at home.  Elsewhere what is not given is held only
+            where the target cannot be reached otherwise.
+
+    Returns:
+        The ends of the tracks, and their progress.
+    """
+    kept = _KEPT if target.pose is not None else _KEPT[1:]
+    held = [_held(target, pose, components) for components in kept]
+    tries = [*held, target] if singular else [target, *held[: target.pose is not None]]
+    track = follow(robot, home, tries[0])
+    for last, now in pairwise(tries):
+        closed = np.inf if last is target else _CLOSED
+        waiting = np.flatnonzero(~(track.reached & (track.mismatch < closed)))
+        if not waiting.size:
+            break
+        _try(robot, home, now.rows(waiting), track, waiting, now is target)
+    return track
+
+
+def _held(target: Target, pose: NDArray, kept: range) -> Target:
+    """The target, and components of the pose that it does not give as they are."""
+    goal = np.full((len(target), 6), np.nan)
+    if target.pose is not None:
+        goal = np.array(target.pose, dtype=float)
+    stays = np.isnan(goal) & np.isin(range(6), kept)
+    return Target(np.where(stays, pose, goal), target.coordinates)
+
+
+def _try(
+    robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
+    whatever: bool,
+) -> None:  # fmt: skip
+    """Follow other targets, into these rows of a track where they are reached."""
+    found = follow(robot, home, target)
+    good = whatever | (found.reached & (found.mismatch < _CLOSED))
+    for one in fields(Track):
+        getattr(track, one.name)[rows[good]] = getattr(found, one.name)[good]

@@ -1,0 +1,82 @@
+"""Postures at which first order decides nothing: the locked robot gains a freedom.
+
+With its drives locked a robot keeps as many freedoms as its closures leave.  Where it
+keeps more than at the postures near by, these closures are dependent at first order
+only: small errors move the robot far, or not at all, and equations (17) to (27), which
+are linear in them, answer neither whether it goes together nor how far off it is.
+Operation modes meet there (Zlatanov, Bonev, Gosselin 2002).
+
+Begin with :func:`is_singular`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import (
+    SINGULAR,
+    closure_matrices,
+    locked_closures,
+    locked_ranks,
+)
+from assembly.kinematics.nominal import Target, follow, mobile, size_of
+from assembly.model.robot import Robot
+
+_ASIDE = 0.02  # [rad or lengths] to postures near by
+_NEIGHBOURS = 6  # of them: any that stands apart from the singularity will do
+_APART = 1e-5  # relative size of a singular value that is not zero there
+_CLOSED = 1e-8  # [rad, m] most that a posture near by may leave open
+_NOISE = 1e3  # singular values that this times what is left open may make
+
+
+def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
+    """Whether the robot with locked drives keeps more freedoms than near by.
+
+    Args:
+        robot: of n frames.
+        q: (n,) [rad or m] coordinates of all joints.
+        T: (n, 4, 4) frames seen from the base.
+
+    Returns:
+        Not so where it keeps as many all around, as a robot without drives.
+    """
+    rank = int(locked_ranks(robot, T[None])[0])
+    # no posture has a rank above the number of columns
+    most = sum(f.passive for f in robot.frames)
+    return rank < most and rank < rank_near(robot, q, T)
+
+
+def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
+    """The largest rank of the locked closures at a posture and at those near by.
+
+    Args:
+        robot: of n frames.
+        q: (n,) [rad or m] coordinates of all joints.
+        T: (n, 4, 4) frames seen from the base.
+
+    Returns:
+        The rank.
+    """
+    free = Target(coordinates=np.full((1, len(q)), np.nan))
+    best = 0
+    for step in [np.zeros(len(q)), *_steps_aside(robot, T)]:
+        there = follow(robot, q + step, free, guess=True)
+        left_open = float(there.mismatch[0])
+        if left_open < _CLOSED:
+            locked = locked_closures(robot, there.transforms)[0]
+            values = np.linalg.svd(locked, compute_uv=False)
+            least = max(_APART, _NOISE * left_open)
+            best = max(best, int((values > least * values[:1]).sum()))
+    return best
+
+
+def _steps_aside(robot: Robot, T: NDArray) -> NDArray:
+    """(some, n) [rad or m] joint steps that keep the closures at first order."""
+    A = closure_matrices(robot, T[None])[0][0]
+    _, values, Vt = np.linalg.svd(A)
+    rank = int((values > SINGULAR * values[:1]).sum())
+    ways = np.random.default_rng(1).normal(size=(_NEIGHBOURS, len(Vt) - rank))
+    steps = np.zeros((_NEIGHBOURS, len(T)))
+    steps[:, mobile(robot)] = ways @ Vt[rank:]
+    steps *= _ASIDE / np.linalg.norm(steps, axis=1, keepdims=True).clip(1e-300)
+    slides = np.array([f.joint == "prismatic" for f in robot.frames])
+    return steps * np.where(slides, size_of(robot), 1.0)

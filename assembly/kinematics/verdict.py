@@ -1,0 +1,132 @@
+"""Whether a posture may be used: within the joints' limits, regular, on home's side."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.closure_rates import locked_ranks
+from assembly.kinematics.crossing import beyond_singularity, home_rank
+from assembly.kinematics.nominal import Target, size_of
+from assembly.kinematics.posture import (
+    Posture,
+    home_is_singular,
+    home_posture,
+    pose_components,
+)
+from assembly.kinematics.singular_posture import is_singular
+from assembly.model.robot import Robot
+
+SINGULAR = "singular"
+BEYOND_LIMITS = "beyond_limits"
+BEYOND_SINGULARITY = "beyond_singularity"
+SINGULAR_WORDS = "singular posture: first order decides nothing"
+_FAR_SIDE = "not connected to home without passing a singularity"
+_ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be passed
+
+
+def verdicts(
+    robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray | None = None
+) -> list[tuple[str, str]]:
+    """Status and reason of postures that were reached.
+
+    Args:
+        robot: of n frames.
+        target: k poses or sets of coordinates.
+        q: (k, n) [rad or m] coordinates where they were reached.
+        T: (k, n, 4, 4) frames there.
+        near: (k,) bool, which of them may be singular; all if absent.
+
+    Returns:
+        For each :data:`BEYOND_LIMITS`, :data:`SINGULAR` or :data:`BEYOND_SINGULARITY`
+        and why; both empty where nothing is to be said.
+    """
+    limits = [limits_passed(robot, coordinates) for coordinates in q]
+    near = np.ones(len(q), dtype=bool) if near is None else near
+    singular = _singular(robot, q, T, near)
+    far = beyond_singularity(robot, target, T)
+    texts = []
+    for passed, here, there in zip(limits, singular, far, strict=True):
+        status, reason = "", ""
+        if passed:
+            status, reason = BEYOND_LIMITS, passed
+        elif here:
+            status, reason = SINGULAR, SINGULAR_WORDS
+        elif there:
+            status, reason = BEYOND_SINGULARITY, _FAR_SIDE
+        texts.append((status, reason))
+    return texts
+
+
+def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
+    """(k,) bool: postures whose locked closures have a lower rank than near by."""
+    singular = near.copy()
+    if near.any():
+        singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)
+    for i in np.flatnonzero(singular).tolist():
+        singular[i] = is_singular(robot, q[i], T[i])
+    return singular
+
+
+def limits_passed(robot: Robot, q: NDArray) -> str:
+    """Joints beyond their limits, by how much and what the limits are.
+
+    Args:
+        robot: of n frames.
+        q: (n,) [rad or m] coordinates.
+
+    Returns:
+        Such as ``"leg1.rail at 0.3 m, limits -0.2 to 0.2"``; empty if there is none.
+    """
+    texts = []
+    for frame, value in zip(robot.frames, q.tolist(), strict=True):
+        if frame.limits is None:
+            continue
+        slides = frame.joint == "prismatic"
+        room = _ROUNDING * (size_of(robot) if slides else 1.0)
+        low, high = frame.limits[0] - room, frame.limits[1] + room
+        if frame.passive and not slides:
+            # a whole turn of a joint that no drive counts changes nothing
+            value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
+        if not low <= value <= high:
+            texts.append(
+                f"{frame.name} at {value:.6g} {'m' if slides else 'rad'}, limits "
+                f"{frame.limits[0]:g} to {frame.limits[1]:g}"
+            )
+    return "; ".join(texts)
+
+
+def posture_remarks(posture: Posture) -> list[str]:
+    """What is to be known of a posture beside its solution, a sentence each.
+
+    Args:
+        posture: of a robot.
+
+    Returns:
+        The operation mode where several meet at home, joints beyond their limits, and
+        whether a singularity lies between home and here.
+    """
+    robot, q, T = posture.robot, posture.coordinates, posture.transforms
+    remarks = []
+    home = home_posture(robot)
+    if home_is_singular(robot) and np.abs(q - home.coordinates).max() > _ROUNDING:
+        remarks.append(
+            "home is a singular posture, where operation modes meet; this one is "
+            f"{_mode(home, posture)} (give the other components of the pose for "
+            "another)"
+        )
+    if passed := limits_passed(robot, q):
+        remarks.append(f"beyond the limits of its joints: {passed}")
+    target = Target(pose=pose_components(posture.platform)[None])
+    if beyond_singularity(robot, target, T[None])[0]:
+        remarks.append(f"this posture is {_FAR_SIDE}")
+    return remarks
+
+
+def _mode(home: Posture, posture: Posture) -> str:
+    """Name of the operation mode in which the platform came from home."""
+    moved = posture.platform @ np.linalg.inv(home.platform)
+    turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
+    shift = posture.platform[:3, 3] - home.platform[:3, 3]
+    shifted = np.abs(shift).max() > _ROUNDING * size_of(posture.robot)
+    if turned and shifted:
+        return "the mode in which the platform turns and shifts"
+    return "pure rotation" if turned else "pure translation"

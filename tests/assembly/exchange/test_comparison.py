@@ -1,0 +1,59 @@
+"""The other program's process: whatever becomes of it, the conversion goes on."""
+
+import importlib.util
+
+import pytest
+
+from assembly.exchange import comparison
+from assembly.exchange.convert import convert
+from assembly.exchange.mjcf import read_mjcf
+
+TEXT = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="0.1"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(TEXT)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("worker", "reason"),
+    [
+        ("import os; os.abort()", "MuJoCo ended without an answer"),
+        ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
+    ],
+)
+def test_a_reader_that_ends_or_hangs_is_said_and_nothing_else(
+    worker, reason, path, monkeypatch
+):
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    monkeypatch.setattr(comparison, "_WORKER", worker)
+    monkeypatch.setattr(comparison, "_LONGEST", 0.5 if "sleep" in worker else 60.0)
+    answer = comparison.compare(read_mjcf(path), path)
+    assert answer.why_not == reason
+    assert answer.agrees
+
+
+def test_without_mujoco_nothing_is_compared_and_that_is_said(
+    path, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    answer = convert(path, tmp_path / "robot.toml")
+    (told,) = answer.comparisons
+    assert told.why_not == "MuJoCo is not installed"
+    line = "robot.xml was compared with no other program: MuJoCo is not installed"
+    assert line in answer.text()
+
+
+def test_a_command_whose_file_is_read_otherwise_exits_with_1(
+    run, path, tmp_path, monkeypatch
+):
+    other = comparison.Comparison("MuJoCo", "robot.xml", "", 1, 1, 0, 0.3, "body a")
+    monkeypatch.setattr("assembly.exchange.foreign.compare", lambda *_: other)
+    status, out, _ = run("convert", path, "-o", tmp_path / "robot.toml")
+    assert status == 1
+    assert "MuJoCo reads robot.xml otherwise: body a differs by 0.3" in out
+    assert (tmp_path / "robot.toml").is_file()

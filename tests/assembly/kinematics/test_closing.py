@@ -1,0 +1,115 @@
+"""Closures that do not hold: a frame's error, or preloaded drives."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.closing import preloaded, rest_in
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import Frame, Robot
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+
+OFF = 1e-4  # [m] out of the plane of a four-bar: no motion takes it up
+
+
+def bent_four_bar():
+    """The four-bar with one link's end out of its plane."""
+    robot = load_robot("four_bar")
+    frames = tuple(
+        replace(f, translation=f.translation + [0, 0, OFF]) if f.name == "rocker" else f
+        for f in robot.frames
+    )
+    return replace(robot, frames=frames)
+
+
+def test_message_of_an_open_closure_offers_to_make_it_an_error():
+    with pytest.raises(BadInput, match=r"off by 0.0001 m with .*--rest NAME makes it"):
+        home_posture(bent_four_bar())
+
+
+def test_rest_of_a_closure_is_the_error_of_the_frame_that_is_named():
+    """A shift across the plane of motion is the same wherever it is counted."""
+    for name in ("end_coupler", "rocker"):
+        robot = rest_in(bent_four_bar(), name)
+        error = robot.errors[robot.index(name)]
+        assert np.abs(error[5]) == pytest.approx(OFF, rel=1e-6)
+        assert np.abs(np.delete(error, 5)).max() < 1e-9
+        assert home_posture(robot).mismatch < 1e-12
+
+
+def test_energy_does_not_depend_on_the_frame_that_takes_the_rest():
+    """It is one robot, whichever of its frames is called wrong."""
+    energies = [
+        solve_assembly(home_posture(rest_in(bent_four_bar(), name))).energy
+        for name in ("end_coupler", "rocker")
+    ]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("ankle", 'no frame "ankle"'), ("crank", "is in no loop that is open")],
+)
+def test_rest_in_a_frame_that_cannot_take_it_is_refused(name, message):
+    robot = bent_four_bar() if name == "ankle" else load_robot("four_bar")
+    with pytest.raises(BadInput, match=message):
+        rest_in(robot, name)
+
+
+def two_slides(first=2e6, second=3e6):
+    """One platform on two slides along x, one behind the other, both driven."""
+    turn = [0, np.pi / 2, 0]
+
+    def drive(name, stiffness):
+        K = np.diag([np.inf] * 5 + [stiffness])
+        return Frame(name, rotation=turn, joint="prismatic", actuated=True,
+                     position=0.3, joint_stiffness=K)  # fmt: skip
+
+    back = [0, -np.pi / 2, 0]
+    frames = (
+        drive("one", first), Frame("tip", "one", rotation=back),
+        drive("two", second), Frame("end", "two", rotation=back),
+    )  # fmt: skip
+    return Robot("slides", "tip", frames, (("tip", "end"),))
+
+
+@pytest.mark.parametrize("apart", [1e-5, -3e-3])
+def test_redundant_drives_are_preloaded_by_what_does_not_fit(apart):
+    """Two springs in series: E = d^2 / 2 k1 k2 / (k1 + k2), at the weighted mean."""
+    k = 2e6, 3e6
+    robot = preloaded(two_slides(*k), {"one": 0.35, "two": 0.35 + apart})
+    assembly = solve_assembly(home_posture(robot))
+    assert assembly.energy == pytest.approx(apart**2 / 2 * 1.2e6, rel=1e-9)
+    at = home_posture(robot).pose()["tx"] + assembly.platform_screw[3]
+    assert at == pytest.approx(0.35 + apart * k[1] / sum(k), abs=1e-12)
+    assert robot.remarks[-1].startswith("1 of 2 drives redundant")
+
+
+def test_redundant_drives_that_do_not_fit_are_told_the_way_out():
+    with pytest.raises(BadInput, match="1 of 2 drives redundant: with --mismatch spr"):
+        place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
+
+
+def test_rigid_drive_that_does_not_fit_is_refused_by_name():
+    robot = two_slides()
+    frames = tuple(
+        replace(f, joint_stiffness=None) if f.name == "two" else f for f in robot.frames
+    )
+    with pytest.raises(BadInput, match="drive two is rigid"):
+        preloaded(replace(robot, frames=frames), {"one": 0.3, "two": 0.3001})
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.05, 1.0])
+def test_closure_of_a_small_robot_holds_to_a_share_of_its_size(scale):
+    """A ten-thousandth of a small robot's size is no rounding, at any size."""
+    frames = (
+        Frame("tip", translation=[scale, 0, 0]),
+        Frame("post", translation=[scale, 1e-4 * scale, 0]),
+    )
+    with pytest.raises(BadInput, match="does not hold in the home pose"):
+        home_posture(Robot("gap", "tip", frames, (("tip", "post"),)))
+    frames = (frames[0], replace(frames[1], translation=[scale, 1e-7 * scale, 0]))
+    assert home_posture(Robot("gap", "tip", frames, (("tip", "post"),))).mismatch > 0

@@ -1,0 +1,88 @@
+"""Singular postures have no first-order verdict: solve, error and study say so."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import write_robot
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.model.robot import BeamLink
+from assembly.report.pose_errors import pose_error_of, pose_error_text
+from assembly.report.results import solution_of, solution_text
+from tests.linkages_for_tests import SLIDER_CRANK, slider_crank
+from tests.three_upu_for_tests import HEIGHT, three_upu
+from validation.study.report import verdict
+from validation.study.study import run_study
+from validation.study.study_file import read_study
+
+SAID = "singular posture: first order decides nothing; finite motions: 0 J"
+
+
+def test_solution_at_a_singular_posture_gives_the_energy_of_finite_motions():
+    """The modes that meet there let errors be taken up without force."""
+    results = solution_of(home_posture(three_upu(seed=1)))
+    assert results["energy"] > 1e-4
+    assert results["status"] == "singular"
+    assert results["reason"].startswith(SAID)
+    assert SAID in solution_text(results)
+
+
+def test_perfect_robot_at_a_singular_posture_stands_there():
+    results = solution_of(home_posture(three_upu()))
+    assert results["status"] == "ok"
+    assert results["energy"] == 0.0
+
+
+def test_solution_beside_the_singular_posture_is_that_of_first_order():
+    aside = {"tx": 0.05, "ty": 0.02, "tz": HEIGHT}
+    assert solution_of(place_robot(three_upu(seed=1), pose=aside))["status"] == "ok"
+
+
+@pytest.mark.parametrize("seed", [None, 1])
+def test_pose_error_at_a_singular_posture_has_no_bound_of_first_order(seed):
+    results = pose_error_of(home_posture(three_upu(seed)), ["frozen"])
+    assert results["status"] == "singular"
+    assert results["error"] is None
+    assert SAID in pose_error_text(results)
+
+
+def test_energy_that_only_finite_motions_see_is_no_first_order_verdict():
+    """Near its dead centre a short rod needs tension: k (e - s)^2 / 2.
+
+    By s = crank + rod - distance it could be shorter; first order turns the crank
+    through the dead centre and sees no force.
+    """
+    angle, short = 0.02, 2e-4
+    rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
+    crank, length = SLIDER_CRANK
+    down = math.asin(crank * math.sin(angle) / length)
+    slack = crank * (1 - math.cos(angle)) + length * (1 - math.cos(down))
+    stiffness = 70e9 * math.pi * 0.01**2 / length
+    results = solution_of(home_posture(slider_crank(angle, rod, -short)))
+    assert results["energy"] == pytest.approx(0.0, abs=1e-9)
+    assert results["status"] == "singular"
+    expected = stiffness * (short - slack) ** 2 / 2
+    said = re.search(r"finite motions: ([\d.e+-]+) J", results["reason"])
+    assert float(said[1]) == pytest.approx(expected, rel=1e-3)
+
+
+def test_motion_that_is_not_small_is_no_first_order_verdict():
+    """0.1 mm beside the singular axis first order turns the platform by radians."""
+    aside = {"tx": 1e-4, "ty": 0.0, "tz": HEIGHT}
+    results = solution_of(place_robot(three_upu(seed=1), pose=aside))
+    assert np.abs(results["platform_screw"][:3]).max() > 0.3
+    assert results["status"] == "singular"
+
+
+def test_study_at_a_singular_posture_does_not_pass(tmp_path):
+    write_robot(three_upu(seed=1), tmp_path / "snu.toml")
+    (tmp_path / "study.toml").write_text(
+        'robot = "snu.toml"\n[checks]\ncrosscheck = false\n', encoding="utf-8"
+    )
+    results = run_study(read_study(tmp_path / "study.toml", tmp_path / "out"))
+    assert not results.passed
+    assert results.error == {}
+    assert verdict(results).startswith(SAID[0].upper() + SAID[1:])
+    assert np.isfinite(results.solution["energy"])

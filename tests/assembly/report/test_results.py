@@ -1,0 +1,49 @@
+"""What solve prints: certified sizes, rounding left out, equal numbers in order."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.assembled import without_rounding
+from assembly.linear.load import massless
+from assembly.model.robot import Clearance, Frame, Robot
+from assembly.report.pose_errors import pose_error_of
+from assembly.report.results import solution_of, solution_text
+from assembly.robots import load_robot
+from forcefit.inputs.display import largest_row
+
+
+def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
+    """A bush of radius r and half length a lets its tip go hypot(r, a), no box."""
+    r, a = 3e-5, 4e-5
+    frames = (
+        Frame("bush", clearance=Clearance(radial=r, axial=a)), Frame("tip", "bush")
+    )  # fmt: skip
+    posture = home_posture(Robot("bush", "tip", frames))
+    results = solution_of(posture)
+    assert results["worst_error"]["translation"] == pytest.approx(5e-5, abs=1e-6)
+    certified = pose_error_of(posture, ["frozen"])["error"]["frozen"]["translation"]
+    assert results["worst_error"]["translation"] == certified["upper"]
+    assert "reading frozen of assembly error" in solution_text(results)
+
+
+def test_wrenches_leave_out_what_is_rounding_of_the_largest():
+    wrenches = np.array([[1e-13, 7.0, 0, 1.5e-14, 2e-8, 1e3], [0, 0, 5e-6, 0, 0, 0]])
+    shown = without_rounding(wrenches)
+    assert shown.tolist() == [[0, 7.0, 0, 0, 0, 1e3], [0, 0, 5e-6, 0, 0, 0]]
+    assert without_rounding(np.full((2, 6), 1e-14)).any() == np.False_
+
+
+@pytest.mark.parametrize("noise", [1e-15, -1e-15])
+def test_first_of_equal_numbers_is_the_largest_whatever_rounding_says(noise):
+    assert largest_row([0.5, 1.0, 1.0 + noise, 0.2]) == 1
+
+
+def test_gravity_on_a_robot_without_mass_is_said_to_change_nothing():
+    robot = load_robot("irsbot2")
+    (remark,) = massless(robot, [0, 0, -9.81])
+    assert remark.startswith("nothing has a mass: gravity changes nothing")
+    assert massless(robot, None) == massless(robot, [0, 0, 0]) == []
+    assert massless(load_robot("hexapod"), [0, 0, -9.81]) == []
+    results = solution_of(home_posture(robot), gravity=[0, 0, -9.81])
+    assert remark in results["remarks"]

@@ -1,0 +1,83 @@
+"""Effects linearised together, against the finite motion of a drive and a bar."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.measurement.predict import with_second_order
+from tests.bar_for_tests import BEAM, LENGTH, bar
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.relinearise import Relinearisation
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.states import Fitting
+
+TURN, LONGER = 6e-3, 5e-3
+CAMPAIGN = bar(link=BEAM, rows=20, spread=5.0)
+
+
+@pytest.fixture(scope="module")
+def columns():
+    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+
+
+def moved():
+    """(120,) whitened readings of a turned drive and a longer bar, finite motions."""
+    q = CAMPAIGN.coordinates[:, 0]
+    still = np.zeros_like(q)
+    place = [
+        length * np.column_stack([np.cos(angle), np.sin(angle), still])
+        for angle, length in ((q + TURN, LENGTH + LONGER), (q, LENGTH))
+    ]
+    turn = np.column_stack([still, still, still + TURN])
+    return (np.hstack([turn, place[0] - place[1]]) / CAMPAIGN.sigma).ravel()
+
+
+def effects(columns):
+    names = {"encoder_offset": TURN, "link_length": LONGER}
+    found = [e for e in columns.library if e.name in names]
+    return found, [np.array([names[e.name]]) for e in found]
+
+
+def test_effects_together_move_the_bar_by_finite_motions(columns):
+    elements, xs = effects(columns)
+    assert columns.combined(elements, xs) == pytest.approx(moved(), abs=0.02)
+
+
+def test_linearised_elements_are_exact_at_their_values(columns):
+    elements, xs = effects(columns)
+    again = columns.again(elements, xs)
+    total = sum(
+        e.columns @ ((x - e.begin)[e.slots] / e.scale)
+        + (0.0 if e.offset is None else e.offset)
+        for e, x in zip(again, xs, strict=True)
+    )
+    assert total == pytest.approx(moved(), abs=0.02)
+    assert [e.origin for e in again] == elements
+
+
+def test_a_model_finds_values_that_a_linear_one_misses(columns):
+    elements, xs = effects(columns)
+    z = moved() + np.random.default_rng(0).normal(size=120)
+    fit = Fitting(columns, z, np.ones(120, dtype=bool), np.ones(120))
+    first = fit.state(tuple(elements), (False, False))
+    last = Relinearisation(columns, fit).relinearised(first)
+    assert last.score > first.score + 3
+    for k, (e, x) in enumerate(zip(last.elements, xs, strict=True)):
+        mean = last.sizes.mean[last.own(k)]
+        spread = np.sqrt(last.sizes.covariance[last.own(k), last.own(k)])[0] * e.scale
+        assert abs(e.values(mean) - x) < 4 * spread
+
+
+def test_a_spring_that_is_a_drives_compliance_is_no_nuisance(columns):
+    loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
+    known = Columns(loaded, with_second_order(conditions_of(loaded)))
+    small, robot = known.nuisance, CAMPAIGN.robot
+    springs = {
+        (robot.frames[f].name, int(axis))
+        for f, axis in zip(
+            small.frame[small.spring], small.axis[small.spring], strict=True
+        )
+    }
+    assert ("drive", 2) not in springs
+    assert "drive_compliance" in {e.name for e in known.library}
