@@ -112,7 +112,7 @@ def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
     assert abs(value - 3e5) < 3 * std
 
 
-def test_noise_that_repeats_show_to_be_larger_is_told(tmp_path):
+def test_noise_that_repeats_show_to_be_larger_is_told(diagnosed, tmp_path):
     """Three times what is stated: errors stay in the sigma stated, no cause named."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
@@ -126,6 +126,7 @@ def test_noise_that_repeats_show_to_be_larger_is_told(tmp_path):
     # 48 rows repeat one of 16 configurations under the same conditions
     assert found.lack.repeats == pytest.approx(3.0, rel=4 / np.sqrt(2 * 6 * 36))
     assert "not repeatable" in text(found)
+    assert "not repeatable" not in text(diagnosed("none"))
 
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
