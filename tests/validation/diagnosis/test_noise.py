@@ -50,7 +50,8 @@ def test_repeats_scatter_by_their_own_mean():
 
 
 @pytest.mark.parametrize(("tau", "repeats", "told"), [
-    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["residual"]), (0.4, (0.5, 40), ["residual"]),
+    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["residual"]),
+    (0.4, (0.5, 40), ["residual"]),
     (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
 ])  # fmt: skip
 def test_noise_is_told_of_where_it_is_not_as_stated(tau, repeats, told):
