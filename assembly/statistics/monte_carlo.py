@@ -219,4 +219,8 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         labels |= {"wrench_component": list(WRENCH), "motion": np.arange(6)}
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
-    return xarray.Dataset(variables, labels, provenance(experiment) | at)
+    data = xarray.Dataset(variables, labels, provenance(experiment) | at)
+    if experiment.links:
+        errors = np.array(experiment.stress_errors)
+        data["stress"].attrs["estimated_relative_error"] = errors
+    return data
