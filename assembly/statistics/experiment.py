@@ -109,6 +109,13 @@ class Experiment:
             return ()
         return tuple(link.frame for link in stressed_links(self.posture.robot))
 
+    @property
+    def stress_errors(self) -> list[float]:
+        """[1] of each link's stress, the mesh's estimated relative error."""
+        if not self.stress:
+            return []
+        return [x.relative_error for x in stressed_links(self.posture.robot)]
+
     @cached_property
     def record_type(self) -> np.dtype:
         """Type of a record: the quantities of one draw."""

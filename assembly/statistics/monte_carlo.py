@@ -224,4 +224,8 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     pose = experiment.posture.pose()
     at = {f"pose.{k}": pose[k] for k in POSE if k in pose}
     alone = {"perfect_parts": stored_perfect_parts(experiment)}
-    return xarray.Dataset(variables, labels, provenance(experiment) | at | alone)
+    data = xarray.Dataset(variables, labels, provenance(experiment) | at | alone)
+    if experiment.links:
+        errors = np.array(experiment.stress_errors)
+        data["stress"].attrs["estimated_relative_error"] = errors
+    return data

@@ -109,6 +109,9 @@ def summarise(
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
         with np.errstate(divide="ignore"):  # endless without any stress
             report["safety"] = strength / largest
+        errors = data["stress"].attrs.get("estimated_relative_error")
+        if errors is not None:
+            report["stress_error"] = np.atleast_1d(errors)
     if "stiffness" in data:
         report["stiffness"] = stiffness_report(
             data["stiffness"].values[solved],

@@ -13,6 +13,7 @@ from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import draws_dataset
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import sweep_in_memory
@@ -80,6 +81,8 @@ def test_finite_elements_agree_with_the_beam_away_from_the_ends():
     expected = [1000 / (np.pi * r**2), 4000 * (0.452 - r) / (np.pi * r**3)]
     found = peak_stresses(robot, w)[:, 0]
     assert 1.0 <= found[0] / expected[0] <= 1.05
+    # of unit wrenches, bending and torsion among them
+    assert 0.001 < stressed_links(robot)[0].relative_error < 0.2
     assert found[1] == pytest.approx(expected[1], rel=0.03)
     beam = replace(frame, link=BeamLink({"radius": r}, 6e10, 0.3))
     whole = peak_stresses(Robot("one", "distal", (beam,)), w)[:, 0]
@@ -131,6 +134,8 @@ def test_sweeps_and_draws_know_the_stress_of_a_links_own_weight():
     experiment = Experiment(home_posture(robot), sources, gravity=gravity)
     rows = experiment.solve(0, 2)
     np.testing.assert_allclose(rows["stress"][:, 0], expected, rtol=1e-9)
+    errors = draws_dataset(experiment, rows)["stress"].attrs["estimated_relative_error"]
+    assert errors.tolist() == [0.0]  # a formula has no mesh
     weight = 7850 * 0.02**2 * 9.81  # through the drive
     np.testing.assert_allclose(rows["force"], weight, rtol=1e-9)
     np.testing.assert_allclose(rows["moment"], weight / 2, rtol=1e-9)
