@@ -33,6 +33,7 @@ _OF_NAME = 2  # models in the beam with the same names
 _LOOKED = 2  # models of the beam for which functions are scored
 _FORMS = 4  # models whose function is tried in all forms
 _VARIABLES = 4  # variables whose products with others are scored
+_WIDEST = 60  # most columns of a function at several places
 _DROP = 1.0  # log posterior by which a larger model may be worse
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 _ROUNDS = 3  # of exchanges
@@ -163,6 +164,7 @@ class Search:
         made = [(one.score, self._element(one)) for one in found[:_BEAM]]
         best += [(w, e) for w, e in made if e is not None and e not in state.elements]
         best.sort(key=lambda one: -one[0])
+        state.forget()
         begin = state.score - MORE
         return [(begin + w, e) for w, e in best[: _BEAM + 2]]
 
@@ -214,11 +216,13 @@ class Search:
         if len(one.parts) == 1:
             found = self.look(base, [(variables, tuple(priors))], most=4)
             return [self._element(f) for f in found]
-        tried = [Candidate(one.parts, one.kind, shape) for shape in priors]
-        made = [
-            self._made.setdefault(c, self.functions.element(c, priors[c.shape]))
-            for c in tried
+        count = sum(len(part.components) for part in one.parts)
+        tried = [
+            Candidate(one.parts, one.kind, shape)
+            for shape in priors
+            if len(shape.names) * count <= _WIDEST
         ]
+        made = (self.functions.element(c, priors[c.shape]) for c in tried)
         shown = [e for e in made if e is not None]
         dense = Dense(shown, self.fit.cells, self.fit.root)
         score = dense.gains(base.marginal, FREEDOM) + [e.log_prior for e in shown]

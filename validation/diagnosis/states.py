@@ -76,6 +76,11 @@ class State:
         X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
         return marginalise(X, self.sizes.std, z, flat)
 
+    def forget(self) -> None:
+        """Release the memory of the marginal model; it is recomputed if needed."""
+        for name in ("marginal", "sample_marginal"):
+            self.__dict__.pop(name, None)
+
     @cached_property
     def fitted(self) -> NDArray:
         """(n,) contribution of the model to the readings, whitened and weighted."""
