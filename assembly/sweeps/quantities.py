@@ -167,7 +167,7 @@ def variables(question: Question) -> dict[str, Variable]:
             {}, "1", "energy, linear minus exact, relative to the exact one"
         )
     table["joint_coordinate"] = Variable(
-        {"joint": _moving(question.robot)}, "rad, m",
+        {"joint": _moving(question.robot)}, "rad or m",
         "nominal, of every joint, also where the status is not ok",
     )  # fmt: skip
     return table
