@@ -80,7 +80,7 @@ class Facets:
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
     """(e, 3) [m] 4 times the lifts of edges' middles, by planes at their corners."""
-    # limited to the smaller one where the planes at both ends rise differently, and none
+    # limited to the smaller one where the planes at both ends differ, and to none
     # where one rises and one falls: there a flat side meets a rounding
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([

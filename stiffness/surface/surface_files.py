@@ -1,7 +1,9 @@
 """Readers of surface files."""
 
 import io
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Generator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,15 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 
 STEP = (".step", ".stp")
 _FACETS = 48  # of a full circle, in STEP
+_ALL, _AND = "*", "+"  # all solids of a STEP file, several, as one
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
     """A surface file, and which of the solids of a STEP file is meant.
 
     Args:
-        path: of a file, or ``part.step#name``.
+        path: of a file, or ``part.step#name``; ``part.step#one+other`` or
+            ``part.step#*`` of several solids as one.
 
     Returns:
         The file, and the name; empty where none is given.
@@ -118,8 +122,51 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
     return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 
 
-def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """A solid of a STEP file cut into fine triangles, in metres by its own unit."""
+@dataclass(frozen=True)
+class StepSolid:
+    """A solid of a STEP file.
+
+    Attributes:
+        name: as ``part.step#name`` takes it.
+        volume: [m^3].
+        low: (3,) [m] the bounding box's lower corner.
+        high: (3,) [m] its upper one.
+    """
+
+    name: str
+    volume: float
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+def step_solids(path: Path | str) -> list[StepSolid]:
+    """List the solids of a STEP file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The solids in the file's order, in metres by its own unit.
+
+    Raises:
+        BadInput: the file cannot be read, holds no solid, or gmsh is not installed.
+    """
+    path = Path(path)
+    with _gmsh_model(path) as model:
+        solids = _solids(model)
+        boxes = {name: model.getBoundingBox(3, tag) for name, tag in solids.items()}
+        volumes = {n: float(model.occ.getMass(3, tag)) for n, tag in solids.items()}
+    if not solids:
+        raise BadInput(f"{path}: found no solid, expected one or more")
+    return [
+        StepSolid(name, volumes[name], tuple(box[:3]), tuple(box[3:]))
+        for name, box in boxes.items()
+    ]
+
+
+@contextmanager
+def _gmsh_model(path: Path) -> Generator[Any, None, None]:
+    """Gmsh's model of a STEP file, in metres."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -133,35 +180,71 @@ def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
-        gmsh.open(str(path))
-        sides = _sides(gmsh.model, path, solid)
-        gmsh.model.mesh.generate(2)
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        corners = np.concatenate([
-            gmsh.model.mesh.getElementsByType(2, side)[1] for side in sides
-        ])
+        try:
+            gmsh.open(str(path))
+        except Exception as error:  # gmsh has no class of its own for what it refuses
+            raise BadInput(f"{path}: not a readable STEP file") from error
+        yield gmsh.model
     finally:
         gmsh.finalize()
+
+
+def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
+    """A solid of a STEP file cut into fine triangles, in metres by its own unit."""
+    with _gmsh_model(path) as model:
+        sides = _sides(model, path, solid)
+        model.mesh.generate(2)
+        tags, points, _ = model.mesh.getNodes()
+        corners = np.concatenate([
+            model.mesh.getElementsByType(2, side)[1] for side in sides
+        ])
     used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
     index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
     index[tags.astype(np.int64)] = np.arange(len(tags))
     return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
 
 
-def _sides(model: Any, path: Path, solid: str) -> list[int]:
-    """Faces of the solid that is meant, which must be named if there are several."""
+def _solids(model: Any) -> dict[str, int]:
+    """Tags of a model's solids by name."""
     solids = dict[str, int]()
     for _, tag in model.getEntities(3):
         own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
         solids[own if own not in solids else f"{own}-{tag}"] = tag
-    if solid and solid not in solids:
-        raise BadInput(f"{path}: no solid {quoted(solid)}{nearest(solid, solids)}")
+    return solids
+
+
+def _sides(model: Any, path: Path, solid: str) -> list[int]:
+    """Faces of the solid that is meant, which must be named if there are several."""
+    solids = _solids(model)
+    several = list(solids) if solid == _ALL else solid.split(_AND)
+    unknown = [] if solid in solids else [n for n in several if n not in solids]
+    if solid and unknown:
+        hint = nearest(unknown[0], solids)
+        raise BadInput(f"{path}: no solid {quoted(unknown[0])}{hint}")
     if not solid and len(solids) > 1:
         names = ", ".join(list(solids)[:20])
         raise BadInput(
             f"{path}: found {len(solids)} solids ({names}), expected which one, such "
-            f"as {path.name}#{next(iter(solids))}"
+            f"as {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
+            f"them as one; forcefit stiffness solids {path.name} lists them"
         )
     if not solid:  # one, or faces that belong to none
         return [tag for _, tag in model.getEntities(2)]
-    return [tag for _, tag in model.getBoundary([(3, solids[solid])], oriented=False)]
+    chosen = [solids[solid]] if solid in solids else [solids[n] for n in several]
+    if len(chosen) > 1:
+        chosen = _fused(model, path, chosen)
+    return [tag for _, tag in model.getBoundary([(3, chosen[0])], oriented=False)]
+
+
+def _fused(model: Any, path: Path, tags: list[int]) -> list[int]:
+    """The one solid that several become when they are united."""
+    solids = [(3, tag) for tag in tags]
+    united, _ = model.occ.fuse(solids[:1], solids[1:])
+    model.occ.synchronize()
+    volumes = [tag for dimension, tag in united if dimension == 3]
+    if len(volumes) != 1:
+        raise BadInput(
+            f"{path}: {len(tags)} solids unite to {len(volumes)} bodies, expected one: "
+            "solids of one link must touch"
+        )
+    return volumes

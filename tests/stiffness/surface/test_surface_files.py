@@ -11,7 +11,7 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import read_surface
-from stiffness.surface.surface_files import _sides
+from stiffness.surface.surface_files import _sides, step_solids
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
 SIDES = [
@@ -165,6 +165,39 @@ def test_of_several_solids_one_is_read_by_its_name(tmp_path):
     assert volumes == pytest.approx(exact, rel=4e-3)
     with pytest.raises(BadInput, match='no solid "screw"'):
         read_surface(f"{path}#screw")
+
+
+TOUCHING = """
+import sys
+import gmsh
+gmsh.initialize(interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+gmsh.model.occ.addBox(0, 0, 0, 20, 30, 40)
+gmsh.model.occ.addBox(5, 5, 40, 10, 10, 50)
+gmsh.model.occ.addBox(100, 0, 0, 1, 1, 1)
+gmsh.model.occ.synchronize()
+gmsh.write(sys.argv[1])
+"""
+
+
+def test_solids_are_listed_and_several_that_touch_are_read_as_one(tmp_path):
+    """Boxes of 20 x 30 x 40, 10 x 10 x 50 on it, and 1 x 1 x 1 mm apart."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    path = tmp_path / "three.step"
+    script = [sys.executable, "-c", TOUCHING, str(path)]
+    subprocess.run(script, check=True, capture_output=True)
+    solids = step_solids(path)
+    assert [s.volume for s in solids] == pytest.approx([24e-6, 5e-6, 1e-9], rel=1e-6)
+    assert solids[1].low == pytest.approx((0.005, 0.005, 0.04), abs=1e-6)
+    assert solids[1].high == pytest.approx((0.015, 0.015, 0.09), abs=1e-6)
+    one, other, apart = (s.name for s in solids)
+    united = read_surface(f"{path}#{one}+{other}")
+    assert united.volume == pytest.approx(29e-6, rel=1e-9)
+    for whole in (f"{one}+{apart}", "*"):
+        with pytest.raises(BadInput, match="solids unite to 2 bodies, expected one"):
+            read_surface(f"{path}#{whole}")
+    with pytest.raises(BadInput, match='no solid "screw"'):
+        read_surface(f"{path}#{one}+screw")
 
 
 @pytest.mark.parametrize("binary", [0, 1])
