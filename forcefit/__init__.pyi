@@ -3,7 +3,9 @@
 from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
 from assembly.exchange.robot_files import load_robot, read_robot, write_robot
+from assembly.kinematics.closing import preloaded, rest_in
 from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.kinematics.singular_posture import is_singular
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import PoseError, bound_pose_error
@@ -78,6 +80,7 @@ __all__ = [
     "foretell",
     "home_posture",
     "inspect_campaign",
+    "is_singular",
     "load_deflection",
     "load_robot",
     "look_up",
@@ -89,6 +92,7 @@ __all__ = [
     "place_robot",
     "platform_stiffness",
     "point_table",
+    "preloaded",
     "read_campaign",
     "read_commands",
     "read_library",
@@ -96,6 +100,7 @@ __all__ = [
     "read_sources",
     "read_study",
     "rectangular_section",
+    "rest_in",
     "round_section",
     "run_draws",
     "run_study",

@@ -195,6 +195,27 @@ def fea(
 
 
 @app.command()
+def solids(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="STEP.")],
+    json: JsonOption = None,
+) -> None:
+    """The solids of a STEP file: name, volume, bounding box."""
+    from dataclasses import asdict
+
+    from stiffness.surface.surface_files import step_solids
+
+    found = step_solids(file)
+    write_json({"solids": [asdict(solid) for solid in found]}, json)
+    if json != "-":
+        for solid in found:
+            box = ", ".join(
+                f"{k} = {a:.5g} .. {b:.5g}"
+                for k, a, b in zip("xyz", solid.low, solid.high, strict=True)
+            )
+            print(f"{solid.name}: {solid.volume:.5g} m^3, {box} m")
+
+
+@app.command()
 def compare(
     surface: Surface,
     base: Base,

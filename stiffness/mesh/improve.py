@@ -58,8 +58,10 @@ def fitted(solid: Solid) -> Solid:
             return moved
         moved = _relaxed(_split_inside(moved, poor), poor)
     safe = moved_onto_shapes(solid)
-    better = element_quality(moved).min() > min(poor / 8, element_quality(safe).min())
-    return moved if better else safe
+    quality, other = element_quality(moved), element_quality(safe)
+    better = (quality < poor).sum() <= (other < poor).sum()
+    proper = quality.min() > min(poor / 1e3, other.min())
+    return moved if better and proper else safe
 
 
 def _split_inside(solid: Solid, limit: float) -> Solid:

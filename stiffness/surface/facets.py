@@ -1,8 +1,9 @@
 """A curved patch of no known shape, smoothed by Phong tessellation.
 
 Between the corners a facet is lifted by half of the mean of the projections onto the
-corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation).  On an arc of
-half-angle a this leaves a^4 of the radius where a flat facet leaves a^2.
+corners' tangent planes (Boubekeur & Alexa 2008, Phong tessellation), along each edge by
+the lower of the two.  On an arc of half-angle a this leaves a^4 of the radius where a
+flat facet leaves a^2.
 """
 
 from dataclasses import dataclass, field
@@ -51,14 +52,9 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """(e,) [m] lifts at the middles of edges (e, 2) between two points."""
-        half = (self.points[edges[:, 0]] - self.points[edges[:, 1]]) / 2
-        rises = [
-            np.einsum("ei,ei->e", sign * half, self.normals[edges[:, k]])[:, None]
-            * self.normals[edges[:, k]]
-            for k, sign in ((0, 1), (1, -1))
-        ]
-        return np.asarray(np.linalg.norm(rises[0] + rises[1], axis=1) / 4)
+        """(e,) [m] lifts at the middles of edges (e, 2), by both ends' planes."""
+        rises = _rises(self.points[edges], self.normals[edges], limited=False)
+        return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
     def lifts(self) -> NDArray:
         """(m,) [m] the largest lift of each facet at the middles of its edges."""
@@ -72,11 +68,29 @@ class Facets:
         foot = np.atleast_2d(foot)
         corners, normals = self.points[members], self.normals[members]
         share = _barycentric(corners, foot)
-        height = np.einsum("pci,pci->pc", corners - foot[:, None], normals)
-        lift = 0.5 * np.einsum("pc,pc,pci->pi", share, height, normals)
+        lift = np.zeros_like(foot)
+        for k in range(3):
+            pair = [k, (k + 1) % 3]
+            rise = _rises(corners[:, pair], normals[:, pair], limited=True)
+            lift += share[:, pair].prod(axis=1, keepdims=True) * rise
         facing = np.einsum("pc,pci->pi", share, normals)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         return np.einsum("pi,pi->p", points - foot - lift, facing), facing
+
+
+def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
+    """(e, 3) [m] 4 times the lifts of edges' middles, by planes at their corners."""
+    # limited to the smaller one where the planes at both ends differ, and to none
+    # where one rises and one falls: there a flat side meets a rounding
+    along = corners[:, 0] - corners[:, 1]
+    heights = np.stack([
+        np.einsum("ei,ei->e", sign * along, normals[:, k])
+        for k, sign in ((0, 1), (1, -1))
+    ])
+    if limited:
+        same = (heights[0] * heights[1] > 0) * np.sign(heights[0])
+        heights = np.tile(same * np.abs(heights).min(axis=0), (2, 1))
+    return np.asarray(np.einsum("ke,eki->ei", heights, normals) / 2)
 
 
 def _barycentric(corners: NDArray, points: NDArray) -> NDArray:

@@ -30,6 +30,7 @@ _STEP = 2e-3  # [rad] between two angles that count as different
 _MANY = 5  # steps between angles; more are on one circle by no coincidence
 _EVEN = 0.75  # facets this share of the widest are as wide
 _LIFT = 4.0  # times the usual lift of a part's facets: a face or edge is straight
+_RULING = 2.0  # times it: a ruling of a cone, no edge of a facet that is bent
 _NO_LIFT = 0.01  # times it: straight as well
 
 
@@ -107,8 +108,9 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
             continue
         shape = fit(points, normals)
         if _lies_on(shape, points, graph):
-            if len(points) < _CONE and isinstance(shape, Cone):
-                return shape if abs(shape.slope) < _CYLINDER else None
+            straight = not isinstance(shape, Cone) or abs(shape.slope) < _CYLINDER
+            if len(points) < _CONE and not straight:
+                return None
             return shape if _is_faceted(shape, points) else None
     return None
 
@@ -242,7 +244,7 @@ def _is_straight(
     if rings > 2:
         return True
     share = lifts.share(graph.ends[rulings]) if len(rulings) else 0.0
-    return not _NO_LIFT < share < _LIFT
+    return not _NO_LIFT < share < _RULING
 
 
 def ring(

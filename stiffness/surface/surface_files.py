@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,8 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
     """A surface file, and which of the solids of a STEP file is meant.
 
     Args:
-        path: of a file, or ``part.step#name``.
+        path: of a file, or ``part.step#name``; ``part.step#one+other`` or
+            ``part.step#*`` of several solids as one.
 
     Returns:
         The file, and the name; empty where none is given.
@@ -55,25 +57,66 @@ def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]
     path = Path(path)
     if path.suffix.lower() == ".stl":
         return read_stl(path)
-    points, faces = _in_own_process(path, solid)
+    read = _in_own_process("triangles", path, solid)
+    points, faces = read["points"], read["faces"]
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         kind = path.suffix[1:].upper()
         raise BadInput(f"{path}: holds no triangles, or is not {kind}")
     return points, faces.astype(np.int64)
 
 
-def _in_own_process(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """Points and faces by a reader that may crash, hang or want all memory."""
+@dataclass(frozen=True)
+class StepSolid:
+    """A solid of a STEP file.
+
+    Attributes:
+        name: as ``part.step#name`` takes it.
+        volume: [m^3].
+        low: (3,) [m] the bounding box's lower corner.
+        high: (3,) [m] its upper one.
+    """
+
+    name: str
+    volume: float
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+def step_solids(path: Path | str) -> list[StepSolid]:
+    """List the solids of a STEP file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The solids in the file's order, in metres by its own unit.
+
+    Raises:
+        BadInput: the file cannot be read, holds no solid, or gmsh is not installed.
+    """
+    read = _in_own_process("solids", Path(path))
+    if not len(read["names"]):
+        raise BadInput(f"{path}: found no solid, expected one or more")
+    return [
+        StepSolid(str(name), float(volume), tuple(box[:3]), tuple(box[3:]))
+        for name, volume, box in zip(
+            read["names"], read["volumes"], read["boxes"].tolist(), strict=True
+        )
+    ]
+
+
+def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
+    """Arrays by a reader that may crash, hang or want all memory."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
         # -P: modules of the folder it runs in are not to be taken for others'
         module = "stiffness.surface.surface_worker"
-        command = [sys.executable, "-P", "-m", module, str(path), str(made), solid]
+        command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}
         try:
             subprocess.run(
-                command,
+                [*command, solid],
                 timeout=_TIME_LIMIT,
                 capture_output=True,
                 stdin=subprocess.DEVNULL,
@@ -85,9 +128,10 @@ def _in_own_process(path: Path, solid: str) -> tuple[NDArray, NDArray]:
                 f"{path}: not read after {_TIME_LIMIT:g} s as {kind}"
             ) from None
         try:
-            stored = np.load(io.BytesIO(made.read_bytes()), allow_pickle=False)
+            with np.load(io.BytesIO(made.read_bytes()), allow_pickle=False) as stored:
+                arrays = dict(stored)
         except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             raise BadInput(f"{path}: not a readable {kind} file") from None
-        if "refused" in stored:
-            raise BadInput(str(stored["refused"]))
-        return stored["points"], stored["faces"]
+        if "refused" in arrays:
+            raise BadInput(str(arrays["refused"]))
+        return arrays

@@ -1,8 +1,8 @@
 """The readers that may end their process: VTK, meshio and gmsh on a file of a user.
 
-``python -m stiffness.surface.surface_worker FILE READ.npz [SOLID]``
+``python -m stiffness.surface.surface_worker triangles|solids FILE READ.npz [SOLID]``
 
-:func:`stiffness.surface.surface_files.read_triangles` runs this in a process of its
+:mod:`stiffness.surface.surface_files` runs this in a process of its
 own; a damaged file ends that one alone.
 """
 
@@ -13,26 +13,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.inputs.table import BadInput
 from stiffness.surface.obj_file import read_obj
+from stiffness.surface.step_file import read_solids, read_step
 
-_FACETS = 48  # of a full circle, in STEP
 
-
-def main(path: Path, made: Path, solid: str = "") -> None:
-    """Read a file and write its points and triangles, or why it is refused.
+def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
+    """Read a file and write what is wanted of it, or why it is refused.
 
     Args:
+        wanted: "triangles", or "solids" of a STEP file.
         path: of an existing file.
-        made: ``points`` (n, 3) and ``faces`` (m, 3); or ``refused``, one line.
+        made: ``points`` (n, 3) and ``faces`` (m, 3); or ``names`` (n,), ``volumes``
+            (n,) and ``boxes`` (n, 6); or ``refused``, one line.
         solid: of a STEP file with several, by its name.
     """
     _limit_memory()
-    read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
     try:
+        if wanted == "solids":
+            names, volumes, boxes = read_solids(path)
+            np.savez(made, names=names, volumes=volumes, boxes=boxes)
+            return
         if path.suffix.lower() in {".step", ".stp"}:
-            points, faces = _step(path, solid)
+            points, faces = read_step(path, solid)
         else:
+            read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
             points, faces = read(path)
     except BadInput as error:
         np.savez(made, refused=str(error))
@@ -121,59 +126,5 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
     return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 
 
-def _step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """A solid of a STEP file cut into fine triangles, in metres by its own unit."""
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:
-        reason = "" if isinstance(error, ImportError) else f" ({error})"
-        raise BadInput(
-            f"{path}: STEP needs the package gmsh{reason}; install forcefit[gmsh], or "
-            "export the surface as STL"
-        ) from None
-    try:
-        gmsh.initialize(interruptible=False)
-    except Exception as error:  # its Python file without its library
-        raise BadInput(
-            f"{path}: STEP needs the package gmsh, which does not start: {error}"
-        ) from None
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
-        gmsh.open(str(path))
-        sides = _sides(gmsh.model, path, solid)
-        gmsh.model.mesh.generate(2)
-        tags, points, _ = gmsh.model.mesh.getNodes()
-        corners = np.concatenate([
-            gmsh.model.mesh.getElementsByType(2, side)[1] for side in sides
-        ])
-    finally:
-        gmsh.finalize()
-    used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
-    index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
-    index[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
-
-
-def _sides(model: Any, path: Path, solid: str) -> list[int]:
-    """Faces of the solid that is meant, which must be named if there are several."""
-    solids = dict[str, int]()
-    for _, tag in model.getEntities(3):
-        own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
-        solids[own if own not in solids else f"{own}-{tag}"] = tag
-    if solid and solid not in solids:
-        raise BadInput(f"{path}: no solid {quoted(solid)}{nearest(solid, solids)}")
-    if not solid and len(solids) > 1:
-        names = ", ".join(list(solids)[:20])
-        raise BadInput(
-            f"{path}: found {len(solids)} solids ({names}), expected which one, such "
-            f"as {path.name}#{next(iter(solids))}"
-        )
-    if not solid:  # one, or faces that belong to none
-        return [tag for _, tag in model.getEntities(2)]
-    return [tag for _, tag in model.getBoundary([(3, solids[solid])], oriented=False)]
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), *sys.argv[3:])
+    main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), *sys.argv[4:])

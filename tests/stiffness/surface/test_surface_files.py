@@ -11,8 +11,9 @@ from stiffness.surface import surface_files
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Cone, Plane
+from stiffness.surface.step_file import read_step, sides
 from stiffness.surface.surface import read_surface
-from stiffness.surface.surface_worker import _sides, _step
+from stiffness.surface.surface_files import step_solids
 from tests.solids_for_tests import cylinder
 
 CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
@@ -103,7 +104,7 @@ def test_step_without_gmsh_says_what_to_install(tmp_path, monkeypatch):
     path = tmp_path / "part.step"
     path.write_text("ISO-10303-21;")
     with pytest.raises(BadInput, match=r"install forcefit\[gmsh\], or export .* STL"):
-        _step(path, "")
+        read_step(path, "")
 
 
 @pytest.fixture
@@ -167,6 +168,39 @@ def test_of_several_solids_one_is_read_by_its_name(tmp_path):
     assert volumes == pytest.approx(exact, rel=4e-3)
     with pytest.raises(BadInput, match='no solid "screw"'):
         read_surface(f"{path}#screw")
+
+
+TOUCHING = """
+import sys
+import gmsh
+gmsh.initialize(interruptible=False)
+gmsh.option.setNumber("General.Terminal", 0)
+gmsh.model.occ.addBox(0, 0, 0, 20, 30, 40)
+gmsh.model.occ.addBox(5, 5, 40, 10, 10, 50)
+gmsh.model.occ.addBox(100, 0, 0, 1, 1, 1)
+gmsh.model.occ.synchronize()
+gmsh.write(sys.argv[1])
+"""
+
+
+def test_solids_are_listed_and_several_that_touch_are_read_as_one(tmp_path):
+    """Boxes of 20 x 30 x 40, 10 x 10 x 50 on it, and 1 x 1 x 1 mm apart."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    path = tmp_path / "three.step"
+    script = [sys.executable, "-c", TOUCHING, str(path)]
+    subprocess.run(script, check=True, capture_output=True)
+    solids = step_solids(path)
+    assert [s.volume for s in solids] == pytest.approx([24e-6, 5e-6, 1e-9], rel=1e-6)
+    assert solids[1].low == pytest.approx((0.005, 0.005, 0.04), abs=1e-6)
+    assert solids[1].high == pytest.approx((0.015, 0.015, 0.09), abs=1e-6)
+    one, other, apart = (s.name for s in solids)
+    united = read_surface(f"{path}#{one}+{other}")
+    assert united.volume == pytest.approx(29e-6, rel=1e-9)
+    for whole in (f"{one}+{apart}", "*"):
+        with pytest.raises(BadInput, match="solids unite to 2 bodies, expected one"):
+            read_surface(f"{path}#{whole}")
+    with pytest.raises(BadInput, match='no solid "screw"'):
+        read_surface(f"{path}#{one}+screw")
 
 
 @pytest.mark.parametrize("binary", [0, 1])
@@ -236,16 +270,16 @@ class Model:
 
 def test_the_faces_are_those_of_the_solid_that_is_named(tmp_path):
     path = tmp_path / "arm.step"
-    assert _sides(Model(arm=[1, 2]), path, "") == [1, 2]
+    assert sides(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
-    assert _sides(both, path, "bolt") == [3]
-    assert _sides(both, path, "bolt-13") == [4, 5]
-    assert _sides(both, path, "solid14") == [6]
+    assert sides(both, path, "bolt") == [3]
+    assert sides(both, path, "bolt-13") == [4, 5]
+    assert sides(both, path, "solid14") == [6]
     with pytest.raises(BadInput, match=r"no solid .*bolz.*bolt"):
-        _sides(both, path, "bolz")
+        sides(both, path, "bolz")
     several = r"found 4 solids \(arm, bolt, bolt-13, solid14\).*arm\.step#arm"
     with pytest.raises(BadInput, match=several):
-        _sides(both, path, "")
+        sides(both, path, "")
     crowd = Model(**{f"part{k}": [k] for k in range(25)})
     with pytest.raises(BadInput, match=r"found 25 solids .*part19\)"):
-        _sides(crowd, path, "")
+        sides(crowd, path, "")
