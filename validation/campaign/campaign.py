@@ -126,6 +126,16 @@ class Campaign:
         places = {**self.points, "": self.reference_point}
         return np.array([places[name] for name in self.point])
 
+    @property
+    def measured_at_once(self) -> NDArray:
+        """(R,) int, the same for rows that read several points of one row of a file."""
+        labels = self.ids
+        if self.point is not None:
+            pairs = zip(labels, self.point.tolist(), strict=True)
+            labels = [i.removesuffix(f":{name}") if name else i for i, name in pairs]
+        number = dict[str, int]()
+        return np.array([number.setdefault(i, len(number)) for i in labels], dtype=int)
+
     def take(self, rows: ArrayLike | slice) -> "Campaign":
         """Some of the rows; ``configuration`` and ``repeat`` keep their numbers.
 

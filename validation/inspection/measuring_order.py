@@ -61,9 +61,13 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
         The answer.
     """
     clock = session_clock(campaign)
-    order = np.argsort(clock, kind="stable")
-    place = np.empty(len(order), dtype=int)
-    place[order] = np.arange(len(order))
+    # rows that read points at once are one visit
+    visit = campaign.measured_at_once
+    _, first = np.unique(np.column_stack([kinds, visit]), axis=0, return_index=True)
+    kinds, clock, visit = kinds[first], clock[first], visit[first]
+    when = np.full(visit.max(initial=-1) + 1, np.inf)
+    np.minimum.at(when, visit, clock)
+    place = np.argsort(np.argsort(when, kind="stable"))[visit]
     rows = adjacent = steps = 0
     spans = []
     for kind in np.unique(kinds):

@@ -1,5 +1,7 @@
 """Noise from repeats: textbook variances, drift kept out, outliers named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -156,6 +158,26 @@ def test_the_order_of_repeats_is_seen(rng):
     assert revisits(row, np.arange(60)).order == "none"
     assert revisits(row, np.zeros(60)).order == "all"
     assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
+
+
+def test_points_read_at_once_are_one_visit():
+    """Twenty configurations, gone round three times, three points read at each."""
+    ids = tuple(f"m{i}{end}" for i in range(60) for end in ("", ":left", ":right"))
+    points = {"left": np.array([0, 0.1, 0]), "right": np.array([0, -0.1, 0])}
+    configuration = np.repeat(np.tile(np.arange(20), 3), 3)
+    campaign = replace(
+        campaign_of(np.zeros((180, 6)), repeat=np.tile(np.arange(60), 3)),
+        ids=ids,
+        points=points,
+        point=np.tile(["", "left", "right"], 60),
+        configuration=configuration,
+    )
+    visits = revisits(campaign, campaign.configuration)
+    assert visits.order == "interleaved"
+    assert visits.rows == 60
+    assert visits.span == pytest.approx(120 / 179)
+    in_one_go = np.repeat(np.repeat(np.arange(20), 3), 3)
+    assert revisits(campaign, in_one_go).order == "back to back"
 
 
 def test_time_goes_before_the_order_of_the_file(rng):
