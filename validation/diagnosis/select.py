@@ -158,15 +158,14 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
         # each one, and all together: two functions can compensate each other
         rests = [tuple(x for x in best.elements if x is not e) for e in learned]
         rests.append(tuple(x for x in best.elements if x.name))
-        gains = [
+        sure = [
             prediction_gain(best, search.fit.state(rest, best.mode, best), blocks)
             for rest in rests
             if learned
         ]
-        if all(gain >= _SURE * error for gain, error in gains):
+        if all(one >= _SURE for one in sure):
             break
-        sure = [gain / max(error, 1e-300) for gain, error in gains[: len(learned)]]
-        rest = rests[int(np.argmin(sure))]
+        rest = rests[int(np.argmin(sure[: len(learned)]))]
         known = {frozenset(s.elements) for s in states}
         pruned = [] if frozenset(rest) in known else [search.fit.best(rest, best)]
         states = sorted([*states[1:], *pruned], key=lambda s: -s.score)

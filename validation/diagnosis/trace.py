@@ -245,8 +245,8 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
         return whole
     timeless = select(columns.without_clocks(), z, cells, update)
     blocks = columns.block[cells]
-    gain, error = prediction_gain(whole.states[0], timeless.states[0], blocks)
-    return whole if gain > _CLEARLY * error else timeless
+    sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
+    return whole if sure > _CLEARLY else timeless
 
 
 def _traced(
