@@ -132,7 +132,9 @@ class Campaign:
         labels = self.ids
         if self.point is not None:
             pairs = zip(labels, self.point.tolist(), strict=True)
-            labels = [i.removesuffix(f":{name}") if name else i for i, name in pairs]
+            labels = tuple(
+                i.removesuffix(f":{name}") if name else i for i, name in pairs
+            )
         number = dict[str, int]()
         return np.array([number.setdefault(i, len(number)) for i in labels], dtype=int)
 
