@@ -33,7 +33,7 @@ OWNERS = {
     "pytetwild": ("stiffness/mesh/mesh_worker.py",),
     "skfem": ("stiffness/mesh/lagrange.py",),
     "meshio": ("stiffness/surface/surface_worker.py",),
-    "gmsh": ("stiffness/surface/surface_worker.py",),
+    "gmsh": ("stiffness/surface/step_file.py",),
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
         "assembly/linear/reference.py",

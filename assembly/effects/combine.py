@@ -34,7 +34,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
     both = {name: dict(values) for name, values in declared.items()}
     for name, values in found.items():
         before = both.get(name)
-        if before is None:
+        if not before:
             both[name] = dict(values)
         else:
             both[name] = _COMBINE.get(name, _sum)(before, values)

@@ -56,6 +56,12 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
+def test_an_effect_without_declared_parameters_is_the_found_one(name):
+    _, found = IN_TURN[name]
+    assert combined({name: {}}, {name: found}) == {name: found}
+
+
+@pytest.mark.parametrize("name", IN_TURN)
 def test_both_together_read_as_one_after_the_other(name, standing):
     declared, found = ({name: values} for values in IN_TURN[name])
     in_turn = predict(apply_effects(apply_effects(standing, declared), found)).deviation
