@@ -69,7 +69,12 @@ def _at_lower(one: Acting, x: NDArray) -> NDArray:
 
 
 def parameters_of(
-    robot: Robot, one: Acting, x: NDArray, C: NDArray, declared: Values = _NOTHING
+    robot: Robot,
+    one: Acting,
+    x: NDArray,
+    C: NDArray,
+    declared: Values = _NOTHING,
+    seen: NDArray | None = None,
 ) -> list[tuple[str, float, float]]:
     """Public name, value and standard deviation of a machine's parameters.
 
@@ -79,6 +84,7 @@ def parameters_of(
         x: (k,) values of its unknowns.
         C: (k, k) their covariance.
         declared: parameters of the same effect in the robot's file.
+        seen: (k,) bool, unknowns that some reading depends on; all if absent.
 
     Returns:
         Parameters that were found, in the units of the public format: of the machine,
@@ -106,7 +112,14 @@ def parameters_of(
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
     std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
-    return [(n, v, float(s)) for (n, v), s in zip(value.items(), std, strict=True)]
+    # what no reading depends on, such as a component that was not measured
+    acting = J if seen is None else J[:, seen]
+    shown = np.any(acting != 0, axis=1).tolist()
+    return [
+        (name, v, float(s))
+        for (name, v), s, kept in zip(value.items(), std, shown, strict=True)
+        if kept
+    ]
 
 
 def unit_of(effect: str, robot: Robot, name: str) -> str:

@@ -40,6 +40,7 @@ _STEPS = 20
 _SLOPES = 6  # steps for which slopes are computed again
 _SHORTEST = 1 / 64  # of a step
 _SETTLED = 1e-3  # decrease of F that is none; F counts squared standard deviations
+_SEEN = 1e-9  # share of an unknown that the readings say and not its prior: none at all
 _NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no answer
 
 
@@ -71,6 +72,12 @@ class MachineFit:
         places = zip(self.unknowns.parts, self.unknowns.slices, strict=True)
         own = next(s for one, s in places if one is part)
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
+
+    def seen(self, part: Acting) -> NDArray:
+        """(k,) bool, unknowns of one effect that some reading depends on."""
+        places = zip(self.unknowns.parts, self.unknowns.slices, strict=True)
+        own = next(s for one, s in places if one is part)
+        return self.determined[own] > _SEEN
 
     @property
     def determined(self) -> NDArray:

@@ -187,7 +187,8 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         name, h = one.hypothesis.effect, one.hypothesis
         x, C, _ = diagnosis.fit.own(one)
         declared = robot.effects.get(name, {}) if one.session is None else {}
-        parameters = parameters_of(bare, one, x, C, declared)
+        seen = diagnosis.fit.seen(one)
+        parameters = parameters_of(bare, one, x, C, declared, seen)
         differences = h.public(bare, x)
         acting = {n for p, *_ in parameters for n in (p, p.rpartition(".")[0])}
         shown.append({

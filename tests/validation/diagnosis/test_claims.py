@@ -120,6 +120,14 @@ def test_a_parameter_is_as_sure_as_the_machine_s_and_not_the_difference_s(
     assert sigma == pytest.approx(std, rel=1e-6)
 
 
+def test_what_no_reading_depends_on_is_no_parameter_found():
+    softer = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
+    one, robot = Acting(softer, np.zeros(1)), bar(link=BEAM).robot
+    for seen in (True, False):
+        found = parameters_of(robot, one, np.zeros(1), np.eye(1), seen=np.array([seen]))
+        assert len(found) == int(seen)
+
+
 def test_a_spring_that_would_be_negative_changes_nothing():
     """A drive that turns against its moment: compliance 0, and the robot as it was."""
     M = 30.0
