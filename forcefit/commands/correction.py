@@ -75,13 +75,14 @@ def predict(
 def _about(table: dict[str, Any]) -> list[str]:
     """What a prediction rests on, a line each."""
     lines = []
-    std, noise = table["std"], table["noise"]
-    if std["position"] > 0.0 or std["rotation"] > 0.0:
+    if any(size > 0.0 for size in table["std"].values()):
         lines.append(
-            f"uncertainty of the model, 1 sigma: {1e6 * std['position']:.4g} um, "
-            f"{1e6 * std['rotation']:.4g} urad; of a reading about it: "
-            f"{1e6 * noise['position']:.4g} um, {1e6 * noise['rotation']:.4g} urad"
+            f"uncertainty of the model, 1 sigma: {_sizes(table['std'])}; of a reading "
+            f"about it: {_sizes(table['noise'])}"
         )
+    if table["not_measured"]:
+        names = ", ".join(table["not_measured"])
+        lines.append(f"not measured where the robot was identified: {names}")
     if table["registration"] != "known":
         lines.append(f"registration: {table['registration']}")
     if table["identified_at"] is not None:
@@ -93,6 +94,13 @@ def _about(table: dict[str, Any]) -> list[str]:
         count = len(table["extrapolated"])
         lines.append(f"{count} rows extrapolate (column extrapolated)")
     return lines
+
+
+def _sizes(both: dict[str, float]) -> str:
+    """Position and rotation as far as they are known."""
+    units = {"position": "um", "rotation": "urad"}
+    known = [f"{1e6 * both[k]:.4g} {u}" for k, u in units.items() if both[k] == both[k]]
+    return ", ".join(known) or "unknown"
 
 
 def compensate(

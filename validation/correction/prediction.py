@@ -58,6 +58,8 @@ class Foretold:
         position, rotation, sigma = self.error.tolist()
         rows = zip(self.commands.ids, self.prediction.reason, strict=True)
         far = zip(self.commands.ids, self.extrapolated, strict=True)
+        missing = list(self.commands.robot.diagnosis.get("not_measured", []))
+        known = np.where([name in missing for name in READING], np.nan, 1.0)
         return {
             "rows": len(self.commands),
             "without_answer": [{"id": i, "reason": why} for i, why in rows if why],
@@ -66,8 +68,9 @@ class Foretold:
             "reference_point": self.commands.reference_point.tolist(),
             "identified_at": None if self.point is None else list(self.point),
             "extrapolated": [{"id": i, "variables": why} for i, why in far if why],
-            "std": _both(self.spread),
-            "noise": _both(self.noise),
+            "std": _both(known * self.spread),
+            "noise": _both(known * self.noise),
+            "not_measured": missing,
             "error": {
                 "unit": {"position": "m", "rotation": "rad"},
                 "position": position, "rotation": rotation, "normalised": sigma,

@@ -218,6 +218,10 @@ def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
     assert np.median(told.spread[:, 3:5]) > 3 * SIGMA[3]
     inside = np.abs(left) < 2.6 * np.hypot(told.spread, told.noise)
     assert np.mean(inside[:, 3:]) > 0.9
+    # what is said of all rows is of the component that was measured
+    std = told.table()["std"]
+    assert std["position"] == pytest.approx(np.sqrt(np.mean(told.spread[:, 5] ** 2)))
+    assert np.isnan(std["rotation"])
 
 
 def test_a_machine_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
