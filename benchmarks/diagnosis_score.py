@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from validation.synthetic.outside import OUTSIDE_COVARIATES
+
 WITHIN_90 = 1.645  # [-] standard deviations
 VERDICTS = (
     "explained", "learned", "none_needed", "ambiguous", "outside_library",
@@ -126,10 +128,9 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
     frames = {key.removesuffix(".amplitude").removesuffix(".phase") for key in keys}
     at_reading = name in ("_stand", "_sag")
     wanted = {"reading"} if at_reading else frames
-    of = {
-        "_humidity": {"cov.humidity"},
-        "_quadratic_temperature": {"cov.temperature"},
-    }.get(name, {f"q.{frame}" for frame in frames})
+    known = OUTSIDE_COVARIATES.get(name, ())
+    of = {v if v in ("time", "approach") else f"cov.{v}" for v in known}
+    of = of or {f"q.{frame}" for frame in frames}
     places = {one["where"] for one in diagnosis["learned"]}
     for one in diagnosis["learned"]:
         for same in one["equivalent_places"]:
