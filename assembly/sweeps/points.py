@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.kinematics.verdict import SINGULAR
+from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.zone import MARGIN_READINGS, zone_margins
@@ -135,13 +135,16 @@ def _solve_variant(
         [rows[i] for i in reached], solved.records, solved.texts["near_singularity"],
     )  # fmt: skip
     status_of = dict(zip(reached, said, strict=True))
-    reachable = []
+    reachable: list[tuple[int, Posture]] = []
+    far: list[tuple[int, str]] = []
     for i, posture in enumerate(postures):
         status, reason = status_of.get(i, ("out of reach", reasons[i]))
-        if posture is None or status:
+        if posture is None or status not in ("", BEYOND_SINGULARITY):
             _fail(solved, rows[i], status, reason)
-        else:
-            reachable += [(row, posture) for row in rows[i]]
+            continue
+        reachable += [(row, posture) for row in rows[i]]
+        if status:  # its numbers are right; whether the robot gets there is not said
+            far += [(row, reason) for row in rows[i]]
     if not reachable:
         return
     rows_reached = np.array([row for row, _ in reachable])
@@ -152,6 +155,9 @@ def _solve_variant(
     _solve_or_split(
         question, robot, perfect, postures_reached, errors, solved, rows_reached
     )
+    for row, reason in far:
+        if solved.records["status"][row] == 0:
+            _fail(solved, range(row, row + 1), BEYOND_SINGULARITY, reason)
 
 
 def _solve_or_split(

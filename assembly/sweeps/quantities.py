@@ -23,9 +23,7 @@ STATUSES = (
     "no equilibrium", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
 )  # fmt: skip
 # of points at which nothing was asked
-UNUSABLE = {
-    "out of reach", "invalid robot", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY
-}  # fmt: skip
+UNUSABLE = {"out of reach", "invalid robot", SINGULAR, BEYOND_LIMITS}
 TEXTS = ("reason", "near_singularity")
 
 

@@ -49,7 +49,8 @@ def assert_as_printed(values, printed):
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
 def test_maps_have_the_references_least_median_and_largest_values(case):
     data = sweep_poses(irsbot2_with(case), parse_grid(GRID))
-    reached = data.status.values == "ok"
+    # the paper counts what home reaches through singularities too
+    reached = np.isin(data.status.values, ["ok", "beyond_singularity"])
     assert reached.sum() == 1113
     free, share, rigid, energy = TABLE[case["name"]]
     assert_as_printed(data.margin_free.values, free)

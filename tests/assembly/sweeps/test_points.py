@@ -270,6 +270,7 @@ def test_sweep_names_the_far_side_of_a_singularity():
     assert data["status"].values.ravel().tolist() == ["beyond_singularity", "ok"]
     reason = str(data["reason"].values.ravel()[0])
     assert reason == "not connected to home without passing a singularity"
+    assert np.isfinite(data["energy"].values).all()
 
 
 def test_sweep_marks_postures_beyond_the_joints_limits():
