@@ -29,7 +29,8 @@ class CandidateShape:
     given: tuple[tuple[str, float], ...] = ()
 
 
-def _waves(*orders: int) -> CandidateShape:
+def waves(*orders: int) -> CandidateShape:
+    """Sines and cosines of these orders of an angle."""
     return CandidateShape(
         "waves", tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     )
@@ -40,16 +41,6 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 REVERSAL = CandidateShape("reversal", ("0",))
-
-
-def first_shapes(robot: Robot, name: str) -> list[CandidateShape]:
-    """Forms general enough to show whether a variable counts at all."""
-    if name == "approach":
-        return [_powers(1)]
-    if is_angle(robot, name):
-        return [_waves(1, 2, 3, 4), _powers(0, 1, 2), REVERSAL]
-    cubic = _powers(0, 1, 2, 3)
-    return [cubic, REVERSAL] if name.startswith("q.") else [cubic]
 
 
 def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
@@ -63,10 +54,10 @@ def all_shapes(conditions: Conditions, name: str, kind: str) -> list[CandidateSh
     if name.startswith("q."):
         shapes.append(REVERSAL)
     if is_angle(conditions.robot, name):
-        shapes += [_waves(k) for k in range(1, 9)]
-        shapes += [_waves(*range(1, k + 1)) for k in (2, 4, 8)]
+        shapes += [waves(k) for k in range(1, 9)]
+        shapes += [waves(*range(1, k + 1)) for k in (2, 4, 8)]
         if len(conditions) >= MANY:
-            shapes += [_waves(*range(1, k + 1)) for k in (20, 40)]
+            shapes += [waves(*range(1, k + 1)) for k in (20, 40)]
         if kind == "compliance":
             shapes += [
                 CandidateShape("waves", ("0.cosine", f"{k}.sine", f"{k}.cosine"))

@@ -19,7 +19,6 @@ _SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
 _ENOUGH = 60  # blocks held out that judge well, however many there are
 _FOLDS = 5
 SPANS = "spans of time"
-_TAIL = 4.0  # degrees of freedom of Student's t
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,30 +107,3 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     order = np.argsort(np.argsort(time, kind="stable"))
     count = min(2 * _FEWEST, len(campaign))
     return order * count // len(campaign), SPANS
-
-
-def gain_over_blocks(
-    before: NDArray, after: NDArray, blocks: NDArray
-) -> tuple[float, float]:
-    """How much likelier readings are foretold, by the scatter between blocks.
-
-    Errors are those of Student's t, so that a reading which neither model foretells,
-    a blunder or one next to a singularity, does not decide alone.
-
-    Args:
-        before: (N,) squared errors of the cells, over that of the noise.
-        after: (N,) the same by another model.
-        blocks: (N,) whose each cell is, see :func:`blocks_of`.
-
-    Returns:
-        Twice the logarithm of the likelihoods' ratio, and its standard error; zero of
-        a single block.  Of errors of about one sigma, the sum by which squares fall.
-
-    Sources:
-        Lange, Little, Taylor (1989), Robust statistical modeling using the t
-        distribution, J. Am. Stat. Assoc. 84, 881.
-    """
-    less = (_TAIL + 1) * (np.log1p(before / _TAIL) - np.log1p(after / _TAIL))
-    gains = np.array([float(less[blocks == name].sum()) for name in np.unique(blocks)])
-    error = gains.std(ddof=1) * np.sqrt(len(gains)) if len(gains) > 1 else 0.0
-    return float(gains.sum()), float(error)

@@ -84,36 +84,11 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     )  # fmt: skip
 
 
-def believed_noise(campaign: Campaign, residual: NDArray) -> NDArray:
-    """By how much repeats scatter more than the stated sigma, where they surely do.
-
-    Args:
-        campaign: of R rows, N measured cells.
-        residual: (N,) whitened.
-
-    Returns:
-        (6,) factors on sigma, one for rotations and one for positions; 1 where repeats
-        do not speak against what is stated.
-    """
-    columns = np.nonzero(campaign.cells)[1]
-    factors = np.ones(6)
-    for part in np.split(np.arange(6), 2):
-        own = np.isin(columns, part)
-        squares, freedom = _repeats(campaign, residual, own)
-        if freedom and float(chi2.sf(squares, freedom)) < SIGNIFICANT:
-            factors[part] = np.sqrt(squares / freedom)
-    return factors
-
-
-def _repeats(
-    campaign: Campaign, residual: NDArray, own: NDArray | None = None
-) -> tuple[float, int]:
-    """Squares between repeats under one condition, and their number; of ``own``."""
+def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
+    """Squares between repeats under one condition, and their number."""
     rows, columns = np.nonzero(campaign.cells)
     alike = _alike(campaign)[rows], columns
     group = np.ravel_multi_index(alike, campaign.cells.shape)
-    if own is not None:
-        group, residual = group[own], residual[own]
     order = np.argsort(group, kind="stable")
     _, start, count = np.unique(group[order], return_index=True, return_counts=True)
     mean = np.add.reduceat(residual[order], start) / count

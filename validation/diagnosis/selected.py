@@ -1,6 +1,5 @@
 """Result of the model selection of a diagnosis."""
 
-import math
 from dataclasses import dataclass
 
 from numpy.typing import NDArray
@@ -97,8 +96,3 @@ class Selected:
     def enough(self) -> bool:
         """Whether the blocks exceed the unknowns by two."""
         return self.blocks >= self.unknowns + 2
-
-    @property
-    def blocks_wanted(self) -> int:
-        """Least number of blocks for these unknowns."""
-        return math.ceil(self.unknowns) + 2

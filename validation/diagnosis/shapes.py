@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
-from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle
+from validation.diagnosis.forms_tried import CandidateShape, all_shapes, is_angle, waves
 
 _DEPTHS = 0.03, 0.1, 0.3, 1.0  # of slip, relative to the variable's range
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
@@ -22,11 +22,6 @@ _JUMPS, _MANY_JUMPS = 10, 91  # numbers of times at which a step is tried
 _ANGLE = ("0.cosine", "1.sine", "1.cosine")
 
 
-def _waves(*orders: int) -> CandidateShape:
-    names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
-    return CandidateShape("waves", names)
-
-
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
     """Return general forms that show whether a variable matters."""
     if name == "approach":
@@ -34,8 +29,8 @@ def first(conditions: Conditions, name: str) -> list[CandidateShape]:
     powers = CandidateShape("powers", ("0", "1", "2", "3"))
     straight = [CandidateShape("powers", (k,)) for k in ("1", "2")]
     if is_angle(conditions.robot, name):
-        waves = [_waves(k) for k in range(1, _HIGH + 1)]
-        return [_waves(1, 2, 3, 4), powers, *waves, *_reversals(conditions, name)]
+        single = [waves(k) for k in range(1, _HIGH + 1)]
+        return [waves(1, 2, 3, 4), powers, *single, *_reversals(conditions, name)]
     steps = _steps(conditions, name, _JUMPS) if name in _CLOCKS else []
     return [powers, *straight, *steps, *_reversals(conditions, name)]
 
@@ -44,7 +39,7 @@ def every(conditions: Conditions, name: str, kind: str) -> list[CandidateShape]:
     """Return all forms of one variable."""
     shapes = list(all_shapes(conditions, name, kind))
     if is_angle(conditions.robot, name):
-        shapes += [_waves(k) for k in range(9, _HIGH + 1)]
+        shapes += [waves(k) for k in range(9, _HIGH + 1)]
     if name in _CLOCKS:
         shapes = [s for s in shapes if s.form != "step"]
         shapes += _steps(conditions, name, _MANY_JUMPS)
@@ -91,13 +86,13 @@ def of_two(
         return (first, second), [CandidateShape("waves", pair), turned]
     if any(angles):
         order = (first, second) if angles[0] else (second, first)
-        waves = [
+        scaled = [
             CandidateShape(
                 "scaled_waves", tuple(f"{k}.{w}" for w in ("sine", "cosine"))
             )
             for k in (1, 2, 3)
         ]
-        return order, [*waves, CandidateShape("scaled_waves", _ANGLE)]
+        return order, [*scaled, CandidateShape("scaled_waves", _ANGLE)]
     if "approach" in {first, second}:
         other = second if first == "approach" else first
         shapes = [CandidateShape("reversal", (k,)) for k in ("1", "2")]

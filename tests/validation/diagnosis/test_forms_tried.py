@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from assembly.model.robot import Frame, Robot
 from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.forms_tried import LAGS, MANY, all_shapes, first_shapes
+from validation.diagnosis.forms_tried import LAGS, MANY, all_shapes
 from validation.diagnosis.signatures import conditions_of
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "base_compliance_drift"
@@ -79,27 +78,10 @@ def test_times_of_a_step_a_lag_and_a_wave_are_within_the_campaign(conditions):
 
 def test_the_side_from_which_one_comes_has_a_sign_and_no_more(conditions):
     assert shapes(conditions, "approach") == {"powers": [(("1",), {})]}
-    (one,) = first_shapes(conditions.robot, "approach")
-    assert one.names == ("1",)
 
 
 def test_a_load_has_no_steps(conditions):
     assert shapes(conditions, "load.fx").keys() <= {"powers", "spline"}
-
-
-def test_a_first_look_takes_the_general_forms(conditions):
-    robot = conditions.robot
-    angle = first_shapes(robot, f"q.{angle_of(conditions)}")
-    assert [one.form for one in angle] == ["waves", "powers", "reversal"]
-    orders = [f"{k}.{w}" for k in range(1, 5) for w in ("sine", "cosine")]
-    assert list(angle[0].names) == orders
-    assert angle[1].names == ("0", "1", "2")
-    (other,) = first_shapes(robot, "cov.temperature")
-    assert (other.form, other.names) == ("powers", ("0", "1", "2", "3"))
-    sliding = Frame("slide", joint="prismatic", actuated=True)
-    slide = Robot("axis", "tool", (sliding, Frame("tool", "slide")))
-    cubic, reversal = first_shapes(slide, "q.slide")
-    assert (cubic.names, reversal.form) == (("0", "1", "2", "3"), "reversal")
 
 
 @pytest.mark.parametrize(
