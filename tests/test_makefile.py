@@ -1,5 +1,6 @@
 """The environment that `make` sets up belongs to the Python that is named."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -18,9 +19,12 @@ def commands(folder, stamp):
         shutil.copy(ROOT / name, folder)
     (folder / ".venv").mkdir()
     (folder / ".venv" / stamp).touch()
+    # where make itself runs the tests, its variables are not those of this call
+    outer = ("MAKEFLAGS", "MAKEOVERRIDES", "MFLAGS", "PYTHON", "VENV")
+    own = {name: value for name, value in os.environ.items() if name not in outer}
     return subprocess.run(
         ["make", "-n", "test", f"PYTHON={sys.executable}"],
-        capture_output=True, text=True, cwd=folder, check=True,
+        capture_output=True, text=True, cwd=folder, check=True, env=own,
     ).stdout  # fmt: skip
 
 
