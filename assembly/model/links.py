@@ -1,5 +1,7 @@
 """The elasticity of every body and joint of a robot, as compliances."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,8 +33,15 @@ def link_compliances(robot: Robot) -> NDArray:
     return C
 
 
+@lru_cache(maxsize=4096)  # a robot that is changed in one frame keeps its others
 def link_compliance(frame: Frame) -> NDArray:
-    """(6, 6) compliance of a frame's own body, at the frame in its axes."""
+    """(6, 6) compliance of a frame's own body, at the frame in its axes; read-only."""
+    C = _compliance(frame)
+    C.setflags(write=False)
+    return C
+
+
+def _compliance(frame: Frame) -> NDArray:
     link = frame.link
     if isinstance(link, MatrixLink):
         return np.linalg.inv(link.stiffness)

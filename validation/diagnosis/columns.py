@@ -35,6 +35,7 @@ from validation.diagnosis.small_terms import small_terms
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time of what counts it
+_SAMPLE = 500  # rows, drawn once
 _VISIBLE = 4.0  # squared whitened change of the readings
 
 
@@ -50,7 +51,8 @@ class Columns:
         library: elements of the library's effects.
         nuisance: geometric errors and springs.
         functions: candidate functions at single places.
-        explicit: elements of functions at several places.
+        sampled: (N,) cells of the rows by which functions are scored first.
+        explicit: elements of functions at several places, with columns of these cells.
     """
 
     def __init__(
@@ -80,9 +82,12 @@ class Columns:
         terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
         self.nuisance: Nuisance = nuisance(terms, self._named())
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
+        rows = np.unique(self.row)
+        rows = np.sort(np.random.default_rng(0).permutation(rows)[:_SAMPLE])
+        self.sampled = np.isin(self.row, rows)
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
-        self.explicit = joint_functions(self.functions) if any_function else []
+        self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Return visible hypotheses with distinct columns."""
@@ -116,7 +121,8 @@ class Columns:
         other.library = [e for e in self.library if e.name not in timed]
         names = [n for n in self.functions.variables if not self._is_clock(n)]
         other.functions = self.functions.of(names)
-        other.explicit = joint_functions(other.functions) if names else []
+        rows = np.unique(self.row[self.sampled])
+        other.explicit = joint_functions(other.functions, rows) if names else []
         return other
 
     @property

@@ -42,6 +42,7 @@ Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
 _WIDEST = 36  # most columns of a function of several components
 _LISTED = 2000  # best functions that are sorted
+_BATCH = 2_000_000  # numbers that a batch of functions may occupy at once
 
 
 @dataclass(frozen=True)
@@ -65,15 +66,21 @@ class ScoredFunction:
 
 @dataclass(frozen=True, eq=False)
 class _Scored:
-    """Inner products of one form at c places, columns scaled to norm about 1."""
+    """Inner products of c functions of equally many columns, scaled to norm about 1.
 
-    number: int
-    shape: int
-    where: NDArray
+    Attributes:
+        whose: (c, 3) number of the request, of its form, and of the place.
+        gram: (c, m, m) B'C^-1 B.
+        along: (c, m) B'C^-1 z.
+        most: (c,) largest plausible prior standard deviation.
+        prior: (c,) log prior.
+    """
+
+    whose: NDArray
     gram: NDArray
     along: NDArray
     most: NDArray
-    prior: float
+    prior: NDArray
 
 
 def _likeliest(
@@ -87,25 +94,20 @@ def _likeliest(
             np.concatenate([p.along for p in own]),
             np.concatenate([p.most for p in own]), False, marginal, freedom,
         )  # fmt: skip
-        sizes = [len(p.where) for p in own]
-        scores.append(gains + np.repeat([p.prior for p in own], sizes))
-        numbers = np.repeat([(p.number, p.shape) for p in own], sizes, axis=0)
-        whose.append(np.column_stack([numbers, np.concatenate([p.where for p in own])]))
+        scores.append(gains + np.concatenate([p.prior for p in own]))
+        whose += [p.whose for p in own]
     score, names = np.concatenate(scores), np.concatenate(whose)
     order = [i for i in np.argsort(-score).tolist()[:_LISTED] if np.isfinite(score[i])]
-    return [
-        (float(score[i]), int(names[i, 0]), int(names[i, 1]), int(names[i, 2]))
-        for i in order
-    ]
+    return [(float(score[i]), *names[i].tolist()) for i in order]
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return (c, m) rms norms of the columns, of rotations and of translations."""
-    diagonal = np.einsum("skk->sk", gram)
+    """Return (f, c, m) rms norms of columns, of rotations and of translations."""
+    diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
-        mean = (diagonal * kind).sum(axis=1) / np.maximum(kind.sum(axis=1), 1)
-        squares += kind * mean[:, None]
+        mean = (diagonal * kind).sum(axis=-1) / np.maximum(kind.sum(axis=-1), 1)
+        squares += kind * mean[..., None]
     return np.sqrt(squares)
 
 
@@ -139,6 +141,13 @@ class Functions:
         other = copy(self)
         other.variables = variables
         other._keep()
+        return other
+
+    def at_rows(self, rows: NDArray) -> "Functions":
+        """The same whose elements have columns of some rows only."""
+        other = copy(self)
+        other.campaign = self.campaign.take(rows)
+        other.sensitivities = self.sensitivities.take(rows)
         return other
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
@@ -208,8 +217,8 @@ class Functions:
         through = weighted.answers.transpose(1, 0, 2) @ U
         on = np.einsum("src,rc->sr", weighted.answers, held)
         parts: dict[int, list[_Scored]] = {}
-        for number, (variables, shapes) in enumerate(requests):
-            for one in self._blocks(number, weighted, variables, shapes, through, on):
+        for own in self._by_width(requests, through[0].size):
+            for one in self._scored(own, requests, weighted, through, on):
                 parts.setdefault(one.along.shape[1], []).append(one)
         best: list[ScoredFunction] = []
         each: dict[int, int] = {}
@@ -221,39 +230,62 @@ class Functions:
                 best.append(ScoredFunction(score, where, variables, shapes[k], prior))
         return best
 
-    def _blocks(
-        self, number: int, weighted: Weighted, variables: Variables,
-        shapes: Sequence[CandidateShape], through: NDArray, on: NDArray,
+    def _by_width(
+        self, requests: Sequence[Request], size: int
+    ) -> Iterator[list[tuple[int, int]]]:
+        """Yield request and form of functions with equally many columns, in batches.
+
+        Args:
+            requests: variables with their forms.
+            size: numbers that one column of one function occupies.
+        """
+        by_width: dict[int, list[tuple[int, int]]] = {}
+        for number, (variables, shapes) in enumerate(requests):
+            for k, shape in enumerate(shapes):
+                m = self._numbers(variables, shape).shape[1]
+                by_width.setdefault(m, []).append((number, k))
+        for m, own in by_width.items():
+            count = max(1, _BATCH // max(1, size * m))
+            yield from (own[i : i + count] for i in range(0, len(own), count))
+
+    def _scored(
+        self, own: list[tuple[int, int]], requests: Sequence[Request],
+        weighted: Weighted, through: NDArray, on: NDArray,
     ) -> Iterator[_Scored]:  # fmt: skip
-        """Compute inner products of all forms of a request at all places."""
-        columns = [self._numbers(variables, s)[weighted.rows] for s in shapes]
-        ends = np.cumsum([0, *(c.shape[1] for c in columns)])
-        P = np.hstack(columns)
-        S = len(weighted.answers)
-        shown = (through.reshape(len(P), -1).T @ P).reshape(S, -1, P.shape[1])
-        along = on @ P
-        for k, own in enumerate(columns):
-            part = slice(ends[k], ends[k + 1])
-            m = own.shape[1]
-            whole, cross = weighted.products((variables, shapes[k]), own)
-            prior = self.prior(variables, shapes[k])
-            for where, mem, turns in self.places.sizes:
-                c, size = mem.shape
-                if size > 1 and size * m > _WIDEST:
-                    continue
-                B = (
-                    whole[mem[:, 0]]
-                    if size == 1
-                    else self.places.joined(mem, whole, cross)
-                )
-                y = shown[mem, :, part].transpose(0, 2, 1, 3).reshape(c, -1, size * m)
-                b = along[mem, part].reshape(c, size * m)
-                norm = _by_kind(np.repeat(turns, m, axis=1), B)
-                scale = np.where(norm > 0, 1 / np.maximum(norm, 1e-300), 0.0)
-                left = B - y.transpose(0, 2, 1) @ y
-                left *= scale[:, :, None] * scale[:, None, :]
-                most = self.places.most[where] * norm.max(axis=1)
-                yield _Scored(number, k, where, left, b * scale, most, prior)
+        """Compute inner products of f forms of m columns at all places."""
+        named = [(requests[number][0], requests[number][1][k]) for number, k in own]
+        each = [self._numbers(*name)[weighted.rows] for name in named]
+        f, m, S = len(own), each[0].shape[1], len(weighted.answers)
+        P = np.hstack(each)
+        shown = (through.reshape(len(P), -1).T @ P).reshape(S, -1, f, m)
+        shown = shown.transpose(2, 0, 3, 1)
+        along = (on @ P).reshape(S, f, m).transpose(1, 0, 2)
+        made = [
+            weighted.products(name, columns)
+            for name, columns in zip(named, each, strict=True)
+        ]
+        whole, cross = (np.array(part) for part in zip(*made, strict=True))
+        priors = np.array([self.prior(*name) for name in named])
+        for where, mem, turns in self.places.sizes:
+            c, size = mem.shape
+            if size > 1 and size * m > _WIDEST:
+                continue
+            B = whole[:, mem[:, 0]]
+            if size > 1:
+                B = self.places.joined(mem, whole, cross)
+            y = shown[:, mem].reshape(f, c, size * m, -1)
+            norm = _by_kind(np.repeat(turns, m, axis=1), B)
+            scale = np.where(norm > 0, 1 / np.maximum(norm, 1e-300), 0.0)
+            left = B - y @ y.transpose(0, 1, 3, 2)
+            left *= scale[..., None] * scale[..., None, :]
+            b = along[:, mem].reshape(f, c, size * m) * scale
+            most = self.places.most[where] * norm.max(axis=2)
+            names = np.repeat(own, c, axis=0)
+            whose = np.column_stack([names, np.tile(where, f)])
+            yield _Scored(
+                whose, left.reshape(f * c, size * m, size * m), b.reshape(f * c, -1),
+                most.ravel(), np.repeat(priors, c),
+            )  # fmt: skip
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
         """Return (R, q) columns of a form, scaled by their relative prior."""

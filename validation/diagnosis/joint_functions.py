@@ -7,6 +7,8 @@ at all places; each place has its own coefficients.
 import math
 from collections.abc import Iterator
 
+from numpy.typing import NDArray
+
 from assembly.effects.functions import AXES
 from validation.diagnosis import shapes as forms
 from validation.diagnosis.candidates import Candidate, CandidatePart, places_of
@@ -19,21 +21,23 @@ _CUBIC = CandidateShape("powers", ("2",))  # compliance proportional to wrench^2
 Parts = tuple[CandidatePart, ...]
 
 
-def joint_functions(functions: Functions) -> list[Element]:
+def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
     """Return functions at several places and cubic springs.
 
     Args:
         functions: of a campaign.
+        rows: numbers of the rows whose cells the columns have.
 
     Returns:
         Elements that the readings depend on.
     """
+    some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
     for kind, parts, tried in (*_by_kind(functions), *_at_drives(functions)):
         own = parts[0].variables
         listed += [(Candidate(parts, kind, s), functions.prior(own, s)) for s in tried]
     listed += _cubic(functions)
-    made = [functions.element(one, prior) for one, prior in listed]
+    made = [some.element(one, prior) for one, prior in listed]
     return [e for e in made if e is not None and e.most > SIZES[0]]
 
 

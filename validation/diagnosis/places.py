@@ -200,14 +200,14 @@ class Places:
         return Weighted(rows, answers, squares, beside, (row, component))
 
     def joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
-        """Return (c, s m, s m) inner products of combinations of s components."""
+        """Return (f, c, s m, s m) inner products of combinations of s components."""
         c, s = members.shape
-        m = whole.shape[1]
-        B = np.zeros((c, s, m, s, m))
+        f, _, m, _ = whole.shape
+        B = np.zeros((f, c, s, m, s, m))
         for i in range(s):
-            B[:, i, :, i] = whole[members[:, i]]
+            B[:, :, i, :, i] = whole[:, members[:, i]]
             for j in range(i + 1, s):
                 pair = [self._pairs[a, b] for a, b in members[:, [i, j]].tolist()]
-                B[:, i, :, j] = cross[pair]
-                B[:, j, :, i] = cross[pair].transpose(0, 2, 1)
-        return B.reshape(c, s * m, s * m)
+                B[:, :, i, :, j] = cross[:, pair]
+                B[:, :, j, :, i] = cross[:, pair].transpose(0, 1, 3, 2)
+        return B.reshape(f, c, s * m, s * m)

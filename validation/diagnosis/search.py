@@ -89,8 +89,9 @@ class Search:
         cells[cells] = self.fit.sampled
         root = self.fit.root[self.fit.sampled]
         self.weighted: Weighted = self.functions.places.weighted(cells, root)
-        pool = [*self.columns.library, *self.columns.explicit]
-        self.dense = Dense(pool, self.fit.cells, self.fit.root)
+        self.library = Dense(self.columns.library, self.fit.cells, self.fit.root)
+        own = self.fit.cells[self.columns.sampled]
+        self.explicit = Dense(self.columns.explicit, own, root)
 
     def _keep(self, states: Iterable[State]) -> None:
         """Store models whose estimates support their claims."""
@@ -140,19 +141,21 @@ class Search:
         self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
         """Return the best elements to add, with estimates of the log posterior."""
-        gains = self.dense.gains(state.marginal, FREEDOM)
-        priors = np.array([e.log_prior for e in self.dense.elements])
-        score = gains + priors
+        listed = [*self.library.elements, *self.explicit.elements]
+        some = self.explicit.gains(state.sample_marginal, FREEDOM)
+        gains = [self.library.gains(state.marginal, FREEDOM), self._more * some]
+        score = np.concatenate(gains) + np.array([e.log_prior for e in listed])
         have = {e.name for e in state.elements if e.name}
         counts: dict[str, int] = {}
         best: list[tuple[float, Element]] = []
         for i in np.argsort(-score).tolist():
-            e = self.dense.elements[i]
+            e = listed[i]
             if not np.isfinite(score[i]) or (e.name and e.name in have):
                 continue
             counts[e.name] = counts.get(e.name, 0) + 1
-            if counts[e.name] <= _OF_NAME:
-                best.append((float(score[i]), e))
+            whole = e if e.name else self._element(e.candidate, e.log_prior)
+            if counts[e.name] <= _OF_NAME and whole is not None:
+                best.append((float(score[i]), whole))
             if len(best) >= _BEAM:
                 break
         found: list[ScoredFunction] = []
@@ -161,7 +164,7 @@ class Search:
         if products:
             found += self.look(state, self._products(found))
         found.sort(key=lambda one: -one.score)
-        made = [(one.score, self._element(one)) for one in found[:_BEAM]]
+        made = [(one.score, self._of(one)) for one in found[:_BEAM]]
         best += [(w, e) for w, e in made if e is not None and e not in state.elements]
         best.sort(key=lambda one: -one[0])
         state.forget()
@@ -183,18 +186,25 @@ class Search:
         found = self.functions.look(
             state.sample_marginal, self.weighted, FREEDOM, requests, most
         )
-        more = len(self.fit.sampled) / self.fit.sampled.sum()
         scaled = [
-            replace(f, score=more * (f.score - f.log_prior) + f.log_prior)
+            replace(f, score=self._more * (f.score - f.log_prior) + f.log_prior)
             for f in found
         ]
         return sorted(scaled, key=lambda one: -one.score)
 
-    def _element(self, found: ScoredFunction) -> Element | None:
-        """Return the cached element of a scored function."""
-        one = self.functions.candidate(found)
+    @property
+    def _more(self) -> float:
+        """Readings of all rows for one of the sampled rows."""
+        return len(self.fit.sampled) / max(int(self.fit.sampled.sum()), 1)
+
+    def _of(self, found: ScoredFunction) -> Element | None:
+        """Return the element of a scored function."""
+        return self._element(self.functions.candidate(found), found.log_prior)
+
+    def _element(self, one: Candidate, log_prior: float) -> Element | None:
+        """Return the cached element of a function, with columns of all cells."""
         if one not in self._made:
-            self._made[one] = self.functions.element(one, found.log_prior)
+            self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
 
     def _reformed(self, state: State) -> list[State]:
@@ -215,7 +225,7 @@ class Search:
         priors = self.functions.shapes_of(variables)
         if len(one.parts) == 1:
             found = self.look(base, [(variables, tuple(priors))], most=4)
-            return [self._element(f) for f in found]
+            return [self._of(f) for f in found]
         count = sum(len(part.components) for part in one.parts)
         tried = [
             Candidate(one.parts, one.kind, shape)

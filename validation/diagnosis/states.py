@@ -32,7 +32,6 @@ MORE = math.log(2.0)  # prior odds of one element fewer
 IN_USE = math.log(10.0), math.log(10.0)  # prior odds against geometry, springs
 _GROUPS = 4  # of nuisance parameters
 _RANK = 1e-9  # relative singular value of a dependent column
-_SAMPLE = 500  # rows, drawn once, by which functions are scored first
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,10 +148,7 @@ class Fitting:
             weights: (n,) relative precision, 1 for a good reading.
         """
         self.columns, self.cells, self.weights = columns, cells, weights
-        rows = columns.row[cells]
-        number = np.unique(rows, return_inverse=True)[1]
-        order = np.random.default_rng(0).permutation(number.max(initial=0) + 1)
-        self.sampled = order[number] < _SAMPLE
+        self.sampled = columns.sampled[cells]
         self.root = np.sqrt(weights)
         flat = columns.flat[cells] * self.root[:, None]
         flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
