@@ -10,14 +10,17 @@ Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 
 from validation.diagnosis.gaussian import deviance, size_penalty
 
+Eigen = tuple[NDArray, NDArray]
 _STEPS = 25
 _SETTLED = 0.03  # change of ln s that ends the iteration
 _LEAP = 4.0  # largest factor of change in a step
@@ -58,6 +61,7 @@ class Sizes:
 def best_sizes(
     gram: NDArray, along: NDArray, squares: float, count: int, freedom: float,
     group: NDArray, given: NDArray, most: NDArray, start: dict[int, float],
+    eigen: Mapping[int, Eigen] = MappingProxyType({}),
 ) -> Sizes:  # fmt: skip
     """Optimise the prior standard deviations of all groups.
 
@@ -71,6 +75,7 @@ def best_sizes(
         given: (k,) fixed standard deviation, or NaN.
         most: (k,) largest plausible standard deviation.
         start: start values by group.
+        eigen: eigenvalues and eigenvectors of some groups' blocks of ``gram``.
 
     Returns:
         Standard deviations and posterior.
@@ -83,34 +88,24 @@ def best_sizes(
         unit = 1 / np.sqrt(max(float(diagonal[which].mean()), 1e-300))
         limits[g] = unit * _LEAST, min(unit * _MOST, float(most[which].max()))
         size[g] = min(max(start.get(g, unit * _BEGIN), limits[g][0]), limits[g][1])
-    best: Sizes | None = None
+    largest = max(own, key=lambda g: len(own[g]), default=None)
+    which = np.zeros(0, dtype=int) if largest is None else own[largest]
+    block = eigen.get(-1 if largest is None else largest)
+    turned = _turned(gram, along, which, block)
+    best: tuple[_Posterior, dict[int, float]] | None = None
     worth = -np.inf
     for _ in range(_STEPS):
         std = np.where(free, 0.0, given)
         for g, which in own.items():
             std[which] = size[g]
-        M = gram * np.outer(std, std)
-        M[np.diag_indices(len(M))] += 1.0
-        factor = cho_factor(M, lower=True, check_finite=False)
-        x = cho_solve(factor, std * along, check_finite=False)
-        inverse = solve_triangular(
-            factor[0], np.eye(len(M)), lower=True, check_finite=False
-        )
-        left = max(squares - float(std * along @ x), 1e-12 * squares)
-        log_det = 2 * float(np.log(np.diag(factor[0])).sum())
-        determined = 1 - (inverse**2).sum(axis=0)
-        now = -0.5 * (float(deviance(left, count, freedom)) + log_det)
-        if now > worth:
-            worth = now
-            cost = sum(size_penalty(float(determined[w].sum())) for w in own.values())
-            inverse *= std
-            best = Sizes(
-                std, dict(size), std * x, inverse.T @ inverse, left, log_det, cost
-            )
-        precision, change = (freedom + count) / (freedom + left), 0.0
+        now = turned.posterior(std, squares)
+        value = -0.5 * (float(deviance(now.left, count, freedom)) + now.log_det)
+        if value > worth:
+            worth, best = value, (now, dict(size))
+        precision, change = (freedom + count) / (freedom + now.left), 0.0
         for g, which in own.items():
-            seen = max(float(determined[which].sum()), 1e-9)
-            step = np.sqrt(precision * float((x[which] ** 2).sum()) / seen)
+            seen = max(float(now.determined[which].sum()), 1e-9)
+            step = np.sqrt(precision * float((now.x[which] ** 2).sum()) / seen)
             new = size[g] * float(np.clip(step, 1 / _LEAP, _LEAP))
             new = min(max(new, limits[g][0]), limits[g][1])
             change = max(change, abs(np.log(new / size[g])))
@@ -118,4 +113,121 @@ def best_sizes(
         if change < _SETTLED:
             break
     assert best is not None
-    return best
+    at, size = best
+    determined = [float(at.determined[which].sum()) for which in own.values()]
+    return Sizes(
+        std=at.std,
+        of_group=size,
+        mean=turned.back(at.std * at.x),
+        covariance=turned.covariance(at),
+        squares=at.left,
+        log_det=at.log_det,
+        cost=sum(map(size_penalty, determined)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """Posterior at given standard deviations, in the turned unknowns over them.
+
+    Attributes:
+        std: (k,) standard deviations.
+        x: (k,) means.
+        determined: (k,) 1 minus the variances; those of the largest group by their sum.
+        left: z' C^-1 z.
+        log_det: ln det C.
+        D, E, L: 1 + s^2 values, C D^-1, and L L' = A - C D^-1 C'.
+    """
+
+    std: NDArray
+    x: NDArray
+    determined: NDArray
+    left: float
+    log_det: float
+    D: NDArray
+    E: NDArray
+    L: NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """Inner products, with the unknowns of the largest group turned.
+
+    Their block of the inner products is then diagonal, and so is D of
+
+        M = 1 + S G S = [A  C; C' D],
+
+    because they share one standard deviation, whatever its value.  M is factored by
+    A - C D^-1 C', which is small, while a group may have hundreds of unknowns.
+
+    Attributes:
+        values, V: eigenvalues and eigenvectors of the group's block.
+        group, rest: indices of its unknowns and of all others.
+        inner, across: inner products of the others, and of them with the group.
+        along: (k,) inner products with the readings.
+    """
+
+    values: NDArray
+    V: NDArray
+    group: NDArray
+    rest: NDArray
+    inner: NDArray
+    across: NDArray
+    along: NDArray
+
+    def posterior(self, std: NDArray, squares: float) -> _Posterior:
+        """Return the posterior at standard deviations (k,)."""
+        o, g = self.rest, self.group
+        s, S = (float(std[g[0]]) if len(g) else 0.0), std[o]
+        D = 1.0 + s**2 * self.values
+        C = S[:, None] * self.across * s
+        E = C / D
+        A = self.inner * np.outer(S, S) - E @ C.T
+        A[np.diag_indices(len(A))] += 1.0
+        L = np.linalg.cholesky(A)
+        b, x = std * self.along, np.empty(len(std))
+        x[o] = cho_solve((L, True), b[o] - E @ b[g], check_finite=False)
+        x[g] = (b[g] - C.T @ x[o]) / D
+        inverse = solve_triangular(
+            L, np.hstack([np.eye(len(o)), E]), lower=True, check_finite=False
+        )
+        variance = np.empty(len(std))
+        shown = (inverse**2).sum(axis=0)
+        variance[o], variance[g] = shown[: len(o)], 1 / D + shown[len(o) :]
+        return _Posterior(
+            std, x, 1 - variance, max(squares - float(b @ x), 1e-12 * squares),
+            float(np.log(D).sum()) + 2 * float(np.log(np.diag(L)).sum()), D, E, L,
+        )  # fmt: skip
+
+    def back(self, x: NDArray) -> NDArray:
+        """Return unknowns along the last axis, turned back."""
+        turned = x.copy()
+        turned[..., self.group] = x[..., self.group] @ self.V.T
+        return turned
+
+    def covariance(self, at: _Posterior) -> NDArray:
+        """Return the (k, k) posterior covariance."""
+        o, g = self.rest, self.group
+        inverse = solve_triangular(
+            at.L, np.hstack([np.eye(len(o)), -at.E]), lower=True, check_finite=False
+        )
+        rows = np.empty((len(o), len(at.std)))
+        rows[:, o], rows[:, g] = inverse[:, : len(o)], inverse[:, len(o) :]
+        rows = self.back(rows * at.std)
+        C = rows.T @ rows
+        C[np.ix_(g, g)] += (self.V * (at.std[g] ** 2 / at.D)) @ self.V.T
+        return C
+
+
+def _turned(
+    gram: NDArray, along: NDArray, group: NDArray, eigen: Eigen | None
+) -> _Turned:
+    """Turn the unknowns of a group so that their inner products are diagonal."""
+    rest = np.setdiff1d(np.arange(len(gram)), group)
+    values, V = eigen or np.linalg.eigh(gram[np.ix_(group, group)])
+    turned = along.copy()
+    turned[group] = V.T @ along[group]
+    return _Turned(
+        np.maximum(values, 0.0), V, group, rest, gram[np.ix_(rest, rest)],
+        gram[np.ix_(rest, group)] @ V, turned,
+    )  # fmt: skip

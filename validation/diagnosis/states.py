@@ -25,12 +25,13 @@ from validation.diagnosis.gaussian import (
     marginalise,
 )
 from validation.diagnosis.noise import FREEDOM, scale
-from validation.diagnosis.prior_sizes import Sizes, best_sizes
+from validation.diagnosis.prior_sizes import Eigen, Sizes, best_sizes
 
 Mode = tuple[bool, bool]  # geometric errors in use, springs in use
 MORE = math.log(2.0)  # prior odds of one element fewer
 IN_USE = math.log(10.0), math.log(10.0)  # prior odds against geometry, springs
 _GROUPS = 4  # of nuisance parameters
+_NARROW = 50  # most columns of an element that are kept beside those of all cells
 _RANK = 1e-9  # relative singular value of a dependent column
 
 
@@ -160,7 +161,9 @@ class Fitting:
             columns.nuisance.columns[cells] * self.root[:, None]
         )
         self._gram = self.small.T @ self.small
-        self._own: dict[Element, tuple[NDArray, NDArray, NDArray]] = {}
+        self._own: dict[Element, NDArray] = {}
+        self._inner: dict[tuple[Element, Element | None], NDArray] = {}
+        self._turned: dict[Element, Eigen] = {}
         self._offset: dict[Element, NDArray] = {}
         self._states: dict[object, State] = {}
 
@@ -169,14 +172,38 @@ class Fitting:
 
     def own(self, e: Element) -> NDArray:
         """Return an element's (n, m) columns in the fitted cells."""
-        return self._products(e)[0]
+        if e in self._own:
+            return self._own[e]
+        B = self._without_flat(e.columns[self.cells] * self.root[:, None])
+        if B.shape[1] <= _NARROW:
+            self._own[e] = B
+        return B
 
-    def _products(self, e: Element) -> tuple[NDArray, NDArray, NDArray]:
-        """Return an element's columns and their inner products."""
-        if e not in self._own:
-            B = self._without_flat(e.columns[self.cells] * self.root[:, None])
-            self._own[e] = B, B.T @ B, self.small.T @ B
-        return self._own[e]
+    def _products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
+        """Return the inner products of the elements' m columns.
+
+        Returns:
+            (k, m) with the nuisance parameters, (m, m) with one another.
+        """
+        for i, e in enumerate(elements):
+            missing = [o for o in (None, *elements[: i + 1])
+                       if (e, o) not in self._inner]  # fmt: skip
+            B = self.own(e) if missing else self.small
+            for o in missing:
+                beside = self.small if o is None else B if o is e else self.own(o)
+                self._inner[e, o] = beside.T @ B
+                if o is not None:
+                    self._inner[o, e] = self._inner[e, o].T
+        empty = np.zeros((len(self._gram), 0))
+        with_small = [empty, *(self._inner[e, None] for e in elements)]
+        blocks = [[self._inner[e, o] for e in elements] for o in elements]
+        return np.hstack(with_small), np.block(blocks or [[np.zeros((0, 0))]])
+
+    def _eigen(self, e: Element) -> Eigen:
+        """Return eigenvalues and eigenvectors of an element's inner products."""
+        if e not in self._turned:
+            self._turned[e] = np.linalg.eigh(self._inner[e, e])
+        return self._turned[e]
 
     def readings(self, elements: Sequence[Element]) -> NDArray:
         """Return the (n,) readings minus the offsets of the elements."""
@@ -193,8 +220,9 @@ class Fitting:
         """Drop what can be computed again: models seen and products of columns."""
         for state in self._states.values():
             state.__dict__.pop("marginal", None)
-        for kept in (self._states, self._own, self._offset):
-            kept.clear()
+        kept = self._states, self._own, self._inner, self._turned, self._offset
+        for one in kept:
+            one.clear()
 
     def modes(self) -> list[Mode]:
         """Return the combinations of nuisance parameters in use."""
@@ -246,20 +274,20 @@ class Fitting:
                     begin[number] = start.sizes.of_group.get(_GROUPS + k, np.nan)
             begin = {g: s for g, s in begin.items() if np.isfinite(s)}
         z = self.readings(elements)
-        made = [self._products(e) for e in elements]
-        E = np.hstack([np.zeros((len(z), 0)), *(B for B, _, _ in made)])
-        counts = [B.shape[1] for B, _, _ in made]
-        factor_columns = np.hstack([
-            np.zeros((len(self._gram), 0)),
-            *(c for _, _, c in made),
-        ])
-        inner, with_z = E.T @ E, E.T @ z
+        counts = [e.columns.shape[1] for e in elements]
+        with_small, inner = self._products(elements)
+        with_z = np.concatenate([np.zeros(0), *(self.own(e).T @ z for e in elements)])
         small_z = self.small.T @ z
         element = np.repeat(np.arange(len(elements)), counts)
         given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
         most = np.repeat([e.most for e in elements], counts)
+        eigen = {
+            _GROUPS + k: self._eigen(e)
+            for k, e in enumerate(elements)
+            if e.columns.shape[1] > _NARROW and np.isnan(e.given).all()
+        }
         while True:
-            beside = factor_columns[used]
+            beside = with_small[used]
             gram = np.block([
                 [self._gram[np.ix_(used, used)], beside],
                 [beside.T, inner],
@@ -269,7 +297,7 @@ class Fitting:
                 self.count, FREEDOM,
                 np.append(small.group[used], _GROUPS + element),
                 np.append(small.given[used], given), np.append(small.most[used], most),
-                begin,
+                begin, eigen,
             )  # fmt: skip
             begin = sizes.of_group
             kept = np.flatnonzero(used)
