@@ -33,7 +33,7 @@ _OF_NAME = 2  # models in the beam with the same names
 _LOOKED = 2  # models of the beam for which functions are scored
 _FORMS = 4  # models whose function is tried in all forms
 _VARIABLES = 4  # variables whose products with others are scored
-_WIDEST = 300  # most columns of a function at several places
+_WIDEST = 600  # most columns of a function at several places
 _DROP = 1.0  # log posterior by which a larger model may be worse
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 _ROUNDS = 3  # of exchanges
@@ -234,7 +234,8 @@ class Search:
         ]
         best: list[tuple[float, Element]] = []
         for candidate in tried:  # one by one: each may have hundreds of columns
-            e = self.functions.element(candidate, priors[candidate.shape])
+            e = self._made.get(candidate)
+            e = e or self.functions.element(candidate, priors[candidate.shape])
             if e is None:
                 continue
             gain = Dense([e], self.fit.cells, self.fit.root).gains(
@@ -242,6 +243,8 @@ class Search:
             )
             best.append((float(gain[0]) + e.log_prior, e))
             best = sorted(best, key=lambda scored: -scored[0])[:4]
+        base.forget()
+        self._made |= {e.candidate: e for _, e in best}
         return [e for _, e in best]
 
     def _with_one_removed(self, state: State) -> list[State]:

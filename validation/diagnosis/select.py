@@ -61,6 +61,7 @@ def select(
     states = search.run(update)
     again = probability_good(states[0].expected_squares())
     if not np.array_equal(again, good):
+        states.clear()  # a model may have columns of hundreds of megabytes
         good, search = again, Search(columns, z, cells, again)
         states = search.run(update)
     selected = _selected(search, states, good)

@@ -125,7 +125,10 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
         By how many standard errors the log predictive densities of blocks gain: of
         their mean, or of their signed ranks if these say more.
     """
-    densities = [leave_block_out(s.marginal, blocks, one.tau)[1] for s in (one, other)]
+    densities = []
+    for state in (one, other):
+        densities.append(leave_block_out(state.marginal, blocks, one.tau)[1])
+        state.forget()
     gains = densities[0] - densities[1]
     error = max(float(gains.std(ddof=1)) * np.sqrt(len(gains)), 1e-300)
     ranks = rankdata(np.abs(gains))
