@@ -31,7 +31,9 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
 from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.holdout import hidden
 from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.lack_of_fit import outlying
 from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.prediction import residual_of
@@ -45,6 +47,7 @@ from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknow
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
+_SEARCHED = 2000  # rows by which models are chosen; all are fitted
 _TURNS = 6  # of the search, without gross blunders
 _BENDS = 1  # of them, with what finite geometric errors add
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
@@ -176,13 +179,14 @@ def trace(
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
-    conditions = _with_its_errors(campaign, declared, conditions, fitted, complete)
-    columns = Columns(campaign, conditions, update, odds)
+    sample = hidden(campaign, ~_drawn(fitted))
+    conditions = _with_its_errors(sample, declared, conditions, fitted, complete)
+    columns = Columns(sample, conditions, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     for turn in range(_TURNS):
         cells = (fitted & ~blunders)[columns.row]
         read = predict(conditions).deviation
-        z = whiten(campaign, campaign.measured - read)
+        z = whiten(sample, sample.measured - read)
         cells &= np.isfinite(z)
         selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
@@ -200,7 +204,27 @@ def trace(
         if bent is None or not _differs(campaign, bent, read, fitted):
             break
         conditions, bends = bent, bends + 1
-    return traced, fit
+    return _without_outlying(traced, fit)
+
+
+def _drawn(fitted: NDArray) -> NDArray:
+    """(R,) bool, the rows by which models are chosen: all, or so many drawn once."""
+    rows = np.random.default_rng(0).permutation(np.flatnonzero(fitted))[:_SEARCHED]
+    return np.isin(np.arange(len(fitted)), rows)
+
+
+def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
+    """The machine fitted without blunders among the rows that were not drawn."""
+    others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
+    if not others.any():
+        return traced, fit
+    some = traced.campaign.take(others)
+    left = whiten(some, residual_of(traced.campaign, fit.robot)[others])
+    far = np.zeros(len(traced.used), dtype=bool)
+    far[others] = outlying(some, np.nan_to_num(left))
+    used = traced.used & ~far
+    traced = replace(traced, used=used, outliers=traced.outliers | far)
+    return traced, fit_machine(traced.campaign, fit.unknowns, used, fit.x)
 
 
 def _with_its_errors(
@@ -257,7 +281,8 @@ def _traced(
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
-    sigma[campaign.cells] *= selected.noise.tau / np.sqrt(weights)
+    sigma[campaign.cells] *= selected.noise.tau
+    sigma[columns.campaign.cells] /= np.sqrt(weights)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
     # the row of a blunder is left out whole: what else was read then is doubtful, and

@@ -26,6 +26,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
 from tests.planar_arm_for_tests import SIGMA, measured
 from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis import trace
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.report import report_page
@@ -193,6 +194,24 @@ def test_a_device_anywhere_with_blunders_and_gaps(diagnosed):
     assert table(found)["outliers"] == ["m7", "m30"]
     assert found.after.normalised < 1.1
     assert found.with_outliers[1].normalised > 2.0
+
+
+@pytest.mark.slow
+def test_models_chosen_by_some_rows_are_fitted_to_all(tmp_path, monkeypatch):
+    """The same answer, narrower than by those rows; blunders among the others too."""
+    campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
+    monkeypatch.setattr(trace, "_SEARCHED", 30)
+    fitted = np.ones(len(campaign), dtype=bool)
+    drawn = trace._drawn(fitted)
+    assert drawn.sum() == 30
+    assert not drawn[[7, 30]].all()
+    found = diagnose(campaign)
+    assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
+    value, std = numbers(found, "encoder_offset")["two"]
+    assert abs(value - 6e-5) < 3 * std < 6e-5 / 3
+    assert np.flatnonzero(found.outliers).tolist() == [7, 30]
+    alone = diagnose(campaign.take(drawn))
+    assert std < numbers(alone, "encoder_offset")["two"][1] / 1.2
 
 
 KEYS = {
