@@ -3,8 +3,8 @@
 Steps, each opened once:
 
 1. rows that judge are chosen (:mod:`.holdout`); nothing reads them until step 5;
-   set-up blunders are looked for in the others (:mod:`.setup_blunders`);
-2. effects and functions are searched for in the other rows (:mod:`.trace`);
+2. set-up blunders (:mod:`.setup_blunders`), then effects and functions
+   (:mod:`.trace`) are searched for in the other rows;
 3. all unknown numbers of the machine are fitted together, through the function that
    predicts with the saved file (:mod:`.fit`); effects that the readings do not support
    are dropped (:mod:`.claims`);
@@ -26,7 +26,7 @@ from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut, hidden, hold_out
 from validation.diagnosis.judge import Judged, judge
-from validation.diagnosis.setup_blunders import setup_blunders
+from validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.trace import Traced, trace
@@ -41,10 +41,12 @@ class _Found:
     Attributes:
         traced: what the search found.
         fit: the machine that has it.
+        setup: blunders of the set-up.
     """
 
     traced: Traced
     fit: MachineFit
+    setup: tuple[SetupBlunder, ...]
 
 
 def diagnose(
@@ -71,18 +73,15 @@ def diagnose(
         BadInput: the measuring frame is not known and cannot be found.
     """
     held = hold_out(campaign)
-    judging = held.rows if held.how == "split" else np.zeros(len(campaign), dtype=bool)
-    seen = hidden(campaign, judging)
-    blunders = setup_blunders(
-        seen.take(seen.cells.any(axis=1)),
-        conditions_of(seen).take(seen.cells.any(axis=1)),
-    )
-    if blunders:  # anything else that is found would stand for them
-        odds = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
 
     def found(rows: NDArray) -> _Found:
         part = hidden(campaign, ~rows)
-        return _Found(*trace(part, rows, update, finite=finite, odds=odds))
+        seen = part.cells.any(axis=1)
+        setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
+        # where there are some, anything else that is found would stand for them
+        nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
+        own = nothing if setup else odds
+        return _Found(*trace(part, rows, update, finite=finite, odds=own), setup)
 
     folds = []
     for k, rows in enumerate(held.folds):
@@ -98,7 +97,7 @@ def diagnose(
         for one, rows in zip(folds, held.folds, strict=True)
     ]
     diagnosis = judge(campaign, best.traced, best.fit, held, judged)
-    return replace(diagnosis, setup=blunders)
+    return replace(diagnosis, setup=best.setup)
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:

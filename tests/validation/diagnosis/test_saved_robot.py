@@ -105,10 +105,14 @@ def test_readings_held_out_change_nothing_but_the_errors(found, change):
 
 def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
     """Each is searched and fitted with NaN there; all rows but at the end."""
-    given = []
+    given, looked = [], []
 
     class Enough(Exception):
         pass
+
+    def set_up(campaign, conditions):
+        looked.append(len(campaign))
+        return ()
 
     def watched(campaign, fitted, *args, **options):
         given.append((campaign.cells.any(axis=1), fitted))
@@ -117,11 +121,13 @@ def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
         raise Enough
 
     monkeypatch.setattr(module, "trace", watched)
+    monkeypatch.setattr(module, "setup_blunders", set_up)
     campaign = read(commanded(arm(), 20))
     with pytest.raises(Enough):
         diagnose(campaign)
     *folds, (every, _) = given
     assert every.all()
+    assert looked == [int(seen.sum()) for seen, _ in given]
     held = [~seen for seen, _ in folds]
     assert np.array_equal(np.sum(held, axis=0), np.ones(20))
     for seen, fitted in folds:
