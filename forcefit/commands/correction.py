@@ -203,15 +203,16 @@ def carry(
     """Carry a saved robot over to a new session.
 
     Where the device stands, what changed with time (and what --fit names) is fitted to
-    the set-up rows of each session; the error is that of its other rows, beside the
-    declared robot's.  Exit status 1, and no robot written, where the set-up rows do not
-    suffice or the saved robot is worse than the declared one.
+    the set-up rows of each session, the robot's own numbers too, with their covariance
+    as prior; the error is that of its other rows, beside the declared robot's.  Exit
+    status 1, and no robot written, where the set-up rows do not suffice or the saved
+    robot is worse than the declared one.
     """
     from assembly.exchange.robot_files import load_robot
-    from assembly.files.robot_file import write_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
-    from validation.correction import carrying, carrying_table
+    from validation.correction import carried_file, carrying, carrying_table
     from validation.correction.session_unknowns import OF_A_SESSION
+    from validation.correction.setup_rows import setup_rows
 
     if output is not None:
         check_writable(output, ROBOT)
@@ -223,16 +224,15 @@ def carry(
     declared = read_campaign(campaign)
     data = read_commands(campaign, load_robot(robot))
     data = data.take(data.cells.any(axis=1))
-    sessions = carrying.carry(data, declared, carrying.setup_rows(data, setup), fitted)
-    good = all(one.suffices and one.better for one in sessions)
-    if output is not None and good:
-        write_robot(carrying.carried_robot(data.robot, sessions), output)
-    write_json(carrying_table.table(sessions) | _warned(data), json)
+    carried = carrying.carry(data, declared, setup_rows(data, setup), fitted)
+    if output is not None and carried.good:
+        carried_file.save(carried, output)
+    write_json(carrying_table.table(carried) | _warned(data), json)
     if json != "-":
-        print(carrying_table.text(sessions))
-        if output is not None and not good:
+        print(carrying_table.text(carried))
+        if output is not None and not carried.good:
             print(f"{output}: not written")
-    if not good:
+    if not carried.good:
         raise typer.Exit(1)
 
 

@@ -1,16 +1,19 @@
 """Sessions to which a robot was carried, for machines and people."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from numpy.typing import NDArray
 
-from validation.correction.carrying import Carried
+from validation.correction.carrying import CarriedRobot
 
 
-def table(sessions: Sequence[Carried]) -> dict[str, Any]:
+def table(carried: CarriedRobot) -> dict[str, Any]:
     """For machines: every session, its values and its errors on the other rows."""
     return {
+        "machine": {
+            "numbers": len(carried.fit.machine.numbers),
+            "widened": carried.fit.widened,
+        },
         "sessions": [
             {
                 "session": one.session,
@@ -33,7 +36,7 @@ def table(sessions: Sequence[Carried]) -> dict[str, Any]:
                     )
                 ],
             }
-            for one in sessions
+            for one in carried.sessions
         ],
         "unit": {"position": "m", "rotation": "rad", "uncertainty": "m"},
     }
@@ -44,10 +47,15 @@ def _error(error: NDArray) -> dict[str, float]:
     return {"position": position, "rotation": rotation, "normalised": normalised}
 
 
-def text(sessions: Sequence[Carried]) -> str:
+def text(carried: CarriedRobot) -> str:
     """For people."""
     lines = []
-    for one in sessions:
+    if carried.fit.machine.numbers:
+        lines.append(
+            f"the robot's own {len(carried.fit.machine.numbers)} numbers: fitted too, "
+            f"with {carried.fit.widened:.3g} times their covariance as prior"
+        )
+    for one in carried.sessions:
         name = one.session or "campaign"
         lines.append(f"{name}: {one.rows[0]} set-up rows, {one.rows[1]} others")
         lines.append(f"  others, as carried over: {_said(one.error)}")

@@ -24,6 +24,7 @@ from assembly.effects.functions import (
     parameters_of,
 )
 from assembly.effects.registration import BASE, TOOL
+from assembly.effects.units import units_of
 from assembly.measurement.conditions import Conditions
 from assembly.model.function import Function
 from assembly.model.robot import Robot
@@ -81,6 +82,11 @@ class SessionUnknowns:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def owners(self) -> list[str]:
+        """What the numbers of each function are said to belong to."""
+        return [_owner(i, function) for i, function in enumerate(self.functions)]
+
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
         """Effects of the library with values (k,)."""
         values: dict[str, dict[str, float]] = {}
@@ -98,13 +104,13 @@ class SessionUnknowns:
             replace(
                 function,
                 parameters={
-                    key: known.get((_owner(i, function), key), value)
+                    key: known.get((owner, key), value)
                     for key, value in function.parameters.items()
                 },
                 std={},
                 session=session,
             )
-            for i, function in enumerate(self.functions)
+            for owner, function in zip(self.owners, self.functions, strict=True)
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
@@ -145,7 +151,7 @@ def session_unknowns(
     alone = {name: (name[-2], value) for name, value in drift.items()}
     owned = [(DRIFT, True, alone)]
     owned += [
-        (_owner(i, f), f.form in _SETTLING, _numbers(f))
+        (_owner(i, f), f.form in _SETTLING, _numbers(robot, f))
         for i, f in enumerate(functions)
     ]
     for owner, settles, numbers in owned:
@@ -171,13 +177,13 @@ def _owner(number: int, function: Function) -> str:
     return f"function of time {number + 1}: {function.title}"
 
 
-def _numbers(function: Function) -> dict[str, tuple[str, float]]:
-    """Numbers in which a function is linear: first letter of component, and value."""
-    numbers = {}
+def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
+    """Numbers in which a function is linear: unit, and value."""
+    numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)
         for name in columns_of(function, component):
             full = f"{component}.{name}"
             full = full if full in function.parameters else name
-            numbers[full] = component[0], own[name]
+            numbers[full] = units[full], own[name]
     return numbers

@@ -45,16 +45,27 @@ def deviation_spread(
     if not known.numbers:
         return np.zeros((len(conditions), 6))
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    J = _slopes(robot, conditions, known.numbers, std, conditions_for)
+    J = number_slopes(robot, conditions, known.numbers, std, conditions_for)
     variance = np.einsum("rik,kl,ril->ri", J, known.covariance, J, optimize=True)
     return np.sqrt(np.maximum(variance, 0.0))
 
 
-def _slopes(
+def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """(R, 6, k) change of the deviation per number of the file."""
+    """Change of the deviation per number of a robot's file.
+
+    Args:
+        robot: with its effects.
+        conditions: R rows of it.
+        numbers: k of its file.
+        std: (k,) their standard deviations, by which steps are chosen.
+        conditions_for: the same rows of a robot with other numbers.
+
+    Returns:
+        (R, 6, k) [rad, m] per unit of a number; zero where the model has no answer.
+    """
     J = np.zeros((len(conditions), 6, len(numbers)))
     response = responses(conditions)
     middle: NDArray | None = None

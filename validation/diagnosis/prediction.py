@@ -17,17 +17,21 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.signatures import conditions_of
 
 
-def finite_conditions(campaign: Campaign) -> Conditions:
+def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Conditions:
     """What acts in a campaign, motions finite as those of a machine are.
 
     Args:
         campaign: of R rows.
+        rows: some of them, by numbers or a mask; what they read may depend on others
+            before them.
 
     Returns:
-        R conditions; of a robot with clearance the linear model's, since where it
+        Their conditions; of a robot with clearance the linear model's, since where it
         rests without a load is open.
     """
     conditions = conditions_of(campaign)
+    if rows is not None:
+        conditions = conditions.take(rows)
     if conditions.exact or virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     return with_finite_motions(conditions)

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.function import Function
+from assembly.model.links import in_series
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
 from stiffness.screws import SCREW
-from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_error
+from validation.diagnosis.small_terms import GEOMETRY, with_error
 from validation.diagnosis.unknowns import Small, Unknowns
 
 _AXES = tuple(axis.lower() for axis in SCREW)
@@ -29,6 +30,7 @@ ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
 _STEP = 1e-4  # of an unknown's standard deviation, for derivatives of the numbers
+_STAYS = 1e-3  # of a compliance, whatever is taken from it
 
 
 @dataclass(frozen=True)
@@ -60,12 +62,26 @@ class Number:
             return float(robot.functions[int(self.owner)].parameters[self.name])
         return 0.0
 
+    def _softened(self, robot: Robot, by: float) -> Robot:
+        """The robot whose joint gives more, or less, in one direction."""
+        row, axis = robot.index(self.owner), _AXES.index(self.name)
+        K = robot.frames[row].resistance
+        stiffness = np.inf if K is None else float(K[axis, axis])
+        soft = 1 / stiffness if 0.0 < stiffness < np.inf else 0.0
+        by = max(by, -(1 - _STAYS) * soft)
+        frames = list(robot.frames)
+        if by:
+            stiffer = in_series(K, axis, by)
+            frames[row] = replace(frames[row], joint_stiffness=stiffer)
+        return replace(robot, frames=tuple(frames))
+
     def moved(self, robot: Robot, by: float) -> Robot:
-        """The robot in which it is larger, a compliance by no less than 0."""
-        if self.kind in {ERROR, COMPLIANCE}:
+        """The robot in which it is larger; of a compliance something always stays."""
+        if self.kind == ERROR:
             place = np.array([robot.index(self.owner)]), _place(self.name)
-            change = with_error if self.kind == ERROR else with_compliance
-            return change(robot, *place, np.array([by]))
+            return with_error(robot, *place, np.array([by]))
+        if self.kind == COMPLIANCE:
+            return self._softened(robot, by)
         if self.kind == FUNCTION:
             functions = list(robot.functions)
             one = functions[int(self.owner)]

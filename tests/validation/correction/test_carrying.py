@@ -12,7 +12,6 @@ from assembly.robots import load_robot
 from stiffness.screws import rotation_matrix, rotation_vector
 from tests.campaigns_for_tests import write_campaign
 from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.carrying import _inverse
 from validation.correction.prediction import foretell
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.saving import corrected
@@ -200,14 +199,6 @@ def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
     assert {"sine", "cosine"} & set(day["open"])
     assert 3e-5 < day["uncertainty"] < 3e-4
     assert "do not suffice" in said
-
-
-def test_what_is_known_beforehand_weighs_as_it_says():
-    """One zero, rows that tell it to s: the mean of both by their variances."""
-    told, known = 2.0, 1e6
-    A = np.full((4, 1), 1e3)
-    inverse = told * _inverse(A, told * np.array([known]))
-    assert inverse[0, 0] == pytest.approx(1 / (4e6 / told + known), rel=1e-9)
 
 
 @pytest.mark.parametrize(("words", "message"), [

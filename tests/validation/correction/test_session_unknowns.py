@@ -49,6 +49,15 @@ def test_a_drift_begins_as_it_was_and_a_step_at_zero(saved):
     assert step.session == "today"
 
 
+def test_powers_of_time_are_each_as_large_as_they_were(saved):
+    """1e-4 m and 1e-12 m/s^3 have no unit in common."""
+    numbers = {"0": 1e-4, "1": 2e-8, "3": 1e-12}
+    cubic = Function("reading", ("tx",), ("time",), "powers", numbers)
+    robot = replace(saved, effects={}, functions=(cubic,))
+    unknowns = session_unknowns(robot, (), clock=True)
+    assert unknowns.prior**-0.5 == pytest.approx([1e-4, 2e-8, 1e-12])
+
+
 def test_without_a_clock_only_what_was_asked_for_is_fitted(saved):
     unknowns = session_unknowns(saved, ("registration", "zeros"), clock=False)
     owners = {owner for owner, _ in unknowns.names}

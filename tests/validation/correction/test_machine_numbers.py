@@ -1,0 +1,128 @@
+"""A robot's own numbers in a new session: prior and readings, weighed by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot
+from assembly.model.function import Function
+from tests.campaigns_for_tests import campaign_of
+from validation.correction.carried_file import save
+from validation.correction.carrying import carry
+from validation.correction.machine_numbers import machine_numbers
+from validation.correction.prediction import foretell
+from validation.diagnosis.saved_covariance import (
+    COMPLIANCE,
+    EFFECT,
+    FUNCTION,
+    Number,
+    SavedCovariance,
+    read_covariance,
+    write_covariance,
+)
+
+SIGMA = 1e-5
+
+
+def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
+    """A post that shifts along x with ``wet``, which its file says was nothing."""
+    measured = np.full((len(readings), 6), np.nan)
+    measured[:, 3] = readings
+    campaign = campaign_of(measured, SIGMA, wet=np.array(wet, dtype=float))
+    nothing = dict.fromkeys(numbers, 0.0)
+    function = Function("reading", ("tx",), ("cov.wet",), "powers", nothing)
+    path = folder / "saved.npz"
+    own = tuple(Number(FUNCTION, "0", name) for name in numbers)
+    write_covariance(SavedCovariance(own, np.array(covariance)), path)
+    saved = replace(
+        campaign.robot, functions=(function,), diagnosis={"covariance": str(path)}
+    )
+    return replace(campaign, robot=saved), campaign
+
+
+def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
+    """Prior 0 +- s, n readings of y +- sigma: conjugate normal distributions."""
+    y, s, n = 4e-5, 3e-5, 8
+    saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
+    carried = carry(saved, declared, np.arange(12) < n, ())
+    prior = 1 / (carried.fit.widened * s**2)
+    told = n / SIGMA**2
+    (number,) = carried.fit.robot.functions[0].parameters.values()
+    assert number == pytest.approx(y * told / (told + prior), rel=1e-6)
+    save(carried, tmp_path / "carried.toml")
+    known = read_covariance(read_robot(tmp_path / "carried.toml"))
+    assert known.numbers == (Number(FUNCTION, "0", "1"),)
+    assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
+
+
+def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
+    """Only a + b was known; dry rows tell a anew, and b makes up for it where wet."""
+    s, little, a = 1e-4, 1e-9, 5e-5
+    C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
+    wet = [0] * 8 + [1] * 8
+    saved, declared = wet_post([a] * 8 + [0.0] * 8, wet, C, tmp_path)
+    carried = carry(saved, declared, np.arange(16) < 8, ())
+    (day,) = carried.sessions
+    assert day.error[0] < 0.01 * a
+    assert day.declared[0] == 0.0
+    numbers = carried.fit.robot.functions[0].parameters
+    assert numbers["0"] == pytest.approx(a, rel=0.01)
+    assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
+
+
+def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
+    tmp_path,
+):
+    """Twenty standard deviations: what is known is widened, and so is its spread."""
+    s, y = 2e-6, 4e-5
+    saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
+    carried = carry(saved, declared, np.arange(40) < 20, ())
+    assert carried.fit.widened > 16
+    assert carried.sessions[0].error[0] < 0.05 * y
+
+
+def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
+    s, y = 3e-5, 4e-5
+    saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
+    carried = carry(saved, declared, np.arange(12) < 8, ())
+    save(carried, tmp_path / "carried.toml")
+    robot = read_robot(tmp_path / "carried.toml")
+    again = foretell(replace(saved, robot=robot).take(np.arange(8, 12)))
+    assert again.error[0] == pytest.approx(carried.sessions[0].error[0], rel=1e-9)
+    assert again.spread[:, 3] == pytest.approx(carried.sessions[0].uncertainty)
+
+
+def test_numbers_of_one_session_are_not_the_machines(tmp_path):
+    saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
+    clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
+    robot = replace(
+        saved.robot,
+        functions=(*saved.robot.functions, clock),
+        effects={"registration": {"base.tx": 0.1}, "self_weight": {"g.z": -9.0}},
+    )
+    numbers = (
+        Number(FUNCTION, "0", "0"),
+        Number(FUNCTION, "1", "1"),
+        Number(EFFECT, "registration", "base.tx"),
+        Number(EFFECT, "self_weight", "g.z"),
+        Number(EFFECT, "self_weight", "g.z", "monday"),
+    )
+    path = tmp_path / "saved.npz"
+    write_covariance(SavedCovariance(numbers, 1e-12 * np.eye(5)), path)
+    own = machine_numbers(robot)
+    assert own.numbers == (numbers[0], numbers[3])
+    assert len(own) == 2
+
+
+def test_a_compliance_stays_above_nothing():
+    """Taken from by more than there is, a thousandth stays; a rigid joint is rigid."""
+    robot = campaign_of(np.zeros((1, 6))).robot
+    K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
+    soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
+    one = Number(COMPLIANCE, "top", "tx")
+    less = one.moved(soft, -5e-7).frames[0].joint_stiffness
+    assert less[3, 3] == pytest.approx(2e6)
+    least = one.moved(soft, -1.0).frames[0].joint_stiffness
+    assert least[3, 3] == pytest.approx(1e9)
+    assert one.moved(robot, -1e-6).frames[0].joint_stiffness is None

@@ -1,0 +1,81 @@
+"""A robot carried to new sessions as a file, its covariance beside it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY
+from assembly.files.robot_file import write_robot
+from assembly.model.robot import Robot
+from validation.correction.carrying import CarriedRobot, carried_robot
+from validation.correction.machine_numbers import renumbered
+from validation.diagnosis.saved_covariance import (
+    EFFECT,
+    FUNCTION,
+    Number,
+    SavedCovariance,
+    write_covariance,
+)
+
+
+def save(carried: CarriedRobot, path: Path | str) -> None:
+    """Write the robot in its new sessions, and the covariance beside it.
+
+    Args:
+        carried: to these sessions.
+        path: of the robot file; the covariance gets the ending ``.npz``.
+
+    Raises:
+        BadInput: a file cannot be written.
+    """
+    path, robot = Path(path), carried_robot(carried)
+    record = {k: v for k, v in robot.diagnosis.items() if k != "covariance"}
+    known = covariance_of(carried, robot)
+    if known.numbers:
+        beside = path.with_suffix(".npz")
+        write_covariance(known, beside)
+        record["covariance"] = str(beside.resolve())
+    write_robot(replace(_with_std(robot, known), diagnosis=record), path)
+
+
+def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
+    """The covariance of the numbers that were fitted to the set-up rows.
+
+    Args:
+        carried: to these sessions.
+        robot: as it is written.
+
+    Returns:
+        That of the numbers of its file.
+    """
+    fit, rows = carried.fit, dict[Number, NDArray]()
+    count, machine = len(fit.x), fit.machine
+    for number, root in zip(renumbered(machine), machine.root, strict=True):
+        rows[number] = np.concatenate([np.zeros(count - len(machine)), root])
+    added = sum(len(one.unknowns.functions) for one in carried.sessions)
+    at, first = 0, len(robot.functions) - added
+    for one in carried.sessions:
+        for owner, name in one.unknowns.names:
+            number = Number(EFFECT, owner, name, one.session or "")
+            if owner not in LIBRARY:
+                place = first + one.unknowns.owners.index(owner)
+                number = Number(FUNCTION, str(place), name)
+            rows.setdefault(number, np.zeros(count))[at] += 1.0
+            at += 1
+        first += len(one.unknowns.functions)
+    T = np.array([*rows.values()]).reshape(len(rows), count)
+    return SavedCovariance(tuple(rows), T @ fit.covariance @ T.T)
+
+
+def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
+    """The robot whose functions say how uncertain their numbers are now."""
+    functions = list(robot.functions)
+    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0)).tolist()
+    for number, sigma in zip(known.numbers, std, strict=True):
+        if number.kind == FUNCTION:
+            one = functions[int(number.owner)]
+            own = {**one.std, number.name: sigma}
+            functions[int(number.owner)] = replace(one, std=own)
+    return replace(robot, functions=tuple(functions))

@@ -1,0 +1,140 @@
+r"""The machine's own numbers in a new session: as they were found, give or take.
+
+A saved robot's geometric errors, compliances, effects and functions are known with the
+covariance C of the fit.  That is the prior of them in another session.  A machine may
+have changed by more than the fit was uncertain: the prior is k C, with k of the largest
+evidence in the set-up rows (:mod:`.session_fit`).
+
+======  =============  =========  ====================================================
+symbol  code           shape      meaning
+======  =============  =========  ====================================================
+u       ``u``          (r,)       independent numbers of variance k
+L       ``root``       (m, r)     C = L L'; the m numbers are as saved plus L u
+======  =============  =========  ====================================================
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY
+from assembly.model.robot import Robot
+from validation.correction.session_unknowns import DRIFT, of_one_session
+from validation.diagnosis.saved_covariance import (
+    EFFECT,
+    FUNCTION,
+    Number,
+    known_covariance,
+)
+
+_RANK = 1e-10  # of the largest eigenvalue of the correlations: rounding
+
+
+@dataclass(frozen=True, eq=False)
+class MachineNumbers:
+    """Numbers of a saved robot that belong to no session.
+
+    Attributes:
+        robot: as it was saved.
+        numbers: m of them.
+        root: (m, r) of their covariance.
+    """
+
+    robot: Robot
+    numbers: tuple[Number, ...]
+    root: NDArray
+
+    def __len__(self) -> int:
+        return int(self.root.shape[1])
+
+    @property
+    def std(self) -> NDArray:
+        """(m,) standard deviations of the numbers."""
+        return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
+
+    def robot_at(self, u: NDArray) -> Robot:
+        """The robot whose numbers have changed by L u; none to what cannot be.
+
+        Args:
+            u: (r,).
+
+        Returns:
+            The robot; what cannot be negative changes by a factor.
+        """
+        robot = self.robot
+        if not np.any(u):
+            return robot
+        change = (self.root @ u).tolist()
+        for number, by in zip(self.numbers, change, strict=True):
+            robot = number.moved(robot, _possible(number, self.robot, by))
+        return robot
+
+
+def machine_numbers(robot: Robot) -> MachineNumbers:
+    """The numbers of a saved robot that every session shares.
+
+    Args:
+        robot: with its covariance, or ``tolerance`` and ``std``, in its file.
+
+    Returns:
+        Those that the file says how uncertain they are; none of what belongs to one
+        session, or to the place of a measuring device.
+
+    Raises:
+        BadInput: the covariance that the file names cannot be read.
+    """
+    known = known_covariance(robot)
+    own = np.array([_is_shared(n, robot) for n in known.numbers], dtype=bool)
+    C = known.covariance[np.ix_(own, own)]
+    std = np.sqrt(np.maximum(np.diag(C), 0.0))
+    unit = np.where(std > 0.0, std, 1.0)
+    values, vectors = np.linalg.eigh(C / np.outer(unit, unit))
+    shown = values > _RANK * values.max(initial=0.0)
+    root = unit[:, None] * vectors[:, shown] * np.sqrt(values[shown])
+    numbers = [n for n, is_own in zip(known.numbers, own, strict=True) if is_own]
+    return MachineNumbers(robot, tuple(numbers), root)
+
+
+def _is_shared(number: Number, robot: Robot) -> bool:
+    """Whether a number is the machine's in all sessions."""
+    if number.kind == EFFECT:
+        return not number.session and number.owner not in {"registration", DRIFT}
+    if number.kind == FUNCTION:
+        function = robot.functions[int(number.owner)]
+        return function.session is None and function not in of_one_session(robot)[1]
+    return True
+
+
+def _possible(number: Number, robot: Robot, by: float) -> float:
+    """A change that leaves a number what it can be."""
+    value = number.of(robot)
+    if number.kind == EFFECT and value > 0.0:
+        unknowns = LIBRARY[number.owner].unknowns(robot)
+        if all(unknown.lower >= 0.0 for unknown in unknowns):
+            return value * float(np.expm1(by / value))
+    return by
+
+
+def unchanging(robot: Robot) -> MachineNumbers:
+    """A robot whose numbers are taken as they are."""
+    return MachineNumbers(robot, (), np.zeros((0, 0)))
+
+
+def renumbered(machine: MachineNumbers) -> list[Number]:
+    """The numbers of a robot in the one without what changed with time.
+
+    Args:
+        machine: a saved robot.
+
+    Returns:
+        The same, functions counted without those of time.
+    """
+    own, places = of_one_session(machine.robot)[1], dict[str, str]()
+    for place, function in enumerate(machine.robot.functions):
+        if function not in own:
+            places[str(place)] = str(len(places))
+    return [
+        replace(n, owner=places[n.owner]) if n.kind == FUNCTION else n
+        for n in machine.numbers
+    ]

@@ -1,0 +1,300 @@
+r"""Sessions fitted to their set-up rows: what is theirs, and the machine's numbers.
+
+======  =============  =========  ====================================================
+symbol  code           shape      meaning
+======  =============  =========  ====================================================
+x       ``x``          (k,)       values of every session, then u of the machine
+J       ``slopes``     (R,6,p+r)  change of the readings per unit of a session's p
+                                  values and of u
+C       ``covariance`` (k, k)     of x
+======  =============  =========  ====================================================
+
+Of a session are its values (:mod:`.session_unknowns`), flat or with a prior; u
+(:mod:`.machine_numbers`) is common to all, N(0, k).  How much more than sigma the
+readings scatter about the saved robot, tau, is known from its diagnosis with 20 degrees
+of freedom; k has the largest evidence on a grid, tau marginalised.  Rows of one
+configuration tell the same: readings weigh as if there were one of each.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.effects.registration import BASE
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict
+from assembly.model.robot import Robot
+from validation.campaign.campaign import Campaign
+from validation.correction.machine_numbers import MachineNumbers
+from validation.correction.session_unknowns import SessionUnknowns, without_session
+from validation.correction.spread import number_slopes
+from validation.diagnosis.gaussian import deviance
+from validation.diagnosis.noise import FREEDOM, scale
+from validation.diagnosis.prediction import finite_conditions
+from validation.diagnosis.registration import coarse_frame
+
+_STEPS = 8
+_SETTLED = 1e-3  # [sigma of the value] a step that changes nothing
+_WIDENED = 4.0 ** np.arange(-3, 8)  # k that are tried
+_RANK = 1e-9  # relative singular value of a value that others do as well
+_AT_ONCE = 1000  # rows, so that memory stays small
+
+
+@dataclass(frozen=True, eq=False)
+class SetUp:
+    """A session of R rows, and which of them it is fitted to.
+
+    Attributes:
+        campaign: the rows, with the saved robot.
+        rows: (R,) bool, the set-up rows.
+        unknowns: what is the session's.
+    """
+
+    campaign: Campaign
+    rows: NDArray
+    unknowns: SessionUnknowns
+
+    @cached_property
+    def own(self) -> Campaign:
+        """The set-up rows."""
+        return self.campaign.take(self.rows)
+
+    @property
+    def repeated(self) -> float:
+        """Set-up rows of each configuration, on average."""
+        return len(self.own) / len(np.unique(self.own.configuration))
+
+    @property
+    def told(self) -> float:
+        """Variance of a reading over sigma^2, beforehand; more where rows repeat."""
+        left = self.campaign.robot.diagnosis.get("normalised")
+        level = max(1.0, left) if isinstance(left, float) else 1.0
+        return level**2 * self.repeated
+
+    def start(self) -> NDArray:
+        """(p,) values at which a fit begins."""
+        x = self.unknowns.mean.copy()
+        if any(name in BASE for _, name in self.unknowns.names):
+            conditions = self._still(self.campaign.robot, self.rows)
+            start = coarse_frame(self.own, conditions)
+            x += [start.get(name, 0.0) for _, name in self.unknowns.names]
+        return x
+
+    def _still(self, robot: Robot, rows: NDArray) -> Conditions:
+        """Conditions of some rows without what is the session's."""
+        bare = replace(self.campaign, robot=without_session(robot))
+        return finite_conditions(bare, rows)
+
+    def read(self, robot: Robot, values: NDArray) -> NDArray:
+        """(R, 6) [rad, m] readings of all rows."""
+        still = self._still(robot, np.arange(len(self.campaign)))
+        return predict(self.unknowns.applied(still, values)).deviation
+
+    def tangent(
+        self, machine: MachineNumbers, values: NDArray, u: NDArray, rows: NDArray
+    ) -> tuple[NDArray, NDArray]:
+        """Readings of some rows, and their slopes.
+
+        Args:
+            machine: the robot's own numbers.
+            values: (p,) of the session.
+            u: (r,) of the machine.
+            rows: mask (R,) or numbers of N rows.
+
+        Returns:
+            (N, 6) and (N, 6, p + r).
+        """
+        robot, unknowns = machine.robot_at(u), self.unknowns
+        still = self._still(robot, rows)
+        conditions = unknowns.applied(still, values)
+        middle = predict(conditions).deviation
+        slopes = np.empty((*middle.shape, len(values) + len(machine)))
+        for k in range(len(values)):
+            moved = values.copy()
+            moved[k] += unknowns.step[k]
+            there = predict(unknowns.applied(still, moved)).deviation
+            slopes[:, :, k] = (there - middle) / unknowns.step[k]
+        if len(machine):
+            J = number_slopes(
+                robot, conditions, machine.numbers, machine.std,
+                lambda other: unknowns.applied(self._still(other, rows), values),
+            )  # fmt: skip
+            slopes[:, :, len(values) :] = J @ machine.root
+        return middle, slopes
+
+    def whitened(
+        self, machine: MachineNumbers, values: NDArray, u: NDArray
+    ) -> tuple[NDArray, NDArray]:
+        """(n,) residual and (n, p + r) slopes of the set-up cells, over sigma."""
+        own = self.own
+        read, slopes = self.tangent(machine, values, u, self.rows)
+        A = (slopes / own.sigma[:, :, None])[own.cells]
+        return ((own.measured - read) / own.sigma)[own.cells], A
+
+
+@dataclass(frozen=True, eq=False)
+class SessionsFit:
+    """Sessions as fitted.
+
+    Attributes:
+        sessions: m of them.
+        machine: the robot's own numbers.
+        x: (k,) values of every session, then u.
+        covariance: (k, k) of them.
+        widened: by which the covariance of the machine's numbers was multiplied.
+    """
+
+    sessions: tuple[SetUp, ...]
+    machine: MachineNumbers
+    x: NDArray
+    covariance: NDArray
+    widened: float
+
+    @property
+    def u(self) -> NDArray:
+        """(r,) of the machine."""
+        return self.x[len(self.x) - len(self.machine) :]
+
+    @property
+    def robot(self) -> Robot:
+        """The saved robot with its numbers as they are in these sessions."""
+        return self.machine.robot_at(self.u)
+
+    def own(self, number: int) -> slice:
+        """Where a session's values are in x."""
+        return _own(self.sessions, number)
+
+    def values(self, number: int) -> NDArray:
+        """(p,) of a session."""
+        return self.x[self.own(number)]
+
+    def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
+        """By how much the uncertainty of x leaves readings of a session open.
+
+        Args:
+            number: of the session.
+            cells: (R, 6) bool, which readings.
+
+        Returns:
+            Mean variance, and (p + 1,) what each value by itself adds to it, and all of
+            u together.
+        """
+        one, own = self.sessions[number], self.own(number)
+        p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
+        both = np.r_[own, u]
+        C, total, blame = self.covariance[np.ix_(both, both)], 0.0, np.zeros(p + 1)
+        rows = np.flatnonzero(cells.any(axis=1))
+        for begin in range(0, len(rows), _AT_ONCE):
+            some = rows[begin : begin + _AT_ONCE]
+            J = one.tangent(self.machine, self.values(number), self.u, some)[1]
+            J = J[cells[some]]
+            total += float(np.einsum("nk,nk->", J @ C, J))
+            blame[:p] += np.diag(C)[:p] * (J[:, :p] ** 2).sum(axis=0)
+            blame[p] += float(np.einsum("nk,nk->", J[:, p:] @ C[p:, p:], J[:, p:]))
+        return total / max(cells.sum(), 1), blame / max(cells.sum(), 1)
+
+
+def _own(sessions: Sequence[SetUp], number: int) -> slice:
+    """Where a session's values are in x."""
+    begin = sum(len(one.unknowns) for one in sessions[:number])
+    return slice(begin, begin + len(sessions[number].unknowns))
+
+
+def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> SessionsFit:
+    """Fit what is the sessions', and the machine's numbers, to the set-up rows.
+
+    Args:
+        sessions: of one robot.
+        machine: its own numbers.
+
+    Returns:
+        The most probable values, by Gauss-Newton's method.
+    """
+    fixed = replace(machine, numbers=(), root=np.zeros((0, 0)))
+    told = [one.told for one in sessions]
+    x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
+    x, _ = _settled(sessions, fixed, x, told, 1.0)
+    widened, tau = _widened(sessions, machine, x, told)
+    told = [max(one.told * tau**2, one.repeated) for one in sessions]
+    x, C = _settled(
+        sessions, machine, np.append(x, np.zeros(len(machine))), told, widened
+    )
+    return SessionsFit(tuple(sessions), machine, x, C, widened)
+
+
+def _settled(
+    sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
+    told: Sequence[float], widened: float,
+) -> tuple[NDArray, NDArray]:  # fmt: skip
+    """(k,) most probable x, and its covariance (k, k)."""
+    begin = len(x) - len(machine)
+    mean = np.concatenate([
+        *(s.unknowns.mean for s in sessions),
+        np.zeros(len(machine)),
+    ])
+    prior = [*(s.unknowns.prior for s in sessions), np.full(len(machine), 1 / widened)]
+    precision = np.concatenate(prior)
+    C = np.zeros((len(x), len(x)))
+    for _ in range(_STEPS):
+        H, g = np.diag(precision), -precision * (x - mean)
+        for k, one in enumerate(sessions):
+            own = np.r_[_own(sessions, k), begin : len(x)]
+            z, A = one.whitened(machine, x[_own(sessions, k)], x[begin:])
+            H[np.ix_(own, own)] += A.T @ A / told[k]
+            g[own] += A.T @ z / told[k]
+        C = _inverse(H)
+        step = C @ g
+        x = x + step
+        if np.all(np.abs(step) <= _SETTLED * np.sqrt(np.diag(C))):
+            break
+    return x, C
+
+
+def _inverse(H: NDArray) -> NDArray:
+    """H^-1; a direction of which nothing is known stays finite."""
+    size = np.sqrt(np.diag(H))
+    unit = np.where(size > 0, size, 1.0)
+    scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
+    return np.linalg.inv(scaled) / np.outer(unit, unit)
+
+
+def _widened(
+    sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
+    told: Sequence[float],
+) -> tuple[float, float]:  # fmt: skip
+    """How much the covariance is to be multiplied by, and tau, by the evidence."""
+    values = sum(len(one.unknowns) for one in sessions)
+    zs, rows = [], []
+    for k, one in enumerate(sessions):
+        z, A = one.whitened(machine, x[_own(sessions, k)], np.zeros(len(machine)))
+        wide = np.zeros((len(z), values + len(machine)))
+        wide[:, np.r_[_own(sessions, k), values : wide.shape[1]]] = A
+        zs.append(z / np.sqrt(told[k]))
+        rows.append(wide / np.sqrt(told[k]))
+    z, A = np.concatenate(zs), np.vstack(rows)
+    precision = np.concatenate([np.zeros(0), *(s.unknowns.prior for s in sessions)])
+    flat = np.append(precision == 0.0, np.zeros(len(machine), dtype=bool))
+    Q, size, _ = np.linalg.svd(A[:, flat] / _norm(A[:, flat]), full_matrices=False)
+    Q = Q[:, size > _RANK * size.max(initial=0.0)]
+    z, A = z - Q @ (Q.T @ z), (A - Q @ (Q.T @ A))[:, ~flat]
+    known = precision[precision > 0.0] ** -0.5
+    count, best = len(z) - Q.shape[1], (-np.inf, 1.0, 1.0)
+    for k in _WIDENED if len(machine) else _WIDENED[:1]:
+        B = A * np.append(known, np.full(len(machine), np.sqrt(k)))
+        M = np.eye(B.shape[1]) + B.T @ B
+        along = B.T @ z
+        squares = float(z @ z - along @ np.linalg.solve(M, along))
+        score = -float(np.linalg.slogdet(M)[1]) - float(
+            deviance(squares, count, FREEDOM)
+        )
+        if score > best[0]:
+            tau = scale(squares, count)[0]
+            best = score, max(1.0, float(k) * tau**2), tau
+    return best[1], best[2]
+
+
+def _norm(columns: NDArray) -> NDArray:
+    return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)

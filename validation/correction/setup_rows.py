@@ -1,0 +1,67 @@
+"""Which rows of a campaign ``--setup`` names."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.errors import BadInput, nearest, quoted
+from validation.campaign.campaign import Campaign
+
+
+def setup_rows(campaign: Campaign, text: str) -> NDArray:
+    """Which rows ``--setup`` names.
+
+    Args:
+        campaign: with rows in the order of the file.
+        text: ``20`` for the first 20 of each session, numbers and ranges of rows such
+            as ``1-20,31``, or labels.
+
+    Returns:
+        (R,) bool; all points of a row of the file together.
+
+    Raises:
+        BadInput: neither a number of rows nor rows that are there.
+    """
+    labels = [_label(campaign, i) for i in range(len(campaign))]
+    order = list(dict.fromkeys(labels))
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) == 1 and parts[0].isascii() and parts[0].isdigit():
+        chosen = _first(campaign, labels, int(parts[0]))
+    else:
+        chosen = {label for part in parts for label in _range(part, order)}
+    return np.array([label in chosen for label in labels])
+
+
+def _label(campaign: Campaign, row: int) -> str:
+    """The label of a row in the file, the point taken off."""
+    point = "" if campaign.point is None else str(campaign.point[row])
+    return campaign.ids[row].removesuffix(f":{point}") if point else campaign.ids[row]
+
+
+def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
+    """The first rows of every session."""
+    chosen: set[str] = set()
+    sessions = campaign.session
+    for session in campaign.sessions or (None,):
+        own = [
+            label for i, label in enumerate(labels)
+            if sessions is None or sessions[i] == session
+        ]  # fmt: skip
+        chosen |= set(list(dict.fromkeys(own))[:count])
+    return chosen
+
+
+def _range(part: str, order: list[str]) -> list[str]:
+    """Labels of a row's number, of a range of them, or of a label."""
+    if part in order:
+        return [part]
+    begin, dash, end = part.partition("-")
+    numbers = [begin, end] if dash else [begin, begin]
+    if all(n.isascii() and n.isdigit() for n in numbers):
+        first, last = map(int, numbers)
+        if 1 <= first <= last <= len(order):
+            return order[first - 1 : last]
+        raise BadInput(
+            f"--setup: found {quoted(part)}, expected rows 1 to {len(order)}"
+        )
+    hint = nearest(part, order)
+    raise BadInput(f"--setup: found {quoted(part)}, which is no row's label{hint}")
