@@ -20,6 +20,7 @@ from validation.diagnosis.unknowns import Acting
 
 _CHANCE = 1e-3  # probability of as large an effect where there is none
 _AT_BOUND = 1e-3  # of a bound's distance from the start: the unknown is at the bound
+_RANK = 1e-9  # relative singular value of a direction that others do as well
 _STEP = 1e-4  # of an unknown's size, for derivatives of public parameters
 _NOTHING: Values = MappingProxyType({})
 
@@ -47,6 +48,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
     if np.any(shape & _at_lower(one, x)):
         return False
     moved = np.where(shape, 0.0, x - begin)
+    slopes = _without_devices(fit, slopes)
     size = float(np.sum((slopes @ moved) ** 2))
     unsure = float(np.einsum("ni,ij,nj->", slopes, C, slopes))
     seen = ~shape & (np.linalg.norm(slopes, axis=0) > 0.0)
@@ -55,6 +57,19 @@ def supported(fit: MachineFit, one: Acting) -> bool:
     inverse = np.linalg.pinv(C[np.ix_(seen, seen)], hermitian=True)
     wald = float(moved[seen] @ inverse @ moved[seen])
     return float(chi2.sf(wald, int(seen.sum()))) < _CHANCE
+
+
+def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
+    """(n, k) slopes without what the place of a measuring device does as well."""
+    places = zip(fit.unknowns.effects, fit.unknowns.slices, strict=False)
+    own = [fit.slopes[:, place] for one, place in places if one.device]
+    if not own:
+        return slopes
+    flat = np.hstack(own)
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+    Q, size, _ = np.linalg.svd(flat, full_matrices=False)
+    Q = Q[:, size > _RANK * size.max(initial=0.0)]
+    return slopes - Q @ (Q.T @ slopes)
 
 
 def _at_bound(bound: float, value: float) -> bool:

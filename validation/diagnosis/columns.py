@@ -25,6 +25,11 @@ from validation.diagnosis.joint_functions import joint_functions
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
 from validation.diagnosis.responses import responses
+from validation.diagnosis.session_hypotheses import (
+    in_one_session,
+    sessions_of,
+    with_sessions,
+)
 from validation.diagnosis.signatures import (
     Signature,
     Tangents,
@@ -36,6 +41,7 @@ from validation.diagnosis.small_terms import small_terms
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time of what counts it
 _SAMPLE = 500  # rows, drawn once
+_ALIKE = 1e-3  # share of a column that a device's place does not imitate: none
 _VISIBLE = 4.0  # squared whitened change of the readings
 
 
@@ -94,10 +100,11 @@ class Columns:
         listed = hypotheses(self.conditions, loaded_components(self.campaign))
         shown: dict[object, Signature] = {}
         listed = with_declared(listed, self.campaign.robot)
+        listed = with_sessions(listed, self.campaign.sessions)
         listed = [h for h in listed if self.odds.get(h.effect, 1.0) > 0.0]
         for k, h in enumerate(listed):
             if not (self.device and _moves_base(h)):
-                signature = self.tangents.at_start(h)
+                signature = self._told(self._at_start(h))
                 if _shows(signature):
                     shown.setdefault(_print(signature), signature)
             update("signatures", k + 1, len(listed))
@@ -172,12 +179,10 @@ class Columns:
             has no solution there.
         """
         robot = self.campaign.robot
-        public = self._public(elements, xs)
         middle = self.combined(elements, xs)
         made = []
-        for e, x in zip(elements, xs, strict=True):
-            others = {name: v for name, v in public.items() if name != e.name}
-            signature = self.tangents.about(e.hypothesis, x, others)
+        for k, x in enumerate(xs):
+            signature = self._about(elements, xs, k)
             if not _finite(signature) or not np.isfinite(middle).all():
                 return list(elements)
             middle = middle - signature.columns @ x
@@ -189,9 +194,58 @@ class Columns:
             for s, e, x in zip(made, elements, xs, strict=True)
         ]
 
+    def _at_start(self, h: Hypothesis) -> Signature:
+        """Return a hypothesis to first order where it begins."""
+        first, own = in_one_session(h, sessions_of(h)[0])
+        alike = self.tangents.at_start(first)
+        columns = [alike.columns * self._rows_of(s) for s in sessions_of(h)]
+        return replace(alike, hypothesis=h, columns=np.hstack(columns))
+
+    def _told(self, signature: Signature) -> Signature:
+        """Return a hypothesis of sessions without what their devices imitate."""
+        h = signature.hypothesis
+        if not self.flat.shape[1] or sessions_of(h) == (None,):
+            return signature
+        columns = signature.columns
+        size = np.linalg.norm(columns, axis=0)
+        there = np.linalg.lstsq(self.flat, columns, rcond=_ALIKE)[0]
+        left = np.linalg.norm(columns - self.flat @ there, axis=0)
+        kept = np.flatnonzero((left > _ALIKE * size) | (size == 0.0))
+        slots = tuple(h.slots[k] for k in kept)
+        own = replace(h, slots=slots)
+        return replace(signature, hypothesis=own, columns=columns[:, kept])
+
+    def _about(
+        self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
+    ) -> Signature:
+        """Return the k-th effect to first order about values, the others beside it."""
+        h = elements[k].hypothesis
+        columns, offset = np.zeros((len(self.row), len(h.slots))), np.zeros(1)
+        for session in _sessions(elements):
+            others = self._public(elements, xs, session)
+            del others[elements[k].name]
+            there, own = in_one_session(h, session)
+            one = self.tangents.about(there, xs[k][own], others)
+            columns[:, own] += one.columns * self._rows_of(session)
+            offset = offset + one.offset * self._rows_of(session)[:, 0]
+        return Signature(h, offset, columns)
+
+    def _rows_of(self, session: str | None) -> NDArray:
+        """(N, 1) 1 in the cells of a session, else 0; 1 in all of None."""
+        if session is None or self.campaign.session is None:
+            return np.ones((len(self.row), 1))
+        return (self.campaign.session[self.row] == session)[:, None].astype(float)
+
     def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
         """Return the (N,) whitened contribution of effects acting together."""
-        public = self._public(elements, xs)
+        own = [
+            self._combined(self._public(elements, xs, s)) * self._rows_of(s)[:, 0]
+            for s in _sessions(elements)
+        ]
+        return np.sum(own, axis=0)
+
+    def _combined(self, public: dict[str, dict[str, float]]) -> NDArray:
+        """Return the (N,) whitened contribution of effects in all rows."""
         if any(LIBRARY[name].clearance for name in public):
             return self.tangents.model(public) - self.tangents.declared
         changed = apply_effects(self.conditions, public)
@@ -202,14 +256,20 @@ class Columns:
         return whitened - self.tangents.declared
 
     def _public(
-        self, elements: Sequence[Element], xs: Sequence[NDArray]
+        self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
     ) -> dict[str, dict[str, float]]:
-        """Return parameters by their public names."""
-        robot = self.conditions.robot
-        return {
-            e.name: e.hypothesis.public(robot, x)
-            for e, x in zip(elements, xs, strict=True)
-        }
+        """Return parameters by their public names, as they are in a session."""
+        robot, values = self.conditions.robot, {}
+        for e, x in zip(elements, xs, strict=True):
+            there, own = in_one_session(e.hypothesis, session)
+            values[e.name] = there.public(robot, x[own])
+        return values
+
+
+def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
+    """Return the sessions that effects tell apart, else None alone."""
+    every = [name for e in elements for name in sessions_of(e.hypothesis)]
+    return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 
 
 def _finite(signature: Signature) -> bool:

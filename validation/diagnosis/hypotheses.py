@@ -28,12 +28,14 @@ class Slot:
         unknown: their scale and bounds.
         start: where a fit begins.
         shape: whether the model is far from linear in it, so that screening holds it.
+        session: the only one in which it acts; None where it acts in all.
     """
 
     names: tuple[str, ...]
     unknown: Unknown
     start: float
     shape: bool = False
+    session: str | None = None
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,8 @@ def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """(S, 6) whitened predictions with a machine's effects, (S, 6, k) derivatives."""
-    parts = [e for e in fit.unknowns.effects if not e.device]
+    # a session's own numbers say nothing of another measurement
+    parts = [e for e in fit.unknowns.effects if not e.device and e.session is None]
     values = [fit.own(one)[0] for one in parts]
     places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
     which = [np.arange(own.start, own.stop) for one, own in places if one in parts]

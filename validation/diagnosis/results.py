@@ -186,13 +186,17 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             continue
         name, h = one.hypothesis.effect, one.hypothesis
         x, C, _ = diagnosis.fit.own(one)
-        declared = robot.effects.get(name, {}) if one.session is None else {}
+        there = robot.effects
+        if one.session is not None:
+            there = robot.session_effects.get(one.session, {})
+        declared = there.get(name, {})
         seen = diagnosis.fit.seen(one)
         parameters = parameters_of(bare, one, x, C, declared, seen)
         differences = h.public(bare, x)
         acting = {n for p, *_ in parameters for n in (p, p.rpartition(".")[0])}
         shown.append({
             "name": name,
+            **({} if one.session is None else {"session": one.session}),
             # frames found rigid or tight have no parameter
             "where": [frame for frame in h.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),

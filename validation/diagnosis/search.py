@@ -275,7 +275,13 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self._candidates(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            near = {e.origin: e for w, e in listed if w > best.score - _NEAR}
+            # other ways in which the same effect may act are always tried: estimates
+            # err alike for all of them
+            near = {
+                e.origin: e
+                for w, e in listed
+                if w > best.score - _NEAR or (e.name and e.name == out.name)
+            }
             near.pop(out, None)
             tried = [(*base.elements, e) for e in [*near.values()][:_BEAM]]
             self._keep(self._refined((elements, base) for elements in tried))

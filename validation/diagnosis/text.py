@@ -61,7 +61,9 @@ def _effects_text(diagnosis: Diagnosis) -> list[str]:
     """Effects with their parameters, where the verdict lists them."""
     lines = []
     for effect in effects(diagnosis) if diagnosis.verdict in LISTED else []:
-        lines.append(f"{effect['name']}  (probability {effect['probability']:.3f})")
+        there = f" in session {effect['session']}" if "session" in effect else ""
+        how = f"(probability {effect['probability']:.3f})"
+        lines.append(f"{effect['name']}{there}  {how}")
         for p in effect["parameters"]:
             line = f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
             if "found" in p:

@@ -40,6 +40,7 @@ from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.registration import register
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
+from validation.diagnosis.session_hypotheses import in_one_session, sessions_of
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.states import prediction_gain
@@ -96,7 +97,7 @@ class Traced:
             if unknown and k == 0:
                 effects += self._device_frames(h)
             elif h.effect != FINITE or self._alone:
-                effects.append(Acting(h, found.values[own]))
+                effects += _acting(h, found.values[own])
         small = []
         for name, springs in ((GEOMETRY, False), (SPRINGS, True)):
             own = found.prior.spring == springs
@@ -129,8 +130,11 @@ class Traced:
                 continue
             elements = [(k, e) for k, e in enumerate(state.elements) if e.name]
             effects = [
-                Acting(e.hypothesis, e.values(state.sizes.mean[state.own(k)]))
+                one
                 for k, e in elements
+                for one in _acting(
+                    e.hypothesis, e.values(state.sizes.mean[state.own(k)])
+                )
             ]
             device = [e for e in self.unknowns.effects if e.device]
             found[other] = replace(
@@ -148,6 +152,12 @@ class Traced:
                 row = int(np.flatnonzero(self.campaign.session == session)[0])
             own[session] = base[row]
         return [Acting(hypothesis, start, s, True) for s, start in own.items()]
+
+
+def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
+    """A hypothesis at work, in each session for which it has numbers."""
+    own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
+    return [Acting(there, values[places], s) for (there, places), s in own]
 
 
 def trace(

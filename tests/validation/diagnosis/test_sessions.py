@@ -1,0 +1,118 @@
+"""Campaigns of several sessions, made by the program of springs."""
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot, write_robot
+from tests.campaigns_for_tests import write_campaign
+from tests.validation.diagnosis.test_simulated import arm
+from validation.campaign.campaign_file import read_campaign, read_commands
+from validation.correction.prediction import foretell
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import table
+from validation.diagnosis.saving import save
+from validation.synthetic.design import CampaignDesign, plan_campaign
+from validation.synthetic.effects import SCREW
+from validation.synthetic.machine import Hidden, simulate_readings
+
+SIGMA = np.repeat([1e-5, 5e-6], 3)
+DESIGN = CampaignDesign(configurations=32, rows=56, load=40.0, reach=0.8)
+SPRING = 5e4  # N m/rad, in series with the drive that is declared
+ZEROS = {"monday": {"j2": 3e-4, "j3": -2e-4}, "tuesday": {"j2": -2e-4, "j3": 2.5e-4}}
+TOOLS = {"monday": [2e-4, 0.0, -1e-4], "tuesday": [-1e-4, 2e-4, 0.0]}
+FRAMES = {"monday": [0.3, -0.2, 0.5, 1.2, -0.4, 0.7], "tuesday": [0, 0, 1, 2, 0, 0]}
+
+
+def registration(session, *, placed):
+    """The tool of a session, and where its device stands."""
+    numbers = {f"tool.{k}": v for k, v in zip(SCREW[3:], TOOLS[session], strict=True)}
+    if placed:
+        base = zip(SCREW, FRAMES[session], strict=True)
+        numbers |= {f"base.{k}": float(v) for k, v in base}
+    return Hidden("registration", numbers)
+
+
+def measured(folder, hidden, common=(), known=True):
+    """A campaign of the arm, each session with what is hidden in it and in all."""
+    robot, body, head = arm(), [], None
+    for number, (session, own) in enumerate(hidden.items()):
+        rng = np.random.default_rng(70 + number)
+        plan = plan_campaign(robot, DESIGN, rng)
+        read = simulate_readings(
+            robot, np.zeros(3), plan.rows, [*common, *own], "springs"
+        )
+        read = read + SIGMA * rng.normal(size=read.shape)
+        head = ["id", *plan.columns, "session", "load.fx", "load.fy", "load.fz"]
+        head += [f"meas.{k}" for k in SCREW] + ["cov.time", "cov.temperature"]
+        for i, row in enumerate(plan.rows):
+            cells = [f"{session}{i}", *plan.commands[i].tolist(), session]
+            cells += [*row.load[3:].tolist(), *read[i].tolist()]
+            cells += [row.covariates["time"], row.covariates["temperature"]]
+            body.append(",".join(map(str, cells)))
+    write_robot(robot, folder / "declared.toml")
+    noise = f"[noise]\nrotation = {SIGMA[0]}\nposition = {SIGMA[5]}\n"
+    return write_campaign(
+        folder / "days", ",".join(head), body,
+        robot=(folder / "declared.toml").read_text(), noise=noise,
+        toml={"registration": '"known"' if known else '"unknown"'},
+    )  # fmt: skip
+
+
+def parameters(found, name, session=None):
+    """Value and standard deviation of an effect's parameters, by name."""
+    return {
+        p["name"]: (p["value"], p["std"])
+        for effect in found["effects"]
+        if effect["name"] == name and effect.get("session") == session
+        for p in effect["parameters"]
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("known", [True, False])
+def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
+    """A spring that all share is found beside them; the file says all of it."""
+    spring = Hidden("drive_compliance", {"j2": SPRING})
+    hidden = {
+        s: [Hidden("encoder_offset", ZEROS[s]), registration(s, placed=not known)]
+        for s in ZEROS
+    }
+    folder = measured(tmp_path, hidden, [spring], known)
+    diagnosis = diagnose(read_campaign(folder))
+    found = table(diagnosis)
+    assert found["verdict"] == "explained"
+    assert set(diagnosis.claimed) == {
+        "drive_compliance", "encoder_offset", "registration",
+    }  # fmt: skip
+    value, std = parameters(found, "drive_compliance")["j2"]
+    assert abs(value - SPRING) < 4 * std
+    for session, zeros in ZEROS.items():
+        told = parameters(found, "encoder_offset", session)
+        tool = parameters(found, "registration", session)
+        assert all(name.startswith("tool.") for name in tool)
+        true = zeros | {
+            f"tool.t{k}": v for k, v in zip("xyz", TOOLS[session], strict=True)
+        }
+        for name, one in true.items():
+            value, std = (told | tool)[name]
+            assert abs(value - one) < 4 * std
+            assert std < 2e-5
+    assert found["error"]["after"]["normalised"] < 1.1
+    save(diagnosis, tmp_path / "found.toml")
+    robot = read_robot(tmp_path / "found.toml")
+    assert set(robot.session_effects) == set(ZEROS)
+    again = foretell(read_commands(folder, robot))
+    assert again.error[2] == pytest.approx(found["error"]["saved"]["normalised"])
+
+
+@pytest.mark.slow
+def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
+    """What all share is claimed for all, and saved without a session."""
+    zeros = Hidden("encoder_offset", ZEROS["monday"])
+    folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
+    diagnosis = diagnose(read_campaign(folder))
+    assert diagnosis.claimed == ("encoder_offset",)
+    assert diagnosis.robot.session_effects == {}
+    told = parameters(table(diagnosis), "encoder_offset")
+    for name, true in ZEROS["monday"].items():
+        assert abs(told[name][0] - true) < 4 * told[name][1]
