@@ -1,6 +1,8 @@
 """Where a machine was measured when its robot file was made, and rows beyond that.
 
 A function of a covariate, and any other effect, is known where that covariate has been.
+A joint that has turned once more stands where it stood: its angle is compared modulo a
+turn, unless the file has a function of it that does not repeat after a turn.
 """
 
 from collections.abc import Iterator
@@ -11,12 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects.places import drives
+from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, Campaign
 
 _MARGIN = 0.05  # of a range: so far it is continued without a word
 _SAME = 1e-3  # of a value: so far one that never varied is the same
 _OWN = ("time",)  # every session has its own
+# forms that repeat after a turn of any variable; of the first alone
+_PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
 @dataclass(frozen=True)
@@ -113,9 +118,28 @@ def _outside(
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
         margin = _MARGIN * (high - low) + _SAME * max(abs(low), abs(high))
-        outside = (values < low - margin) | (values > high + margin)
+        above = values - (low - margin)
+        if _repeats(robot, name):
+            above = above % (2 * np.pi)
+        outside = (above < 0.0) | (above > high - low + 2 * margin)
         if outside.any():
             yield name, values, outside
+
+
+def _repeats(robot: Robot, name: str) -> bool:
+    """Whether the robot is the same after a turn of a variable."""
+    turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
+    return name in turning and all(
+        _turns_over(function, name)
+        for function in robot.functions
+        if name in function.variables
+    )
+
+
+def _turns_over(function: Function, name: str) -> bool:
+    """Whether a function repeats after a turn of one of its variables."""
+    forms = _PERIODIC if name == function.variables[0] else _PERIODIC[:2]
+    return function.form in forms and "period" not in function.parameters
 
 
 def _variables(campaign: Campaign) -> dict[str, NDArray]:

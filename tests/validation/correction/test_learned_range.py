@@ -1,11 +1,13 @@
 """A robot is known where it was measured: rows beyond that are named."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from assembly.files.robot_file import read_robot, write_robot
+from assembly.model.function import Function
 from tests.campaigns_for_tests import ARM, write_campaign
 from validation.campaign.campaign_file import read_commands
 from validation.diagnosis.learned_range import beyond, learned_range
@@ -38,6 +40,30 @@ def test_a_twentieth_of_the_range_more_is_no_matter(tmp_path):
         folder = write_campaign(tmp_path / f"c{tilt}", HEAD, rows)
         left = beyond(robot, read_commands(folder, robot))
         assert [one.rows for one in left] == [1] * outside
+
+
+@pytest.mark.parametrize(("variables", "form", "name", "outside"), [
+    (None, "", "", 0),
+    (("q.one",), "waves", "1.sine", 0),
+    (("q.one",), "reversal", "0", 0),
+    (("q.one", "cov.tilt"), "scaled_waves", "1.sine", 0),
+    (("q.two", "q.one"), "scaled_waves", "1.sine", 1),
+    (("q.one",), "powers", "1", 1),
+])  # fmt: skip
+def test_a_joint_that_turned_once_more_is_where_it_was(
+    variables, form, name, outside, tmp_path
+):
+    """Unless a function of its angle does not repeat after a turn."""
+    robot = read_robot(robot_file(tmp_path))
+    if variables:
+        one = Function("base", ("tx",), variables, form, {name: 1e-6})
+        robot = replace(robot, functions=(one,))
+    rows = [f"a,{0.3 + 2 * np.pi},0.2,0.2,0,0", f"b,{0.5 - 4 * np.pi},0.2,0.2,9,0"]
+    folder = write_campaign(tmp_path / "c", HEAD, [*rows, "c,0.1,0.2,0.2,10,0"])
+    left = beyond(robot, read_commands(folder, robot))
+    assert [(one.variable, one.rows) for one in left] == [("q.one", 2)] * outside
+    half = write_campaign(tmp_path / "d", HEAD, [f"a,{0.3 + np.pi},0.2,0.2,0,0"])
+    assert [one.rows for one in beyond(robot, read_commands(half, robot))] == [1]
 
 
 def test_what_a_campaign_does_not_record_is_not_outside(tmp_path):
