@@ -42,6 +42,7 @@ class Campaign:
             rows that share it were measured twice.
         session: (R,) names of sessions; None where the file has none.
         points: (3,) [m] each, further points measured, platform axes, by name.
+        partial: (R,) each, further covariates that some sessions lack: NaN there.
         point: (R,) names of the points that rows read, ``""`` for the reference
             point; None where all are that.  A row of the file is a row for each point.
     """
@@ -64,6 +65,7 @@ class Campaign:
     session: NDArray | None = None
     points: Mapping[str, NDArray] = field(default_factory=dict)
     point: NDArray | None = None
+    partial: Mapping[str, NDArray] = field(default_factory=dict)
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -83,6 +85,7 @@ class Campaign:
             "sigma": ", ".join(sizes) or "none",
             "loaded": f"{int(self.loads.any(axis=1).sum())} rows",
             "covariates": ", ".join(self.covariates) or "none",
+            **({"in some sessions": ", ".join(self.partial)} if self.partial else {}),
             "registration": self.registration,
             **({"points": ", ".join(self.points)} if self.points else {}),
             **({"sessions": ", ".join(self.sessions)} if self.sessions else {}),
@@ -156,6 +159,7 @@ class Campaign:
             self,
             ids=tuple(self.ids[i] for i in chosen),
             covariates={k: v[chosen] for k, v in self.covariates.items()},
+            partial={k: v[chosen] for k, v in self.partial.items()},
             session=None if self.session is None else self.session[chosen],
             point=None if self.point is None else self.point[chosen],
             **{name: getattr(self, name)[chosen] for name in names},

@@ -173,6 +173,11 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     kinds = [which]
     if session is not None:
         kinds.append(np.unique(session, return_inverse=True)[1])
+    covariates = {
+        name.removeprefix("cov."): values[row]
+        for name, values in table.columns.items()
+        if name.startswith("cov.")
+    }
     return Campaign(
         name=declared.name,
         robot=robot,
@@ -184,11 +189,8 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         loads=loads,
         measured=np.array([readings for readings, _ in every.values()])[which, row],
         sigma=np.array([sigma for _, sigma in every.values()])[which, row],
-        covariates={
-            name.removeprefix("cov."): values[row]
-            for name, values in table.columns.items()
-            if name.startswith("cov.")
-        },
+        covariates={k: v for k, v in covariates.items() if np.isfinite(v).all()},
+        partial={k: v for k, v in covariates.items() if not np.isfinite(v).all()},
         reference_point=point,
         registration=declared.registration,
         configuration=configuration,

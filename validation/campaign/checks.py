@@ -65,7 +65,7 @@ def _check_covariates(table: MeasurementTable) -> None:
             raise table.bad(int(i), "cov.time", message)
     if "cov.approach" in columns:
         side = columns["cov.approach"]
-        for i in np.flatnonzero(np.abs(side) != 1)[:1]:
+        for i in np.flatnonzero(np.isfinite(side) & (np.abs(side) != 1))[:1]:
             message = f"found {side[i]:g}, expected -1 or 1"
             raise table.bad(int(i), "cov.approach", message)
 

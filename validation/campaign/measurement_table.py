@@ -128,14 +128,15 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
         The only one as it is; of several, labels begin with the file's name.
 
     Raises:
-        BadInput: one lacks a column of the others that may not be empty.
+        BadInput: one lacks a column of the others that may not be empty; a covariate
+            may be, in a whole table, and is NaN there.
     """
     if len(tables) == 1:
         return tables[0]
     names = list(dict.fromkeys(name for t in tables for name in t.columns))
     columns = {}
     for name in names:
-        may_lack = name.startswith(("meas.", "sigma.", "load."))
+        may_lack = name.startswith(("meas.", "sigma.", "load.", "cov."))
         for table in tables:
             if name not in table.columns and not may_lack:
                 message = f"line 1: missing column {quoted(name)}, which others have"

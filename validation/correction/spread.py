@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from assembly.effects.functions import in_session, inputs_of, is_loaded, value_of
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
+from assembly.model.function import PLACES, Function
 from assembly.model.robot import Robot
 from stiffness.screws import SCREW
 from validation.diagnosis.responses import Responses, responses
@@ -85,28 +86,49 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Whether a function is a small screw at a frame, whatever it carries."""
+    """Whether a function does not depend on what it does itself."""
     function = robot.functions[int(number.owner)]
-    frame = any(f.name == function.where for f in robot.frames)
-    return frame and not is_loaded(function)
+    wrench = any(name.startswith("wrench.") for name in function.variables)
+    alone = function.where not in PLACES and function.kind == "compliance"
+    return (
+        function.where != "load" and not wrench and (alone or not is_loaded(function))
+    )
 
 
 def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """(R, 6) change of the deviation per number of a function at a frame."""
+    """(R, 6) change of the deviation per number of a function."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step
     other = replace(one, parameters={**one.parameters, number.name: more})
     inputs = list(inputs_of(conditions, one).T)
     acts = in_session(conditions, one.session)
-    row = conditions.robot.index(one.where)
     slope = np.zeros((len(conditions), 6))
     for component in one.components:
         change = value_of(other, component, inputs) - value_of(one, component, inputs)
         change = np.where(acts, change, 0.0) / step
-        axis = _AXES.index(component)
-        slope += response.screws[:, :, row, axis] * change[:, None]
+        slope += _answer(conditions, response, one, component) * change[:, None]
     return slope
+
+
+def _answer(
+    conditions: Conditions, response: Responses, function: Function, component: str
+) -> NDArray:
+    """(R, 6) change of the deviation per unit of one component of a function."""
+    axis = _AXES.index(component)
+    if function.where == "reading":
+        return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))
+    if function.where == "base":
+        screw = np.zeros((len(conditions), 6))
+        screw[:, axis] = 1.0
+        origin = conditions.postures.platform[:, :3, 3]
+        screw[:, 3:] += np.cross(screw[:, :3], origin)
+        return np.einsum("rij,rj->ri", response.reading, screw)
+    row = conditions.robot.index(function.where)
+    if function.kind == "compliance":
+        wrench = response.wrenches[:, row, axis, None]
+        return response.screws[:, :, row, axis] * wrench
+    return response.screws[:, :, row, axis]

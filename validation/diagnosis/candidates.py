@@ -184,6 +184,7 @@ class Sensitivities:
             raw = FORMS[shape.form].basis(shape.names, [self._wrench(*variables)], {})
         else:
             raw = np.nan_to_num(basis(self.conditions, function, shape.names))
+            raw[~is_known(self.conditions, *variables)] = 0.0
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -264,7 +265,8 @@ class Sensitivities:
             std: (m,) their standard deviations, taken as independent.
 
         Returns:
-            One function for each of its parts that the readings see.
+            One function for each of its parts that the readings see; for each session,
+            if some lack a variable of it.
         """
         functions, at = [], 0
         least = _NOTHING * np.abs(x).max(initial=0.0)
@@ -288,16 +290,25 @@ class Sensitivities:
                 begin = f"{shown[0]}."
                 numbers = {k.removeprefix(begin): v for k, v in numbers.items()}
                 spread = {k.removeprefix(begin): v for k, v in spread.items()}
-            if shown:
-                functions.append(
-                    replace(
-                        function,
-                        components=tuple(shown),
-                        parameters=numbers,
-                        std=spread,
-                    )
+            sessions = self._sessions(part.variables) if shown else ()
+            functions += [
+                replace(
+                    function, components=tuple(shown), parameters=numbers, std=spread,
+                    session=session,
                 )
+                for session in sessions
+            ]  # fmt: skip
         return functions
+
+    def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
+        """The sessions in which variables are known, None for all."""
+        conditions = self.conditions
+        if variables[0].startswith("wrench.") or conditions.session is None:
+            return (None,)
+        known = is_known(conditions, *variables)
+        if known.all():
+            return (None,)
+        return tuple(dict.fromkeys(conditions.session[known].tolist()))
 
 
 def is_turn(component: str) -> bool:
@@ -306,7 +317,7 @@ def is_turn(component: str) -> bool:
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Public names of what was varied, and is known in every row.
+    """Public names of what was varied, and is known in every row of some session.
 
     Args:
         conditions: R rows.
@@ -321,10 +332,29 @@ def variables_of(conditions: Conditions) -> list[str]:
     names += [f"cov.{name}" for name in conditions.covariates]
     varied = []
     for name in names:
-        values = variable(conditions, name)
-        if np.isfinite(values).all() and np.ptp(values) > 0:
+        known = is_known(conditions, name)
+        if known.any() and np.ptp(variable(conditions, name)[known]) > 0:
             varied.append(name)
     return varied
+
+
+def is_known(conditions: Conditions, *names: str) -> NDArray:
+    """(R,) bool, rows of sessions in which variables are known in every row.
+
+    Args:
+        conditions: R rows.
+        names: of variables, no wrenches.
+
+    Returns:
+        All rows or none, where there are no sessions.
+    """
+    known = np.ones(len(conditions), dtype=bool)
+    for name in names:
+        known &= np.isfinite(variable(conditions, name))
+    if conditions.session is None:
+        return known if known.all() else np.zeros_like(known)
+    lacking = np.unique(conditions.session[~known])
+    return known & ~np.isin(conditions.session, lacking)
 
 
 def places_of(

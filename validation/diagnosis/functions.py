@@ -24,6 +24,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import Campaign
 from validation.diagnosis import shapes as forms
 from validation.diagnosis.candidates import (
@@ -31,6 +32,7 @@ from validation.diagnosis.candidates import (
     CandidatePart,
     Sensitivities,
     in_cells,
+    is_known,
     variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
@@ -150,12 +152,18 @@ class Functions:
         other.sensitivities = self.sensitivities.take(rows)
         return other
 
+    def known(self, *names: str) -> Conditions:
+        """Return the rows in which variables are known."""
+        rows = is_known(self.conditions, *names)
+        return self.conditions if rows.all() else self.conditions.take(rows)
+
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
         """Return all forms of one or two variables with their log priors."""
+        known = self.known(*variables)
         if len(variables) == 1:
-            shapes = forms.every(self.conditions, variables[0], "compliance")
+            shapes = forms.every(known, variables[0], "compliance")
         else:
-            both = forms.of_two(self.conditions, *variables)
+            both = forms.of_two(known, *variables)
             shapes = [] if both is None else both[1]
         count, places = len(self.variables), len(self.places)
         prior = -math.log(2.0) - math.log(max(count, 1)) - math.log(max(places, 1))
@@ -172,7 +180,7 @@ class Functions:
     def first_look(self) -> list[Request]:
         """Return requests for general forms of every variable."""
         return [
-            ((name,), tuple(forms.first(self.conditions, name)))
+            ((name,), tuple(forms.first(self.known(name), name)))
             for name in self.variables
         ]
 
@@ -181,9 +189,9 @@ class Functions:
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
-                both = None
-                if other != name:
-                    both = forms.of_two(self.conditions, name, other)
+                both, known = None, self.known(name, other)
+                if other != name and len(known):
+                    both = forms.of_two(known, name, other)
                 if both is not None and both[0] not in requests:
                     requests[both[0]] = tuple(both[1])
             if is_angle(self.campaign.robot, name):

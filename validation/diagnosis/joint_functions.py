@@ -56,12 +56,12 @@ def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
     """Return functions of all beams, and of all drives' own coordinates."""
-    conditions = functions.conditions
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
-            tried = forms.first(conditions, parts[0].variable)
+            known = functions.known(parts[0].variable)
+            tried = forms.first(known, parts[0].variable)
             if kind == "compliance":
-                tried += forms.uneven(conditions, parts[0].variable)
+                tried += forms.uneven(known, parts[0].variable)
             yield kind, parts, tried
 
 
@@ -81,9 +81,10 @@ def _at_drives(
     for name in functions.variables:
         if name.startswith("q."):
             continue
-        yield "screw", at(name), forms.first(conditions, name)
-        both = forms.of_two(conditions, "approach", name)
-        if sided and name != "approach" and both is not None:
+        yield "screw", at(name), forms.first(functions.known(name), name)
+        known = functions.known("approach", name)
+        both = forms.of_two(known, "approach", name)
+        if sided and name != "approach" and both is not None and len(known):
             yield "screw", at(*both[0]), both[1]
     if all(is_angle(robot, f"q.{w}") for w, _ in own):
         turns = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)

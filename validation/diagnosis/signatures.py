@@ -56,13 +56,15 @@ def conditions_of(campaign: Campaign) -> Conditions:
         campaign: of R rows.
 
     Returns:
-        R conditions.  Covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2], where given,
-        are the weight's known direction in each row.
+        R conditions; a covariate that some sessions lack is NaN there.  Covariates
+        ``gravity.x``, ``.y``, ``.z`` [m/s^2], where given, are the weight's known
+        direction in each row.
 
     Raises:
         BadInput: a function of the robot depends on a covariate that is not there.
     """
-    known, session = campaign.covariates, campaign.session
+    session, whole = campaign.session, campaign.covariates
+    known = {**whole, **campaign.partial}
     for name, function in covariates_of(campaign.robot, campaign.sessions).items():
         if name not in known and name != "approach":
             raise BadInput(
@@ -71,7 +73,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
             )
     gravity = np.zeros((len(campaign), 3))
     for k, axis in enumerate("xyz"):
-        gravity[:, k] = known.get(f"gravity.{axis}", 0.0)
+        gravity[:, k] = whole.get(f"gravity.{axis}", 0.0)
     worst = float(np.max(campaign.mismatch, initial=0.0))
     robot = campaign.robot.without_effects()
     declared = as_declared(

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import read_robot
+from assembly.measurement.predict import predict
 from assembly.model.function import Function
 from tests.campaigns_for_tests import campaign_of
+from tests.validation.diagnosis.test_simulated import arm
+from validation.campaign.campaign_file import read_commands
 from validation.correction.carried_file import save
 from validation.correction.carrying import carry
 from validation.correction.machine_numbers import machine_numbers
 from validation.correction.prediction import foretell
+from validation.correction.spread import number_slopes
 from validation.diagnosis.saved_covariance import (
     COMPLIANCE,
     EFFECT,
@@ -21,6 +25,7 @@ from validation.diagnosis.saved_covariance import (
     read_covariance,
     write_covariance,
 )
+from validation.diagnosis.signatures import conditions_of
 
 SIGMA = 1e-5
 
@@ -126,3 +131,38 @@ def test_a_compliance_stays_above_nothing():
     least = one.moved(soft, -1.0).frames[0].joint_stiffness
     assert least[3, 3] == pytest.approx(1e9)
     assert one.moved(robot, -1e-6).frames[0].joint_stiffness is None
+
+
+@pytest.mark.parametrize(("where", "component", "kind"), [
+    ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
+    ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
+])  # fmt: skip
+def test_slopes_of_functions_are_what_a_small_change_does(
+    where, component, kind, tmp_path
+):
+    """By differences of the predicting function, under load, a device anywhere."""
+    robot, rng = arm(), np.random.default_rng(2)
+    lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
+    for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
+        lines.append(",".join(map(str, [f"m{i}", *q[:3], *(40 * q[3:])])))
+    (tmp_path / "plain.csv").write_text("\n".join(lines) + "\n")
+    one = Function(where, (component,), ("q.j2",), "powers", {"1": 1e-7}, kind)
+    place = {"base.rz": 0.4, "base.rx": -0.2, "base.tx": 0.3}
+    robot = replace(robot, functions=(one,), effects={"registration": place})
+    rows = read_commands(tmp_path / "plain.csv", robot)
+    number = Number(FUNCTION, "0", "1")
+
+    def conditions_for(other):
+        return conditions_of(replace(rows, robot=other))
+
+    J = number_slopes(
+        robot, conditions_for(robot), (number,), np.array([1e-7]), conditions_for
+    )
+    step = 1e-6
+    ends = [
+        predict(conditions_for(number.moved(robot, by))).deviation
+        for by in (step, -step)
+    ]
+    expected = (ends[0] - ends[1]) / (2 * step)
+    # the device's turn of a reading's rotation vector is of second order here
+    assert J[:, :, 0] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())

@@ -116,3 +116,46 @@ def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
     told = parameters(table(diagnosis), "encoder_offset")
     for name, true in ZEROS["monday"].items():
         assert abs(told[name][0] - true) < 4 * told[name][1]
+
+
+def in_two_tables(folder, shift):
+    """An arm read on two days; on one humidity shifts it, on the other it is warm."""
+    rng = np.random.default_rng(3)
+    days = {"dry": "temperature", "wet": "humidity"}
+    tables = '["dry.csv", "wet.csv"]'
+    folder = write_campaign(folder, toml={"measurements": tables}, noise=(
+        f"[noise]\nrotation = {SIGMA[0]}\nposition = {SIGMA[5]}\n"))  # fmt: skip
+    for day, name in days.items():
+        lines = [f"id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.{name}"]
+        for i in range(60):
+            q, x = rng.uniform(-1, 1, 2), rng.uniform(0, 10)
+            read = SIGMA[5] * rng.normal(size=3)
+            read[2] += shift * x if name == "humidity" else 0.0
+            lines.append(",".join(map(str, [f"m{i}", *q, *read, x])))
+        (folder / f"{day}.csv").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
+    """20 um for each of ten parts of humidity, which one of two tables records."""
+    folder = in_two_tables(tmp_path / "days", 2e-5)
+    diagnosis = diagnose(read_campaign(folder))
+    assert diagnosis.verdict == "learned"
+    (one,) = table(diagnosis)["learned"]
+    assert one["variables"] == ["cov.humidity"]
+    save(diagnosis, tmp_path / "found.toml")
+    robot = read_robot(tmp_path / "found.toml")
+    assert [f.session for f in robot.functions] == ["wet"]
+    assert diagnosis.after.normalised < 1.2
+    again = foretell(read_commands(folder, robot))
+    assert again.error[2] == pytest.approx(diagnosis.saved.normalised)
+
+
+def test_a_covariate_of_one_table_alone_is_no_matter_where_nothing_depends_on_it(
+    tmp_path,
+):
+    campaign = read_campaign(in_two_tables(tmp_path / "days", 0.0))
+    assert set(campaign.partial) == {"temperature", "humidity"}
+    assert campaign.covariates == {}
+    assert np.isnan(campaign.partial["humidity"]).sum() == 60
+    assert diagnose(campaign).verdict == "none_needed"
