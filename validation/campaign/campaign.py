@@ -42,6 +42,7 @@ class Campaign:
             rows that share it were measured twice.
         session: (R,) names of sessions; None where the file has none.
         points: (3,) [m] each, further points measured, platform axes, by name.
+        per_session: names of further effects that may differ from session to session.
         partial: (R,) each, further covariates that some sessions lack: NaN there.
         point: (R,) names of the points that rows read, ``""`` for the reference
             point; None where all are that.  A row of the file is a row for each point.
@@ -66,6 +67,7 @@ class Campaign:
     points: Mapping[str, NDArray] = field(default_factory=dict)
     point: NDArray | None = None
     partial: Mapping[str, NDArray] = field(default_factory=dict)
+    per_session: tuple[str, ...] = ()
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 

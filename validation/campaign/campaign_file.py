@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects import LIBRARY
 from assembly.exchange.robot_files import read_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
 from assembly.model.robot import Robot
@@ -53,6 +54,7 @@ class _Declared:
     registration: str
     noise: NDArray
     dialect: Dialect
+    per_session: tuple[str, ...]
 
 
 def read_campaign(folder: Path | str) -> Campaign:
@@ -117,9 +119,24 @@ def _declared(root: Table) -> _Declared:
         registration=root.choice("registration", ("known", "unknown"), "known"),
         noise=_read_noise(root),
         dialect=read_dialect(root),
+        per_session=_per_session(root),
     )
     root.finish()
     return declared
+
+
+def _per_session(root: Table) -> tuple[str, ...]:
+    """Effects that may differ from session to session."""
+    given = root.get("per_session", [])
+    valid = [name for name, effect in LIBRARY.items() if effect.by_row]
+    if not isinstance(given, list):
+        raise root.bad("per_session", f"found {describe(given)}, expected effects")
+    for name in given:
+        if name not in valid:
+            hint = nearest(str(name), valid)
+            message = f"found {describe(name)}, expected effects of single rows{hint}"
+            raise root.bad("per_session", message)
+    return tuple(given)
 
 
 def _table_names(root: Table) -> list[str]:
@@ -197,6 +214,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         repeat=number_rows(configuration, loads, *kinds),
         session=session,
         points=points,
+        per_session=declared.per_session,
         point=np.array([*every], dtype=str)[which] if points else None,
     )
 

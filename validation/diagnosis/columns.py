@@ -100,7 +100,8 @@ class Columns:
         listed = hypotheses(self.conditions, loaded_components(self.campaign))
         shown: dict[object, Signature] = {}
         listed = with_declared(listed, self.campaign.robot)
-        listed = with_sessions(listed, self.campaign.sessions)
+        sessions, further = self.campaign.sessions, self.campaign.per_session
+        listed = with_sessions(listed, sessions, further)
         listed = [h for h in listed if self.odds.get(h.effect, 1.0) > 0.0]
         for k, h in enumerate(listed):
             if not (self.device and _moves_base(h)):

@@ -250,6 +250,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         # in folds fewer functions may have been found
         at = places[min(k, len(places) - 1)] if places else len(diagnosis.sequence) - 1
         before, after = (diagnosis.sequence[max(i, 0)].error for i in (at - 1, at))
+        parts = diagnosis.traced.selected.functions[k].range_error
         for function in functions:
             shown.append({
                 "where": function.where,
@@ -267,6 +268,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 ],
                 "before": _errors(before),
                 "after": _errors(after),
+                "parts_of_range": None if parts is None else asdict(parts),
             })  # fmt: skip
     return shown
 

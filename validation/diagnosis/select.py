@@ -25,6 +25,7 @@ from validation.diagnosis.noise import (
     repeat_scatter,
     scale,
 )
+from validation.diagnosis.range_parts import range_error
 from validation.diagnosis.search import Search, Update, names_of
 from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
 from validation.diagnosis.states import State, prediction_gain
@@ -248,4 +249,7 @@ def _learned(
     return Learned(
         e.candidate, tuple(dict.fromkeys(equal)), best.score - without.score, std,
         probability,
+        range_error(
+            e.candidate, best, without, search.columns.row[search.fit.cells]
+        ),
     )  # fmt: skip

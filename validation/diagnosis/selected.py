@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from validation.diagnosis.candidates import Candidate, CandidatePart
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import Noise
+from validation.diagnosis.range_parts import RangeError
 from validation.diagnosis.states import State
 
 
@@ -20,6 +21,7 @@ class Learned:
         gain: log posterior minus that of the model without it.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
         probability: of all models with a function of these variables.
+        range_error: where it must extrapolate; None where that cannot be said.
     """
 
     candidate: Candidate
@@ -27,6 +29,7 @@ class Learned:
     gain: float
     std: NDArray
     probability: float
+    range_error: RangeError | None = None
 
 
 @dataclass(frozen=True, eq=False)

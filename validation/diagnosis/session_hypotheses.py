@@ -17,13 +17,14 @@ PER_SESSION = ("registration", "encoder_offset", "drift")
 
 
 def with_sessions(
-    listed: Sequence[Hypothesis], sessions: Sequence[str]
+    listed: Sequence[Hypothesis], sessions: Sequence[str], further: Sequence[str] = ()
 ) -> list[Hypothesis]:
     """Hypotheses, and those of effects that may differ from session to session.
 
     Args:
         listed: of a campaign.
         sessions: its names.
+        further: effects that may differ, beside :data:`PER_SESSION`.
 
     Returns:
         The same; and, where there are several sessions, each that shares no number
@@ -34,7 +35,7 @@ def with_sessions(
     own = [
         h
         for h in listed
-        if h.effect in PER_SESSION
+        if h.effect in {*PER_SESSION, *further}
         and all(slot.shape or len(slot.names) == 1 for slot in h.slots)
     ]
     return [*listed, *(_each(h, sessions) for h in own)]

@@ -82,6 +82,12 @@ def _learned_text(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"learned: {where} of {', '.join(one['variables'])}")
         formula = one["formula"]
         lines.append(f"  {formula if len(formula) < 160 else formula[:157] + '...'}")
+        parts = one["parts_of_range"]
+        if parts is not None:
+            lines.append(
+                "  foretold in parts of {variable} left out: {after:.3g} sigma, "
+                "without it {without:.3g}".format(**parts)
+            )
         if one["equivalent_places"]:
             lines.append(f"  {len(one['equivalent_places'])} other places do as well")
     return lines

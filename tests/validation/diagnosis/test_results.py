@@ -11,6 +11,7 @@ from tests.bar_for_tests import LONGER, TURNED, bar
 from validation.diagnosis import results as module
 from validation.diagnosis.candidates import CandidatePart
 from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.range_parts import RangeError
 from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Acting, Small, Unknowns
@@ -134,7 +135,8 @@ def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
     one = SimpleNamespace(
         sequence=sequence,
         traced=SimpleNamespace(selected=SimpleNamespace(functions=[
-            SimpleNamespace(equivalent=same), SimpleNamespace(equivalent=()),
+            SimpleNamespace(equivalent=same, range_error=RangeError("time", 4.0, 1.5)),
+            SimpleNamespace(equivalent=(), range_error=None),
         ])),
     )  # fmt: skip
     told = module.learned(one)
@@ -145,5 +147,7 @@ def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
         [{"where": "tip", "components": ["ty", "tz"], "variables": ["time"]}]
     ]
     assert told[1]["equivalent_places"] == []
+    parts = {"variable": "time", "without": 4.0, "after": 1.5}
+    assert [one["parts_of_range"] for one in told] == [parts, None, None]
     assert (told[0]["parameters"], told[0]["std"]) == ({"1": 2.0}, {"1": 0.5})
     assert told[0]["formula"] == "tx = 2 drive"

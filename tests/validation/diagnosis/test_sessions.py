@@ -1,9 +1,12 @@
 """Campaigns of several sessions, made by the program of springs."""
 
+import re
+
 import numpy as np
 import pytest
 
 from assembly.files.robot_file import read_robot, write_robot
+from forcefit.inputs.errors import BadInput
 from tests.campaigns_for_tests import write_campaign
 from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign_file import read_campaign, read_commands
@@ -116,6 +119,34 @@ def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
     told = parameters(table(diagnosis), "encoder_offset")
     for name, true in ZEROS["monday"].items():
         assert abs(told[name][0] - true) < 4 * told[name][1]
+
+
+@pytest.mark.slow
+def test_a_campaign_says_what_else_may_differ(tmp_path):
+    """A load cell with another gain each day, 10 % and -8 %."""
+    gains = {"monday": 1.1, "tuesday": 0.92}
+    hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
+    folder = measured(tmp_path, hidden)
+    file = folder / "campaign.toml"
+    file.write_text('per_session = ["load_gain"]\n' + file.read_text())
+    diagnosis = diagnose(read_campaign(folder))
+    assert diagnosis.claimed == ("load_gain",)
+    for session, gain in gains.items():
+        value, std = parameters(table(diagnosis), "load_gain", session)["factor"]
+        assert abs(value - gain) < 4 * std
+        assert std < 0.01
+
+
+@pytest.mark.parametrize(("given", "message"), [
+    ('["load_gian"]', 'expected effects of single rows; did you mean "load_gain"'),
+    ('["modulus_scale"]', "found 'modulus_scale', expected effects of single rows"),
+    ('"load_gain"', "per_session: found"),
+    ("[3]", "found 3, expected effects"),
+])  # fmt: skip
+def test_what_cannot_differ_by_session_is_refused(given, message, tmp_path):
+    folder = write_campaign(tmp_path / "days", toml={"per_session": given})
+    with pytest.raises(BadInput, match=re.escape(message)):
+        read_campaign(folder)
 
 
 def in_two_tables(folder, shift):

@@ -156,6 +156,7 @@ def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdic
     function = {
         "where": "tool", "components": ["tx", "ty"], "variables": ["q.one"],
         "formula": "x" * 200, "equivalent_places": [[], []],
+        "parts_of_range": {"variable": "q.j1", "without": 5.0, "after": 1.25},
     }  # fmt: skip
     monkeypatch.setattr(module, "effects", lambda diagnosis: [effect])
     monkeypatch.setattr(module, "learned", lambda diagnosis: [function])
@@ -171,6 +172,7 @@ def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdic
     assert module._learned_text(None) == [
         "learned: tool tx, ty of q.one",
         f"  {'x' * 157}...",
+        "  foretold in parts of q.j1 left out: 1.25 sigma, without it 5",
         "  2 other places do as well",
     ]
 

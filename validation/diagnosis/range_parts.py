@@ -1,0 +1,83 @@
+"""How well functions hold where their variable has not been.
+
+Each fifth of the range of a function's variable is foretold by a fit to the others, at
+the model's prior sizes: without refits, by the leave-block-out identity
+(:mod:`.gaussian`).  Random rows lie between others; a wave that fits them may be
+anything beyond the range.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.measurement.variables import variable
+from validation.diagnosis.candidates import Candidate
+from validation.diagnosis.gaussian import Marginal
+from validation.diagnosis.states import State
+
+PARTS = 5
+_DISTINCT = 4  # values of a variable for each part, at least
+
+
+@dataclass(frozen=True)
+class RangeError:
+    """Errors on parts of a variable's range, each left out in turn.
+
+    Attributes:
+        variable: its public name.
+        without: [sigma] rms of all readings, foretold by the model without the
+            function.
+        after: [sigma] the same with it.
+    """
+
+    variable: str
+    without: float
+    after: float
+
+
+def range_error(
+    candidate: Candidate, best: State, without: State, rows: NDArray
+) -> RangeError | None:
+    """The error where a function of a model must extrapolate.
+
+    Args:
+        candidate: the function.
+        best: model with it.
+        without: the same model without it.
+        rows: (n,) row of each fitted cell.
+
+    Returns:
+        Of its variables the one with the largest error; None where none has enough
+        values.
+    """
+    conditions = best.fit.columns.conditions
+    names = dict.fromkeys(v for part in candidate.parts for v in part.variables)
+    found = []
+    for name in names:
+        if name.startswith("wrench."):
+            continue
+        x = variable(conditions, name)[rows]
+        if not np.isfinite(x).all() or len(np.unique(x)) < _DISTINCT * PARTS:
+            continue
+        levels = np.quantile(np.unique(x), np.linspace(0, 1, PARTS + 1)[1:-1])
+        part = np.searchsorted(levels, x, side="right")
+        errors = [_rms(_left_out(s.marginal, part)) for s in (without, best)]
+        found.append(RangeError(name, *errors))
+    return max(found, key=lambda one: one.after, default=None)
+
+
+def _left_out(marginal: Marginal, part: NDArray) -> NDArray:
+    """(n,) errors of parts foretold by the others: (1 - U U')^-1 C^-1 z of each."""
+    errors = np.empty_like(marginal.held)
+    for number in np.unique(part):
+        own = part == number
+        U, held = marginal.factor_columns[own], marginal.held[own]
+        inner = np.eye(U.shape[1]) - U.T @ U
+        # Woodbury's identity: as many equations as columns
+        errors[own] = held + U @ np.linalg.lstsq(inner, U.T @ held, rcond=None)[0]
+    return errors
+
+
+def _rms(values: NDArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
