@@ -6,8 +6,8 @@ robot's own numbers are as they were found, give or take their covariance
 (:mod:`.machine_numbers`).  Both are fitted to the set-up rows of all sessions
 (:mod:`.session_fit`), and judged on all other rows.
 
-Where the covariance lets the other rows move by more than the set-up rows are off, the
-set-up rows do not suffice.
+Where the covariance lets the other rows move by more than the set-up rows are off from
+the robot as it was saved, the set-up rows do not suffice.
 """
 
 from collections.abc import Sequence
@@ -50,6 +50,7 @@ class Carried:
         uncertainty: [m] by which the set-up rows leave the other rows' points open,
             rms.
         left: [m] rms of what they leave unexplained in themselves.
+        held: [m] the same with the robot's own numbers as they were saved.
         open_: names of the values that are known least, if they do not suffice.
         left_behind: what changed with time where the robot was learned, and is not
             fitted here: without a clock nobody can say how it goes on.
@@ -64,6 +65,7 @@ class Carried:
     declared: NDArray
     uncertainty: float
     left: float
+    held: float
     open_: tuple[str, ...]
     left_behind: tuple[str, ...]
 
@@ -169,8 +171,12 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     declared = alike.read(other.robot, other.values(number))
     own = campaign.cells & setup[:, None]
     own[:, :3] &= not own[:, 3:].any()
-    left = float(np.sqrt(np.mean((campaign.measured - read)[own] ** 2)))
-    level = max(left, float(np.median(campaign.sigma[own])))
+    held = one.read(fit.machine.robot, fit.held[fit.own(number)])
+    off = [
+        float(np.sqrt(np.mean((campaign.measured - there)[own] ** 2)))
+        for there in (read, held)
+    ]
+    level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
     cells[:, :3] &= not cells[:, 3:].any()  # positions decide, unless there are none
     variance, blame = fit.spread(number, cells)
@@ -186,7 +192,8 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
         error=error_of(campaign.take(~setup), read[~setup]),
         declared=error_of(alike.campaign.take(~setup), declared[~setup]),
         uncertainty=float(np.sqrt(variance)),
-        left=left,
+        left=off[0],
+        held=off[1],
         open_=() if variance <= level**2 else tuple(names[k] for k in worst),
         left_behind=(),
     )

@@ -23,6 +23,7 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
                 "open": list(one.open_),
                 "uncertainty": one.uncertainty,
                 "left_in_setup": one.left,
+                "held_in_setup": one.held,
                 "left_behind": list(one.left_behind),
                 "error": _error(one.error),
                 "declared": _error(one.declared),
@@ -62,7 +63,8 @@ def text(carried: CarriedRobot) -> str:
         lines.append(f"  others, declared robot: {_said(one.declared)}")
         lines.append(
             f"  open by the set-up rows: {1e6 * one.uncertainty:.4g} um; "
-            f"they are off by {1e6 * one.left:.4g} um themselves"
+            f"they are off by {1e6 * one.left:.4g} um themselves, "
+            f"{1e6 * one.held:.4g} um from the robot as saved"
         )
         lines += [
             f"  left behind, of the session it was learned in: {title}"

@@ -145,6 +145,7 @@ class SessionsFit:
         x: (k,) values of every session, then u.
         covariance: (k, k) of them.
         widened: by which the covariance of the machine's numbers was multiplied.
+        held: values of every session, the machine's numbers as they were saved.
     """
 
     sessions: tuple[SetUp, ...]
@@ -152,6 +153,7 @@ class SessionsFit:
     x: NDArray
     covariance: NDArray
     widened: float
+    held: NDArray
 
     @property
     def u(self) -> NDArray:
@@ -216,13 +218,13 @@ def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> Sessions
     fixed = replace(machine, numbers=(), root=np.zeros((0, 0)))
     told = [one.told for one in sessions]
     x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
-    x, _ = _settled(sessions, fixed, x, told, 1.0)
-    widened, tau = _widened(sessions, machine, x, told)
+    held, _ = _settled(sessions, fixed, x, told, 1.0)
+    widened, tau = _widened(sessions, machine, held, told)
     told = [max(one.told * tau**2, one.repeated) for one in sessions]
     x, C = _settled(
-        sessions, machine, np.append(x, np.zeros(len(machine))), told, widened
+        sessions, machine, np.append(held, np.zeros(len(machine))), told, widened
     )
-    return SessionsFit(tuple(sessions), machine, x, C, widened)
+    return SessionsFit(tuple(sessions), machine, x, C, widened, held)
 
 
 def _settled(
@@ -277,7 +279,8 @@ def _widened(
     z, A = np.concatenate(zs), np.vstack(rows)
     precision = np.concatenate([np.zeros(0), *(s.unknowns.prior for s in sessions)])
     flat = np.append(precision == 0.0, np.zeros(len(machine), dtype=bool))
-    Q, size, _ = np.linalg.svd(A[:, flat] / _norm(A[:, flat]), full_matrices=False)
+    norm = np.maximum(np.linalg.norm(A[:, flat], axis=0), 1e-300)
+    Q, size, _ = np.linalg.svd(A[:, flat] / norm, full_matrices=False)
     Q = Q[:, size > _RANK * size.max(initial=0.0)]
     z, A = z - Q @ (Q.T @ z), (A - Q @ (Q.T @ A))[:, ~flat]
     known = precision[precision > 0.0] ** -0.5
@@ -294,7 +297,3 @@ def _widened(
             tau = scale(squares, count)[0]
             best = score, max(1.0, float(k) * tau**2), tau
     return best[1], best[2]
-
-
-def _norm(columns: NDArray) -> NDArray:
-    return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)

@@ -9,13 +9,15 @@ from assembly.files.robot_file import read_robot
 from assembly.measurement.predict import predict
 from assembly.model.function import Function
 from tests.campaigns_for_tests import campaign_of
+from tests.validation.diagnosis.test_sessions import FRAMES, measured
 from tests.validation.diagnosis.test_simulated import arm
-from validation.campaign.campaign_file import read_commands
+from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.carried_file import save
 from validation.correction.carrying import carry
 from validation.correction.machine_numbers import machine_numbers
 from validation.correction.prediction import foretell
 from validation.correction.spread import number_slopes
+from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.saved_covariance import (
     COMPLIANCE,
     EFFECT,
@@ -25,7 +27,9 @@ from validation.diagnosis.saved_covariance import (
     read_covariance,
     write_covariance,
 )
+from validation.diagnosis.saving import save as save_found
 from validation.diagnosis.signatures import conditions_of
+from validation.synthetic.machine import Hidden
 
 SIGMA = 1e-5
 
@@ -84,7 +88,10 @@ def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
     assert carried.fit.widened > 16
-    assert carried.sessions[0].error[0] < 0.05 * y
+    (day,) = carried.sessions
+    assert day.error[0] < 0.05 * y
+    assert day.held == pytest.approx(y)
+    assert day.suffices
 
 
 def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
@@ -166,3 +173,31 @@ def test_slopes_of_functions_are_what_a_small_change_does(
     expected = (ends[0] - ends[1]) / (2 * step)
     # the device's turn of a reading's rotation vector is of second order here
     assert J[:, :, 0] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_a_spring_that_became_softer_is_found_by_twenty_rows(tmp_path):
+    """Monday's machine is diagnosed; on Tuesday its drive gives a quarter more."""
+    springs = {"monday": 5e4, "tuesday": 4e4}
+    days = {}
+    for day, stiffness in springs.items():
+        base = {f"base.t{k}": v for k, v in zip("xyz", FRAMES[day][3:], strict=True)}
+        hidden = {day: [Hidden("registration", base)]}
+        spring = Hidden("drive_compliance", {"j2": stiffness})
+        days[day] = measured(tmp_path / day, hidden, [spring], known=False)
+    found = diagnose(read_campaign(days["monday"]))
+    assert found.claimed == ("drive_compliance",)
+    save_found(found, tmp_path / "found.toml")
+    rows = read_commands(days["tuesday"], read_robot(tmp_path / "found.toml"))
+    carried = carry(rows, read_campaign(days["tuesday"]), np.arange(len(rows)) < 20)
+    (day,) = carried.sessions
+    assert day.suffices
+    assert day.error[2] < 1.2
+    save(carried, tmp_path / "carried.toml")
+    robot = read_robot(tmp_path / "carried.toml")
+    known = read_covariance(robot)
+    place = known.numbers.index(Number(EFFECT, "drive_compliance", "j2"))
+    value = robot.effects["drive_compliance"]["j2"]
+    std = known.covariance[place, place] ** 0.5
+    assert abs(value - springs["tuesday"]) < 4 * std
+    assert std < 0.02 * value

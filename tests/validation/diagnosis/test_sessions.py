@@ -37,6 +37,7 @@ def registration(session, *, placed):
 
 def measured(folder, hidden, common=(), known=True):
     """A campaign of the arm, each session with what is hidden in it and in all."""
+    folder.mkdir(exist_ok=True)
     robot, body, head = arm(), [], None
     for number, (session, own) in enumerate(hidden.items()):
         rng = np.random.default_rng(70 + number)
