@@ -123,6 +123,31 @@ def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
 
 
 @pytest.mark.slow
+def test_every_session_drifts_in_its_own_way(tmp_path):
+    """Other components, and 900 s on one day against 2000 s on the other."""
+    drifts = {
+        "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},
+        "tuesday": {
+            "amplitude.tz": -6e-5, "amplitude.ry": -1.5e-4, "time_constant": 2000.0,
+        },
+    }  # fmt: skip
+    hidden = {s: [Hidden("drift", own)] for s, own in drifts.items()}
+    folder = measured(tmp_path, hidden)
+    diagnosis = diagnose(read_campaign(folder))
+    assert diagnosis.claimed == ("drift",)
+    for session, own in drifts.items():
+        told = parameters(table(diagnosis), "drift", session)
+        for name, true in own.items():
+            value, std = told[name]
+            assert abs(value - true) < 4 * std
+            assert std < 0.3 * abs(true)
+    assert diagnosis.after.normalised < 1.1
+    save(diagnosis, tmp_path / "found.toml")
+    again = foretell(read_commands(folder, read_robot(tmp_path / "found.toml")))
+    assert again.error[2] == pytest.approx(diagnosis.saved.normalised)
+
+
+@pytest.mark.slow
 def test_a_campaign_says_what_else_may_differ(tmp_path):
     """A load cell with another gain each day, 10 % and -8 %."""
     gains = {"monday": 1.1, "tuesday": 0.92}
