@@ -46,6 +46,9 @@ class Campaign:
         partial: (R,) each, further covariates that some sessions lack: NaN there.
         point: (R,) names of the points that rows read, ``""`` for the reference
             point; None where all are that.  A row of the file is a row for each point.
+        common: (R, 6, k) [rad, m] noise that all readings of one row of the file have
+            in common, beside that of ``sigma``: change of each per standard deviation
+            of k independent numbers, drawn once for the row; None is none.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Campaign:
     point: NDArray | None = None
     partial: Mapping[str, NDArray] = field(default_factory=dict)
     per_session: tuple[str, ...] = ()
+    common: NDArray | None = None
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -105,6 +109,9 @@ class Campaign:
         for name in ("session", "point"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _locked(self, name, (R,)))
+        if self.common is not None:
+            shape = (R, 6, np.shape(self.common)[-1])
+            object.__setattr__(self, "common", _locked(self, "common", shape))
         covariates = {k: _column(v, R, k) for k, v in self.covariates.items()}
         object.__setattr__(self, "covariates", covariates)
 
@@ -164,6 +171,7 @@ class Campaign:
             partial={k: v[chosen] for k, v in self.partial.items()},
             session=None if self.session is None else self.session[chosen],
             point=None if self.point is None else self.point[chosen],
+            common=None if self.common is None else self.common[chosen],
             **{name: getattr(self, name)[chosen] for name in names},
         )
 

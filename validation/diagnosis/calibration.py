@@ -52,15 +52,15 @@ def calibrate(
     traced = diagnosis.traced
     cells = traced.used[traced.columns.row]
     best = traced.selected.states[0]
-    signal = np.zeros(int(cells.sum()))
-    signal[:] = best.fitted / np.sqrt(best.fit.weights)
+    fit = best.fit
     truth = tuple(sorted(e.name for e in best.elements if e.name))
     rng = np.random.default_rng(0)
     tally: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}
     right = wrong = 0
     for k in range(2 * count):
         present = k % 2 == 1
-        z = rng.standard_normal(len(signal)) + (signal if present else 0.0)
+        z = fit.root * rng.standard_normal(len(fit.root))
+        z = fit.whiten.inverse(z + (best.fitted if present else 0.0))
         decision, claimed = _decided(select(traced.columns, z, cells), len(z))
         tally[present][decision] += 1
         right += present and decision == "explained" and claimed == truth

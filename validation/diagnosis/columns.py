@@ -37,6 +37,7 @@ from validation.diagnosis.signatures import (
     whiten,
 )
 from validation.diagnosis.small_terms import small_terms
+from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time of what counts it
@@ -52,6 +53,9 @@ class Columns:
         campaign, conditions: of R rows.
         row: (N,) row of every cell.
         block: (N,) configuration or span of time of every cell.
+        visit: (N,) measurement of every cell: a row of the file, of several points.
+        motions: (R, 6, 6) what a motion of the platform changes, see
+            :func:`.platform_motions`; None where every row is a measurement.
         device: hypothesis of an unknown measuring frame; else None.
         flat: (N, f) its columns, by session.
         library: elements of the library's effects.
@@ -79,21 +83,29 @@ class Columns:
         self.campaign, self.conditions = campaign, conditions
         self.row = np.nonzero(campaign.cells)[0]
         self.block = blocks_of(campaign)[0][self.row]
+        self.visit = campaign.measured_at_once[self.row]
         self.tangents = Tangents(campaign, conditions)
         unknown = campaign.registration == "unknown"
         self.device: Hypothesis | None = device_frame(conditions) if unknown else None
         self.library = self._library(update)
         self.response = responses(conditions)
+        self.motions = platform_motions(campaign, self.response.reading)
         terms = small_terms(campaign, conditions, self.response)
         terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
         self.nuisance: Nuisance = nuisance(terms, self._named())
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
-        rows = np.unique(self.row)
-        rows = np.sort(np.random.default_rng(0).permutation(rows)[:_SAMPLE])
-        self.sampled = np.isin(self.row, rows)
+        self.sampled = self._sampled()
+        rows = np.unique(self.row[self.sampled])
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
         self.explicit = joint_functions(self.functions, rows) if any_function else []
+
+    def _sampled(self) -> NDArray:
+        """(N,) mask of the cells of whole measurements, of about 500 rows."""
+        visits, rows = np.unique(self.visit), len(np.unique(self.row))
+        most = _SAMPLE * len(visits) // max(rows, 1)
+        drawn = np.random.default_rng(0).permutation(visits)[:most]
+        return np.isin(self.visit, drawn)
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Return visible hypotheses with distinct columns."""
@@ -132,6 +144,37 @@ class Columns:
         rows = np.unique(self.row[self.sampled])
         other.explicit = joint_functions(other.functions, rows) if names else []
         return other
+
+    @property
+    def candidates(self) -> bool:
+        """Whether any effect or function may act."""
+        return bool(self.library or self.explicit or self.functions.variables)
+
+    def loadings(self, cells: NDArray) -> NDArray | None:
+        """(n, 6) change of cells over sigma per rotation and shift of the platform."""
+        if self.motions is None:
+            return None
+        measured = self.campaign.cells
+        over_sigma = self.motions[measured] / self.campaign.sigma[measured][:, None]
+        return np.asarray(over_sigma[cells])
+
+    def whitening(
+        self, cells: NDArray, root: NDArray, common: tuple[float, float]
+    ) -> Whitening:
+        """The map of cells to cells of independent noise.
+
+        Args:
+            cells: (N,) mask.
+            root: (n,) square roots of their relative precisions.
+            common: [rad, m] sizes of the platform's motion in common, over tau.
+
+        Returns:
+            The map.
+        """
+        loadings = self.loadings(cells) if any(common) else None
+        if loadings is not None:
+            loadings = loadings * np.repeat(common, 3)
+        return whitening(root, loadings, self.visit[cells])
 
     @property
     def has_clocks(self) -> bool:

@@ -45,7 +45,7 @@ class Diagnosis:
         after: likewise, with machines fitted without these rows; whatever the verdict.
         saved: errors of the saved robot on all rows without outliers, to which it was
             fitted.
-        noise: by sigma.
+        noise: by sigma, and by what the points of a measurement have in common.
         with_outliers: before and after with the held-out rows called outliers.
         uncertainty: [-] standard error of ``after.normalised``, by scatter of blocks.
         noise_scale: true over stated sigma, and the standard deviation of that.
@@ -136,6 +136,7 @@ class Diagnosis:
             "claimed": ", ".join(self.claimed) or "none",
             "likeliest": ", ".join(f"{name} {p:.3f}" for name, p in likely) or "none",
             "held-out rows": f"{self.before.normalised:.3g} sigma before, "
-            f"{self.after.normalised:.3g} after (1 is noise)",
+            f"{self.after.normalised:.3g} after "
+            f"({self.noise.normalised:.3g} is noise)",
             "outliers": f"{int(self.outliers.sum())} rows",
         }

@@ -17,6 +17,7 @@ from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.gaussian import Marginal, deviance, evidence_gains
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import Signature
+from validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
 _NO_OFFSET = 1e-9  # [sigma] below which an offset is rounding
@@ -182,13 +183,15 @@ def function_element(
 class Dense:
     """Elements with stored columns, scored in batches."""
 
-    def __init__(self, elements: list[Element], cells: NDArray, root: NDArray) -> None:
+    def __init__(
+        self, elements: list[Element], cells: NDArray, whiten: Whitening
+    ) -> None:
         """Group the elements by their number of columns.
 
         Args:
             elements: candidates.
             cells: (N,) mask of the fitted cells.
-            root: (n,) square roots of the weights.
+            whiten: map of these n cells.
         """
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
@@ -198,11 +201,11 @@ class Dense:
             if e.columns.shape[1]:
                 by_count.setdefault(e.columns.shape[1], []).append(i)
             elif e.offset is not None:
-                self._offsets.append((i, e.offset[cells] * root))
+                self._offsets.append((i, whiten(e.offset[cells])))
         for m, own in by_count.items():
             B = np.concatenate([elements[i].columns[cells] for i in own], axis=1)
-            B *= root[:, None]
-            each = B.reshape(len(root), len(own), m)
+            B = whiten(B)
+            each = B.reshape(len(B), len(own), m)
             gram = np.einsum("nck,ncl->ckl", each, each, optimize=True)
             most = np.array([elements[i].most for i in own])
             bounded = np.array([m == 1 and elements[i].bounded[0] for i in own])

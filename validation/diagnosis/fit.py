@@ -2,7 +2,7 @@ r"""The last step of a diagnosis: every unknown number of a robot fitted togethe
 
 The most probable x minimises
 
-    F(x) = |(y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
+    F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
 with f the readings of the robot that would be saved, computed by the function that
 predicts with the saved file (:mod:`validation.diagnosis.prediction`).  Steps are
@@ -13,7 +13,8 @@ leads up is halved.
 symbol  code            shape      meaning
 ======  ==============  =========  ===================================================
 y       ``measured``    (n,)       readings of the fitted cells
-A       ``A``           (n, k)     slopes over sigma
+W       ``whiten``      (n, n)     makes their noise independent (:mod:`.whitening`)
+A       ``A``           (n, k)     slopes over sigma, whitened
 P       ``precision``   (k,)       1 / s^2
 C       ``covariance``  (k, k)     (A'A + P)^-1
 ======  ==============  =========  ===================================================
@@ -35,6 +36,7 @@ from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.unknowns import Acting, Unknowns
+from validation.diagnosis.whitening import whitening_of
 
 _STEPS = 20
 _SLOPES = 6  # steps for which slopes are computed again
@@ -52,8 +54,8 @@ class MachineFit:
         unknowns: what was fitted.
         x: (k,) the most probable numbers.
         covariance: (k, k) of their posterior, at fixed prior sizes and sigma.
-        slopes: (n, k) change of the fitted cells per unknown, over sigma.
-        residual: (n,) of the fitted cells, over sigma.
+        slopes: (n, k) change of the fitted cells per unknown, over sigma, whitened.
+        residual: (n,) of the fitted cells, likewise.
     """
 
     unknowns: Unknowns
@@ -92,7 +94,7 @@ def fit_machine(
     """Fit the unknown numbers of a robot to some rows of a campaign.
 
     Args:
-        campaign: of R rows, whose sigma is believed.
+        campaign: of R rows, whose sigma and noise in common are believed.
         unknowns: of its robot.
         rows: (R,) bool, rows to be fitted; readings of others are not used.
         start: (k,) where to begin; the prior's mean if absent.
@@ -102,14 +104,14 @@ def fit_machine(
     """
     # all rows are predicted: what a row reads may depend on commands before it
     cells = campaign.cells & rows[:, None]
-    sigma = campaign.sigma[cells]
+    sigma, whiten = campaign.sigma[cells], whitening_of(campaign, cells)
 
     def residual(x: NDArray) -> NDArray:
         left = residual_of(campaign, unknowns.robot_at(x))[cells] / sigma
-        return np.where(np.isfinite(left), left, _NO_ANSWER)
+        return whiten(np.where(np.isfinite(left), left, _NO_ANSWER))
 
     def slopes(x: NDArray) -> NDArray:
-        return unknowns.slopes(campaign, x)[cells] / sigma[:, None]
+        return whiten(unknowns.slopes(campaign, x)[cells] / sigma[:, None])
 
     x, A, left = _minimum(unknowns, residual, slopes, start)
     covariance = _covariance(A, unknowns.std)

@@ -104,6 +104,10 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     if len(np.unique(blocks)) >= _FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
-    order = np.argsort(np.argsort(time, kind="stable"))
-    count = min(2 * _FEWEST, len(campaign))
-    return order * count // len(campaign), SPANS
+    # points that are measured at once share the span
+    _, first, visit = np.unique(
+        campaign.measured_at_once, return_index=True, return_inverse=True
+    )
+    order = np.argsort(np.argsort(time[first], kind="stable"))[visit]
+    count = min(2 * _FEWEST, len(first))
+    return order * count // len(first), SPANS

@@ -28,6 +28,7 @@ from validation.diagnosis.structure import Trend, trends
 from validation.diagnosis.text import text
 from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import NOT_ENOUGH, Kept, by_names, verdict
+from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
 BLUNDERS = 20  # one row in so many may be called a blunder, in all
 _LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
@@ -75,7 +76,8 @@ def judge(
     steps = pooled(campaign, every, rows)
     fit, correlated = _with_noise_in_time(traced.fitting, fit)
     left = residual_of(campaign, fit.robot)
-    lack = _lack_of_fit(campaign, traced, fit, left)
+    noisy = _noisy(campaign, traced)
+    lack = _lack_of_fit(noisy, traced, fit, left)
     names = _names(fit)
     kept = Kept(names, bool(fit.unknowns.functions), bool(fit.unknowns.small))
     decision, claimed = verdict(traced.selected, kept, lack.significant)
@@ -84,7 +86,7 @@ def judge(
         for kind, residual in (("before", before), ("after", after))
     }
     if decision in {"explained", "learned", "ambiguous"}:
-        fails = _fails(campaign, folds, after, rows, lack)
+        fails = _fails(noisy, folds, after, rows, lack)
         if fails or errors["after"].normalised > errors["before"].normalised:
             decision, claimed = "outside_library", ()
         if _too_few(campaign, traced, fit, fails):
@@ -107,12 +109,12 @@ def judge(
         alternatives=by_names(traced.selected),
         lack=lack,
         declared=lack_of_fit(
-            campaign.take(used), whiten(campaign.take(used), declared[used]), 0
+            noisy.take(used), independent(noisy.take(used), declared[used]), 0
         ),
         before=errors["before"],
         after=errors["before"] if decision == "none_needed" else errors["after"],
         saved=errors_of(campaign, left, ~outliers),
-        noise=errors_of(campaign, campaign.sigma, rows),
+        noise=errors_of(campaign, size_of_noise(noisy), rows),
         with_outliers=(
             errors_of(campaign, before, held.rows),
             errors_of(campaign, after, held.rows),
@@ -151,6 +153,16 @@ def _trends(campaign: Campaign, traced: Traced, left: NDArray) -> tuple[Trend, .
 def _believed(campaign: Campaign, traced: Traced) -> Campaign:
     """The campaign with its readings and the sigma that the search believed."""
     return replace(traced.campaign, measured=campaign.measured)
+
+
+def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
+    """The campaign with the noise by which residuals are judged."""
+    # sigma as it is stated, unless it counts in what the points have in common
+    common = traced.campaign.common
+    if common is None:
+        return campaign
+    scale = min(traced.selected.noise.tau, 1.0)
+    return replace(campaign, sigma=scale * campaign.sigma, common=common)
 
 
 def _declared_residual(campaign: Campaign, traced: Traced, linear: bool) -> NDArray:
@@ -216,7 +228,7 @@ def _lack_of_fit(
 ) -> LackOfFit:
     """Is the residual of the fitted rows noise, by the stated sigma and repeats?"""
     fitting = campaign.take(traced.used)
-    residual = np.nan_to_num(whiten(fitting, left[traced.used]))
+    residual = independent(fitting, left[traced.used])
     return lack_of_fit(fitting, residual, round(float(fit.determined.sum())))
 
 
@@ -227,16 +239,15 @@ def _fails(
     """Whether held-out rows show more than noise and the uncertainty of the fit."""
     squares, count = 0.0, 0
     for one in folds:
-        own = campaign.cells & (one.held & rows)[:, None]
-        variance = np.ones(int(own.sum()))
+        own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
+        variance, whiten = np.ones(int(own.sum())), whitening_of(campaign, own)
         if len(one.fit.x):
             J = one.fit.unknowns.slopes(campaign, one.fit.x)[own]
-            J /= campaign.sigma[own][:, None]
+            J = whiten(J / campaign.sigma[own][:, None])
             variance += np.einsum("nk,kl,nl->n", J, one.fit.covariance, J)
-        z = residual[own] / campaign.sigma[own]
-        known = np.isfinite(z)
-        squares += float(np.sum(z[known] ** 2 / variance[known]))
-        count += int(known.sum())
+        z = whiten(residual[own] / campaign.sigma[own])
+        squares += float(np.sum(z**2 / variance))
+        count += len(z)
     if not count:
         return True
     scatter = lack.repeats if lack.sigma_too_small else 1.0

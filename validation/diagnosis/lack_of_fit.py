@@ -30,6 +30,8 @@ class LackOfFit:
         repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
         repeats_freedom: [-] its degrees of freedom.
         against_repeats: probability that noise as between repeats leaves as much.
+        common: whether noise that points of one measurement share was found in the
+            residual itself: repeats must then show it too.
     """
 
     rms: float
@@ -38,14 +40,15 @@ class LackOfFit:
     repeats: float
     repeats_freedom: int
     against_repeats: float
+    common: bool = False
 
     @property
     def significant(self) -> bool:
         """Whether more than noise is left, whichever noise is believed."""
-        by_sigma = self.probability < SIGNIFICANT
+        by_repeats = self.against_repeats < SIGNIFICANT
         if self.sigma_too_small:
-            return self.against_repeats < SIGNIFICANT
-        return by_sigma
+            return by_repeats
+        return self.probability < SIGNIFICANT or (self.common and by_repeats)
 
     @property
     def sigma_too_small(self) -> bool:
@@ -61,7 +64,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
     Args:
         campaign: of R rows, N measured cells.
-        residual: (N,) whitened.
+        residual: (N,) whitened, independent in every cell if it is noise.
         unknowns: how many were fitted.
 
     Returns:
@@ -80,7 +83,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
         against = float(f.sf(ratio, freedom - between, between))
     return LackOfFit(
         float(np.sqrt(rss / freedom)), freedom, float(chi2.sf(rss, freedom)),
-        float(repeats), between, against,
+        float(repeats), between, against, campaign.common is not None,
     )  # fmt: skip
 
 

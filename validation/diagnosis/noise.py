@@ -33,11 +33,14 @@ class Noise:
         tau: true over stated sigma.
         tau_std: its standard deviation.
         findings: sentences for the user.
+        common: [rad, m] standard deviations of rotation and translation of a motion
+            that the points of one measurement have in common.
     """
 
     tau: float
     tau_std: float
     findings: tuple[str, ...] = ()
+    common: tuple[float, float] = (0.0, 0.0)
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
@@ -85,8 +88,9 @@ def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
 
 
 def findings(
-    tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool
-) -> tuple[str, ...]:
+    tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
+    common: tuple[float, float] = (0.0, 0.0),
+) -> tuple[str, ...]:  # fmt: skip
     """Return findings about the noise.
 
     Args:
@@ -94,11 +98,20 @@ def findings(
         tau_std: its standard deviation.
         repeats: of :func:`repeat_scatter`, from the residual.
         memory: whether the model depends on earlier rows.
+        common: [rad, m] noise that the points of a measurement share.
 
     Returns:
         Sentences; none where all is as stated.
     """
     told = []
+    if any(common):
+        sizes = [f"{1e6 * size:.3g} {unit}" for size, unit in _in_common(common)]
+        unsure = (
+            ""
+            if repeats[1]
+            else ("; without repeats a cause that was not recorded would look the same")
+        )
+        told.append(f"noise common to the points of a row: {', '.join(sizes)}{unsure}")
     if abs(np.log(tau)) > max(_UNLIKE * tau_std / tau, _CLOSE):
         told.append(f"the residual is {tau:.2g} times the stated sigma")
     rms, freedom = repeats
@@ -111,6 +124,12 @@ def findings(
     if memory:
         told.append("memory: the readings depend on the order of the rows")
     return tuple(told)
+
+
+def _in_common(common: tuple[float, float]) -> list[tuple[float, str]]:
+    """Return sizes of a motion in common that are not zero, with their units."""
+    listed = [(common[1], "um"), (common[0], "urad")]
+    return [one for one in listed if one[0] > 0]
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:

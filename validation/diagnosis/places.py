@@ -22,6 +22,7 @@ from validation.diagnosis.candidates import (
 )
 from validation.diagnosis.gaussian import SIZES
 from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
+from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind
 _PROBES = 3  # random projections that identify equal responses
@@ -178,21 +179,22 @@ class Places:
         size = float(np.sqrt(np.mean(w**2)))
         return most / size if size > 0 else 0.0
 
-    def weighted(self, cells: NDArray, root: NDArray) -> Weighted:
+    def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
         """Return weighted responses in selected cells.
 
         Args:
             cells: (N,) mask of the measured cells.
-            root: (n,) square roots of the weights.
+            whiten: map of these n cells; rows of one measurement have equal variables,
+                so that a response times a function is whitened as the response is.
 
         Returns:
             Responses of all places.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)
-        weight = np.zeros((len(rows), 6))
-        weight[row, component] = root
-        answers = self._answers[:, rows] * weight
+        answers = np.zeros((len(self._answers), len(rows), 6))
+        each = self._answers[:, rows[row], component]
+        answers[:, row, component] = whiten(each.T).T
         squares = np.einsum("src,src->sr", answers, answers)
         beside = np.zeros((len(self._pairs), len(rows)))
         for (i, j), k in self._pairs.items():

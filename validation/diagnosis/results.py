@@ -54,6 +54,7 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
             "noise": {
                 "position": diagnosis.noise.position,
                 "rotation": diagnosis.noise.rotation,
+                "normalised": diagnosis.noise.normalised,
             },
             "with_outliers": {
                 "before": _errors(diagnosis.with_outliers[0]),
@@ -64,6 +65,9 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
             "value": diagnosis.noise_scale[0],
             "std": diagnosis.noise_scale[1],
             "findings": list(diagnosis.findings),
+            "common": dict(
+                zip(KINDS, diagnosis.traced.selected.noise.common, strict=True)
+            ),
         },
         "noise_in_time": None
         if diagnosis.noise_in_time is None

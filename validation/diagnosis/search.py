@@ -44,8 +44,9 @@ class Search:
     """Models of one set of readings and weights, and the search over them."""
 
     def __init__(
-        self, columns: Columns, z: NDArray, cells: NDArray, good: NDArray
-    ) -> None:
+        self, columns: Columns, z: NDArray, cells: NDArray, good: NDArray,
+        common: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
         """Weight the readings and fit the model without elements.
 
         Args:
@@ -53,9 +54,10 @@ class Search:
             z: (n,) whitened residual of the fitted cells.
             cells: (N,) mask of the fitted cells.
             good: (n,) probability that a reading is no blunder.
+            common: sizes of noise in common, see :class:`.states.Fitting`.
         """
         self.columns, self.functions = columns, columns.functions
-        self.fit = Fitting(columns, z, cells, cell_weights(good))
+        self.fit = Fitting(columns, z, cells, cell_weights(good), common)
         self.empty = [self.fit.state((), mode) for mode in self.fit.modes()]
         self.begin = max(self.empty, key=lambda s: s.score)
         self.relinearisation = Relinearisation(columns, self.fit)
@@ -88,10 +90,11 @@ class Search:
         cells = self.fit.cells.copy()
         cells[cells] = self.fit.sampled
         root = self.fit.root[self.fit.sampled]
-        self.weighted: Weighted = self.functions.places.weighted(cells, root)
-        self.library = Dense(self.columns.library, self.fit.cells, self.fit.root)
+        whiten = self.columns.whitening(cells, root, self.fit.common)
+        self.weighted: Weighted = self.functions.places.weighted(cells, whiten)
+        self.library = Dense(self.columns.library, self.fit.cells, self.fit.whiten)
         own = self.fit.cells[self.columns.sampled]
-        self.explicit = Dense(self.columns.explicit, own, root)
+        self.explicit = Dense(self.columns.explicit, own, whiten)
 
     def _keep(self, states: Iterable[State]) -> None:
         """Store models whose estimates support their claims."""
@@ -238,7 +241,7 @@ class Search:
             e = e or self.functions.element(candidate, priors[candidate.shape])
             if e is None:
                 continue
-            gain = Dense([e], self.fit.cells, self.fit.root).gains(
+            gain = Dense([e], self.fit.cells, self.fit.whiten).gains(
                 base.marginal, FREEDOM
             )
             best.append((float(gain[0]) + e.log_prior, e))

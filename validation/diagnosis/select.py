@@ -16,6 +16,7 @@ from scipy.special import logsumexp
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from validation.diagnosis.columns import Columns
+from validation.diagnosis.common_noise import NONE, common_sizes, stable
 from validation.diagnosis.elements import label
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
@@ -36,12 +37,14 @@ _SAME = 1.0  # squared whitened difference of models with equal predictions
 _LISTED = 20  # models in the result
 _COMPARED = 60  # models whose predictions are compared
 _FEWEST = 5  # blocks: with fewer, functions are not cross-validated
+_AGAIN = 3  # searches with other noise in common, or other blunders
 _SURE = 2.0  # standard errors: least gain of a function in cross-validation
 
 
 def select(
     columns: Columns, z: NDArray, cells: NDArray,
     update: Update = lambda what, done, total: None,
+    common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
     """Find what the declared model lacks.
 
@@ -50,20 +53,25 @@ def select(
         z: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells; no other reading is used.
         update: progress callback: stage, steps done, steps in total.
+        common: [rad, m] noise that cells of a measurement share, over tau, if known.
 
     Returns:
         The best model, and the posterior probabilities.
     """
-    good = np.ones(len(z))
-    search = Search(columns, z, cells, good)
+    good, shared = np.ones(len(z)), common or NONE
+    search = Search(columns, z, cells, good, shared)
     begin = probability_good(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
-        good, search = begin, Search(columns, z, cells, begin)
+        good, search = begin, Search(columns, z, cells, begin, shared)
     states = search.run(update)
-    again = probability_good(states[0].expected_squares())
-    if not np.array_equal(again, good):
+    for _ in range(1 if columns.motions is None else _AGAIN):
+        again = probability_good(states[0].expected_squares())
+        sizes = common_sizes(states[0]) if common is None else shared
+        if np.array_equal(again, good) and stable(sizes, shared):
+            break
         states.clear()  # a model may have columns of hundreds of megabytes
-        good, search = again, Search(columns, z, cells, again)
+        good, shared = again, sizes
+        search = Search(columns, z, cells, good, shared)
         states = search.run(update)
     selected = _selected(search, states, good)
     search.fit.forget()
@@ -112,7 +120,12 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
             small.axis[kept],
             best.sizes.std[: len(kept)] * tau,
         ),  # fmt: skip
-        noise=Noise(tau, tau_std, _findings(search, best, (tau, tau_std), good)),
+        noise=Noise(
+            tau,
+            tau_std,
+            _findings(search, best, (tau, tau_std), good),
+            (tau * fit.common[0], tau * fit.common[1]),
+        ),  # fmt: skip
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
@@ -138,7 +151,8 @@ def _findings(
     repeats = repeat_scatter(best.left[kept], group[kept])
     forms = {e.candidate.shape.form for e in best.elements if not e.name}
     memory = any(FORMS[form].remembers for form in forms)
-    return findings(*scale, repeats, memory=memory)
+    common = scale[0] * fit.common[0], scale[0] * fit.common[1]
+    return findings(*scale, repeats, memory=memory, common=common)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:

@@ -23,7 +23,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     if math.isfinite(diagnosis.uncertainty):
         unsure = f" +- {diagnosis.uncertainty:.2f}"
     kept = f"on {where} the residual is {diagnosis.before.normalised:.2f} sigma before"
-    both = f"{kept}, {after.normalised:.2f}{unsure} after (1 is noise)"
+    noise = f"{diagnosis.noise.normalised:.3g} is noise"
+    both = f"{kept}, {after.normalised:.2f}{unsure} after ({noise})"
     if diagnosis.setup:
         return "The campaign is set up wrongly: " + "; ".join(
             one.sentence for one in diagnosis.setup

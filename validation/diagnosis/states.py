@@ -91,7 +91,7 @@ class State:
 
     @cached_property
     def left(self) -> NDArray:
-        """(n,) whitened residual, unweighted."""
+        """(n,) residual of independent noise, unweighted."""
         f = self.fit
         X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
         return (f.readings(self.elements) - X @ self.sizes.mean) / f.root
@@ -141,8 +141,9 @@ class Fitting:
     """Weighted readings of the fitted cells, and models of them."""
 
     def __init__(
-        self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray
-    ) -> None:
+        self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
+        common: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
         """Apply the weights and project out the measuring frame.
 
         Args:
@@ -150,19 +151,24 @@ class Fitting:
             z: (n,) whitened residual of the fitted cells.
             cells: (N,) mask of the fitted cells.
             weights: (n,) relative precision, 1 for a good reading.
+            common: [rad, m] standard deviations of the platform's rotation and
+                translation that all cells of a measurement share, over tau.
         """
         self.columns, self.cells, self.weights = columns, cells, weights
+        self.given, self.common = z, common
         self.sampled = columns.sampled[cells]
         self.root = np.sqrt(weights)
-        flat = columns.flat[cells] * self.root[:, None]
-        flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-        left, size, _ = np.linalg.svd(flat, full_matrices=False)
+        self.whiten = columns.whitening(cells, self.root, common)
+        flat = self.whiten(columns.flat[cells])
+        norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
         self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        self.z = self._without_flat(z * self.root)
+        # of the noise's covariance, and of the likelihood without the measuring frame
+        seen = np.append(norm, size[: self.flat.shape[1]])
+        self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
+        self.z = self._without_flat(self.whiten(z))
         self.count = len(z) - self.flat.shape[1]
-        self.small = self._without_flat(
-            columns.nuisance.columns[cells] * self.root[:, None]
-        )
+        self.small = self._without_flat(self.whiten(columns.nuisance.columns[cells]))
         self._gram = self.small.T @ self.small
         self._own: dict[Element, NDArray] = {}
         self._inner: dict[tuple[Element, Element | None], NDArray] = {}
@@ -177,7 +183,7 @@ class Fitting:
         """Return an element's (n, m) columns in the fitted cells."""
         if e in self._own:
             return self._own[e]
-        B = self._without_flat(e.columns[self.cells] * self.root[:, None])
+        B = self._without_flat(self.whiten(e.columns[self.cells]))
         if B.shape[1] <= _NARROW:
             self._own[e] = B
         return B
@@ -214,7 +220,7 @@ class Fitting:
         for e in elements:
             if e.offset is not None:
                 if e not in self._offset:
-                    o = e.offset[self.cells] * self.root
+                    o = self.whiten(e.offset[self.cells])
                     self._offset[e] = self._without_flat(o)
                 z = z - self._offset[e]
         return z

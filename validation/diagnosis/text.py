@@ -100,17 +100,16 @@ def _errors_text(diagnosis: Diagnosis) -> list[str]:
         f"{'':<20}{'before':>12}{'after':>12}{'noise':>12}{'saved':>12}",
     ]
     columns = diagnosis.before, diagnosis.after, diagnosis.noise, diagnosis.saved
+    noise = diagnosis.noise.normalised
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
         row = [getattr(errors, name) for errors in columns]
-        if name == "normalised":
-            row[2] = 1.0
         shown = "".join(
             f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
         )
         lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
     if (diagnosis.outliers & diagnosis.held.rows).any():
         cut = [f"{errors.normalised:>12.3g}" for errors in diagnosis.with_outliers]
-        lines.append(f"{'with outliers':<20}{cut[0]}{cut[1]}{1.0:>12.3g}")
+        lines.append(f"{'with outliers':<20}{cut[0]}{cut[1]}{noise:>12.3g}")
     return lines
 
 

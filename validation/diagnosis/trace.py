@@ -30,6 +30,7 @@ from assembly.measurement.predict import (
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
+from validation.diagnosis.common_noise import NONE
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import hidden
 from validation.diagnosis.hypotheses import Hypothesis
@@ -63,7 +64,7 @@ class Traced:
 
     Attributes:
         campaign: of R rows; sigma is as large as the search believed, of a blunder
-            many times as large.
+            many times as large, and so is the noise in common.
         unregistered: conditions of all rows, before any registration.
         conditions: the same, registered, with what finite geometric errors add.
         used: (R,) bool, rows that were fitted.
@@ -189,7 +190,7 @@ def trace(
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
-    sample = hidden(campaign, ~_drawn(fitted))
+    sample = hidden(campaign, ~_drawn(campaign, fitted))
     conditions = _with_its_errors(sample, declared, conditions, fitted, complete)
     columns = Columns(sample, conditions, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
@@ -217,10 +218,13 @@ def trace(
     return _without_outlying(traced, fit)
 
 
-def _drawn(fitted: NDArray) -> NDArray:
+def _drawn(campaign: Campaign, fitted: NDArray) -> NDArray:
     """(R,) bool, the rows by which models are chosen: all, or so many drawn once."""
-    rows = np.random.default_rng(0).permutation(np.flatnonzero(fitted))[:_SEARCHED]
-    return np.isin(np.arange(len(fitted)), rows)
+    visit = campaign.measured_at_once  # the points of a row of the file stay together
+    listed = np.unique(visit[fitted])
+    most = _SEARCHED * len(listed) // max(int(fitted.sum()), 1)
+    drawn = np.random.default_rng(0).permutation(listed)[:most]
+    return fitted & np.isin(visit, drawn)
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
@@ -249,7 +253,7 @@ def _with_its_errors(
         read = predict(conditions).deviation
         z = whiten(campaign, campaign.measured - read)
         known = cells & np.isfinite(z)
-        selected = select(columns, z[known], known)
+        selected = select(columns, z[known], known, common=NONE)
         traced = _traced(
             campaign, declared, conditions, fitted, known, selected, columns, False
         )
@@ -274,10 +278,12 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
     """The search; where rows follow one another, time itself explains the least."""
     # it varies with whatever changed meanwhile, and says nothing of another day: it is
     # believed only where it predicts other spans of time clearly better
-    whole = select(columns, z, cells, update)
+    # where nothing may act, what would is no noise
+    whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    timeless = select(columns.without_clocks(), z, cells, update)
+    common = whole.states[0].fit.common  # of one noise alone can they be compared
+    timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
     return whole if sure > _CLEARLY else timeless
@@ -293,6 +299,9 @@ def _traced(
     sigma = campaign.sigma.copy()
     sigma[campaign.cells] *= selected.noise.tau
     sigma[columns.campaign.cells] /= np.sqrt(weights)
+    common = None
+    if any(selected.noise.common):
+        common = columns.motions * np.repeat(selected.noise.common, 3)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
     # the row of a blunder is left out whole: what else was read then is doubtful, and
@@ -300,7 +309,7 @@ def _traced(
     blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
-        campaign=replace(campaign, sigma=sigma),
+        campaign=replace(campaign, sigma=sigma, common=common),
         unregistered=declared,
         conditions=conditions,
         used=fitted & ~outliers,

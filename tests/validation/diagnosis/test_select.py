@@ -104,7 +104,7 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     made = [
         columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
     ]
-    dense = Dense(made, search.fit.cells, search.fit.root)
+    dense = Dense(made, search.fit.cells, search.fit.whiten)
     alone = dense.gains(search.empty[-1].marginal, FREEDOM)
     together = np.array([f.score - f.log_prior for f in looked])
     assert len(looked) > 50

@@ -99,6 +99,7 @@ def test_a_verdict_is_said_with_what_it_rests_on(monkeypatch, changes, expected)
     sets = ("a",), (), ("a", "b"), ("c",), ("d",)
     one = SimpleNamespace(**{
         "before": SimpleNamespace(normalised=7.0),
+        "noise": SimpleNamespace(normalised=1.0),
         "after": SimpleNamespace(normalised=1.5), "lack": SimpleNamespace(rms=2.5),
         "claimed": ("a", "b"), "alternatives": tuple((names, 0.2) for names in sets),
         "fit": SimpleNamespace(

@@ -24,7 +24,7 @@ def made(**changes):
         "verdict": "none_needed",
         "alternatives": ((("drift",), 0.75), ((), 0.25)),
         "held": SimpleNamespace(rows=np.arange(4) > 1, words="2 rows, drawn once"),
-        "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 0.2),
+        "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 1.2),
         "saved": Errors(8e-6, 3e-6, 1.0),
         "with_outliers": (Errors(2e-5, 1e-6, 8.0), Errors(9e-6, 1e-6, 2.25)),
         "noise_scale": (1.0, 0.05), "findings": (), "noise_in_time": None,
@@ -60,8 +60,8 @@ def test_what_is_not_there_is_not_said(shown):
         ["before", "after", "noise", "saved"],
         ["position", "[m]", "3e-05", "1e-05", "5e-06", "8e-06"],
         ["rotation", "[rad]", "2e-06", "-", "1e-06", "3e-06"],
-        # noise is one sigma whatever it is in the rows at hand
-        ["normalised", "[sigma]", "7", "1.5", "1", "1"],
+        # more than one sigma where the points of a row have some in common
+        ["normalised", "[sigma]", "7", "1.5", "1.2", "1"],
     ]
     assert [line.split() for line in said[at + 10 :]] == [
         ["model", "unknowns", "m", "sigma", "reduction"],
@@ -87,7 +87,7 @@ def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
     aside = shown(outliers=np.array([False, True, False, True]))
     assert "left out as outliers: m1, m3" in aside
     (more,) = [line for line in aside if line.startswith("with outliers")]
-    assert more.split() == ["with", "outliers", "8", "2.25", "1"]
+    assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
 
 
 def test_components_that_no_row_has_are_named(shown):

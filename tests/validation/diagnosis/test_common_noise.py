@@ -1,0 +1,175 @@
+"""Noise that the points of one measurement have in common, in a diagnosis."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.measurement.predict import with_second_order
+from assembly.robots import delta
+from tests.bar_for_tests import BEAM, LONGER, along, bar, machine
+from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_points
+from tests.validation.diagnosis.test_simulated import arm
+from validation.campaign.campaign import number_rows
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.lack_of_fit import lack_of_fit
+from validation.diagnosis.results import table
+from validation.diagnosis.select import select
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.whitening import independent
+from validation.synthetic.design import CampaignDesign
+
+VISITS = 60
+DESIGN = CampaignDesign(
+    configurations=64, rows=128, load=40.0, reach=0.6, reference_point=(0.02, 0, 0.03)
+)
+
+
+def three_points(visits=VISITS, **covariates):
+    """The bar, three points of whose tip are measured at once, noise of 5 um each."""
+    rows = 3 * visits
+    single = bar(link=BEAM, rows=visits, spread=6.0)
+    measured = np.zeros((rows, 6))
+    measured[:, :3] = np.nan
+    names = np.tile(list(TARGETS), visits)
+    labels = zip(np.repeat(np.arange(visits), 3), names, strict=True)
+    return replace(
+        single.take(np.repeat(np.arange(visits), 3)), point=names, points=TARGETS,
+        ids=tuple(f"m{i}:{name}" for i, name in labels), measured=measured,
+        sigma=np.full((rows, 6), DEVICE),
+        covariates={name: np.repeat(x, 3) for name, x in covariates.items()},
+    )  # fmt: skip
+
+
+CAMPAIGN = three_points(time=60.0 * np.random.default_rng(0).permutation(VISITS))
+
+
+@pytest.fixture(scope="module")
+def columns():
+    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+
+
+def moved(campaign, sizes, rng):
+    """(R, 6) [m] what every point reads of a motion drawn once for a measurement."""
+    turn, shift = (
+        size * rng.normal(size=(len(campaign), 3))[campaign.measured_at_once]
+        for size in sizes
+    )
+    centre = np.mean(list(TARGETS.values()), axis=0)
+    place = campaign.transforms[:, 1, :3, :3]
+    arm = np.einsum("rij,rj->ri", place, campaign.targets - centre)
+    return np.hstack([np.zeros(arm.shape), shift + np.cross(turn, arm)])
+
+
+def found(columns, readings, seed, device=DEVICE):
+    rng = np.random.default_rng([seed, 1])
+    noise = device * rng.normal(size=readings.shape)
+    z = ((readings + noise) / CAMPAIGN.sigma)[CAMPAIGN.cells]
+    return select(columns, z, np.ones(len(z), dtype=bool))
+
+
+# device 0.5 um, machine 5 um, stated 5 um: all of it is what the points have in common
+@pytest.mark.parametrize(("device", "sizes"), [
+    (DEVICE, (2e-4, 2e-5)), (DEVICE, (0.0, 0.0)), (0.1 * DEVICE, (5e-5, 5e-6)),
+    pytest.param(DEVICE, (0.0, 2e-5), marks=pytest.mark.slow),
+    pytest.param(DEVICE, (3e-4, 0.0), marks=pytest.mark.slow),
+    pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
+])  # fmt: skip
+def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
+    """60 measurements say each size of three components to 5 %; four times that."""
+    rng = np.random.default_rng([7, 1])
+    selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
+    assert selected.hypotheses == selected.functions == ()
+    for seen, true in zip(selected.noise.common, sizes, strict=True):
+        assert seen == pytest.approx(true, rel=0.25)
+    # the prior of the stated sigma counts as 20 cells of 540
+    assert device / DEVICE - 0.2 < selected.noise.tau < device / DEVICE + 0.25
+    told = [s for s in selected.noise.findings if "common to the points" in s]
+    assert len(told) == any(sizes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_length_is_found_beside_noise_in_common(columns, seed):
+    """Its uncertainty is that of the mean of 60 measurements, not of 180 points."""
+    true = 2e-5
+    rng = np.random.default_rng([seed, 2])
+    readings = moved(CAMPAIGN, (0.0, 2e-5), rng)
+    readings[:, 3:] += true * np.repeat(along(bar(rows=VISITS, spread=6.0)), 3, axis=0)
+    selected = found(columns, readings, seed)
+    assert [h.effect for h in selected.hypotheses] == ["link_length"]
+    std = np.sqrt((2e-5**2 + DEVICE**2 / 3) / VISITS)
+    assert selected.values[0] == pytest.approx(true, abs=3.5 * std)
+
+
+def test_a_fit_counts_what_points_have_in_common_once():
+    """Of a length: (c^2 + sigma^2/3) / measurements, for a shift c of all points."""
+    c = 3 * DEVICE
+    common = np.zeros((len(CAMPAIGN), 6, 3))
+    common[:, 3:] = c * np.eye(3)
+    fit = machine(replace(CAMPAIGN, common=common), LONGER)
+    expected = (c**2 + DEVICE**2 / 3) / VISITS
+    assert fit.covariance[0, 0] == pytest.approx(expected, rel=1e-3)
+    alone = machine(CAMPAIGN, LONGER)
+    assert alone.covariance[0, 0] == pytest.approx(DEVICE**2 / 3 / VISITS, rel=1e-3)
+
+
+@pytest.mark.parametrize("repeats", [True, False])
+def test_what_repeats_do_not_show_is_no_noise(repeats):
+    """A motion that is the same whenever a command is repeated has a cause."""
+    rng = np.random.default_rng(3)
+    campaign = three_points(80)
+    visit = campaign.measured_at_once
+    point = np.unique(campaign.point, return_inverse=True)[1]
+    campaign = replace(campaign, repeat=number_rows(visit // 2, point))
+    drawn = rng.normal(size=(80, 3))
+    motion = 4 * DEVICE * drawn[visit // 2 * 2 if repeats else visit]
+    residual = DEVICE * rng.normal(size=(240, 6))
+    residual[:, 3:] += motion
+    common = np.zeros((240, 6, 3))
+    common[:, 3:] = 4 * DEVICE * np.eye(3)
+    campaign = replace(campaign, common=common)
+    lack = lack_of_fit(campaign, independent(campaign, residual), 0)
+    assert lack.significant == repeats
+
+
+# whole diagnoses of machines that another program simulated
+
+
+def diagnosed(robot, wanted, seed, folder):
+    made = simulated(robot, wanted, DESIGN, seed, MACHINE[3])
+    return made, diagnose(write_points(made, folder / "campaign", seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path):
+    robot = arm() if seed % 2 else delta()
+    _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
+    assert diagnosis.verdict == "none_needed"
+    assert diagnosis.claimed == ()
+    assert not diagnosis.fit.unknowns.functions
+    sizes = table(diagnosis)["noise_scale"]["common"]
+    # 96 measurements of three components: 4 % each, and four times that
+    assert sizes["rotation"] == pytest.approx(MACHINE[0], rel=0.2)
+    assert sizes["translation"] == pytest.approx(MACHINE[3], rel=0.2)
+    assert "noise common to the points of a row" in diagnosis.summary()
+    assert diagnosis.after.position == pytest.approx(diagnosis.noise.position, rel=0.2)
+
+
+@pytest.mark.slow
+def test_intervals_cover_beside_noise_in_common(tmp_path):
+    """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
+    covers = 0
+    for seed in range(12):
+        made, diagnosis = diagnosed(
+            arm(), {"encoder_offset": 5.0}, 50 + seed, tmp_path / str(seed)
+        )
+        (true,) = made.effects
+        assert diagnosis.claimed == ("encoder_offset",)
+        assert not diagnosis.fit.unknowns.functions
+        for one in table(diagnosis)["effects"][0]["parameters"]:
+            off = abs(one["value"] - true.parameters.get(one["name"], 0.0))
+            covers += off < 1.645 * one["std"] and one["name"] == min(true.parameters)
+    assert covers >= 8

@@ -1,0 +1,89 @@
+"""Noise that the points of one measurement have in common: how large is it?
+
+A device that reads several points of the platform at once sees in all of them how the
+machine repeats, and how its frame shakes: a small motion of the platform, drawn once
+for a measurement.  It has one standard deviation of rotations and one of translations
+of the points' centre.  Both maximise the evidence of a model of the readings, every
+other unknown marginalised.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from validation.diagnosis.gaussian import size_penalty
+from validation.diagnosis.states import IN_USE, Fitting, State
+
+NONE = (0.0, 0.0)
+_STEP = 1.0  # of the logarithms of both sizes, at the start
+_CLOSE = 0.05  # of a logarithm, that ends the search
+_LEAST = 0.02  # [sigma] contribution to the readings that is none
+_EVALUATIONS = 40
+_STABLE = 0.1  # change of a logarithm that changes no decision
+
+
+def common_sizes(state: State) -> tuple[float, float]:
+    """Estimate the noise in common.
+
+    Args:
+        state: model of the readings; its elements are kept.
+
+    Returns:
+        [rad, m] standard deviations of rotation and translation over the noise's scale;
+        zero for what is not better than none by more than its cost.
+    """
+    fit = state.fit
+    loadings = fit.columns.loadings(fit.cells)
+    if loadings is None:
+        return NONE
+    squares = [float((loadings[:, k : k + 3] ** 2).sum()) for k in (0, 3)]
+    units = [math.sqrt(len(loadings) / s) if s > 0 else 0.0 for s in squares]
+    visits = len(np.unique(fit.columns.visit[fit.cells]))
+    cost = size_penalty(3.0 * visits) + IN_USE[0]
+    best, worth = NONE, _evidence(state, NONE)
+    for kinds in ((0, 1), (1,), (0,)):
+        if not all(units[k] for k in kinds):
+            continue
+        start = [best[k] / units[k] if best[k] else 1.0 for k in kinds]
+        sizes, value = _largest(state, kinds, units, np.log(start))
+        if value - cost * len(kinds) > worth:
+            best, worth = sizes, value - cost * len(kinds)
+    return best
+
+
+def _largest(
+    state: State, kinds: tuple[int, ...], units: list[float], start: NDArray
+) -> tuple[tuple[float, float], float]:
+    """Return the sizes of largest evidence, and that."""
+
+    def sizes(logs: NDArray) -> tuple[float, float]:
+        own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
+        return own.get(0, 0.0) * units[0], own.get(1, 0.0) * units[1]
+
+    simplex = np.vstack([start, start + _STEP * np.eye(len(kinds))])
+    found = minimize(
+        lambda logs: -_evidence(state, sizes(logs)), start, method="Nelder-Mead",
+        bounds=[(math.log(_LEAST), math.log(1e4))] * len(kinds),
+        options={
+            "initial_simplex": simplex, "xatol": _CLOSE, "fatol": 0.1,
+            "maxfev": _EVALUATIONS,
+        },
+    )  # fmt: skip
+    return sizes(found.x), -float(found.fun)
+
+
+def _evidence(state: State, sizes: tuple[float, float]) -> float:
+    """Return the log posterior of a model's elements with some noise in common."""
+    fit = state.fit
+    other = Fitting(fit.columns, fit.given, fit.cells, fit.weights, sizes)
+    return other.state(state.elements, state.mode, state).score - other.log_det / 2
+
+
+def stable(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether two estimates of the sizes lead to the same decisions."""
+    pairs = list(zip(one, other, strict=True))
+    if any((a > 0) != (b > 0) for a, b in pairs):
+        return False
+    return all(a == b or abs(math.log(a / b)) < _STABLE for a, b in pairs)

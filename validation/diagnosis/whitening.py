@@ -1,0 +1,155 @@
+r"""Noise that the points of one measurement have in common, made independent.
+
+A measurement reads several points of the platform at once.  The noise of its cells,
+over the stated sigma, is e + L n: e independent of variance 1/w, n of k independent
+standard normal numbers that all its cells share.
+
+======  ==============  =======  =====================================================
+symbol  code            shape    meaning
+======  ==============  =======  =====================================================
+w       ``root`` ** 2   (n,)     relative precisions
+L       ``loadings``    (n, k)   change of the cells over sigma per number in common
+W       ``matrix``      (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
+======  ==============  =======  =====================================================
+
+Of all such W this is the one nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with
+K = w^1/2 L, by the singular values of the blocks of K.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import spsolve
+
+from validation.campaign.campaign import Campaign
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Linear map of n cells to cells of independent noise of variance one.
+
+    Attributes:
+        root: (n,) square roots of the relative precisions.
+        matrix: (n, n) W, sparse; None if no noise is in common.
+        log_det: ln det (1 + K K').
+    """
+
+    root: NDArray
+    matrix: csc_array | None = None
+    log_det: float = 0.0
+
+    def __call__(self, values: NDArray) -> NDArray:
+        """Return W times (n,) or (n, m) values over sigma."""
+        if self.matrix is not None:
+            return np.asarray(self.matrix @ values)
+        return values * (self.root if values.ndim == 1 else self.root[:, None])
+
+    def inverse(self, values: NDArray) -> NDArray:
+        """Return the (n,) values over sigma that the map takes to given ones."""
+        if self.matrix is not None:
+            return np.asarray(spsolve(self.matrix, values))
+        return values / self.root
+
+
+def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
+    """Build the map.
+
+    Args:
+        root: (n,) square roots of the relative precisions.
+        loadings: (n, k) change of the cells over sigma per number in common, or None.
+        visit: (n,) the same for cells of one measurement.
+
+    Returns:
+        The map; diagonal without loadings.
+    """
+    if loadings is None or not loadings.any():
+        return Whitening(root)
+    K = root[:, None] * loadings
+    row, column, value, log_det = [], [], [], 0.0
+    for cells in _of_one_size(visit):
+        U, d, _ = np.linalg.svd(K[cells], full_matrices=False)
+        shrink = 1 / np.sqrt(1 + d**2) - 1
+        W = np.eye(cells.shape[1]) + (U * shrink[:, None]) @ U.transpose(0, 2, 1)
+        W *= root[cells][:, None, :]
+        row.append(np.broadcast_to(cells[:, :, None], W.shape).ravel())
+        column.append(np.broadcast_to(cells[:, None, :], W.shape).ravel())
+        value.append(W.ravel())
+        log_det += float(np.log1p(d**2).sum())
+    places = np.concatenate(row), np.concatenate(column)
+    matrix = csc_array((np.concatenate(value), places), shape=(len(root), len(root)))
+    return Whitening(root, matrix, log_det)
+
+
+def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
+    """Yield (V, m) cells of all measurements of m cells, for every m."""
+    order = np.argsort(visit, kind="stable")
+    _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
+    for size in np.unique(count).tolist():
+        first = start[count == size]
+        yield order[first[:, None] + np.arange(size)]
+
+
+def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
+    """The map of cells of a campaign, by its sigma and its noise in common.
+
+    Args:
+        campaign: of R rows.
+        cells: (R, 6) bool, measured cells.
+
+    Returns:
+        The map of these n cells over sigma.
+    """
+    row, _ = np.nonzero(cells)
+    loadings = None
+    if campaign.common is not None:
+        loadings = campaign.common[cells] / campaign.sigma[cells][:, None]
+    visit = campaign.measured_at_once[row] if loadings is not None else row
+    return whitening(np.ones(len(row)), loadings, visit)
+
+
+def independent(campaign: Campaign, residual: NDArray) -> NDArray:
+    """A residual over its noise, independent in every cell.
+
+    Args:
+        campaign: of R rows, N measured cells.
+        residual: (R, 6) [rad, m]; what is not finite counts as zero.
+
+    Returns:
+        (N,) of unit variance if the residual is noise.
+    """
+    cells = campaign.cells
+    z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
+    return whitening_of(campaign, cells)(z)
+
+
+def size_of_noise(campaign: Campaign) -> NDArray:
+    """(R, 6) [rad, m] standard deviation of every reading, noise in common included."""
+    if campaign.common is None:
+        return campaign.sigma
+    return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
+
+
+def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
+    """What a small motion of the platform changes in the readings.
+
+    Args:
+        campaign: of R rows.
+        reading: (R, 6, 6) change of the readings per screw of the platform at its
+            origin, base axes.
+
+    Returns:
+        (R, 6, 6) [rad, m] per rotation about the centre of the points measured, and per
+        translation; None where no measurement reads several points.
+    """
+    visit = campaign.measured_at_once[campaign.cells.any(axis=1)]
+    if len(np.unique(visit)) == len(visit):
+        return None
+    centre = np.unique(campaign.targets, axis=0).mean(axis=0)
+    place = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
+    screws = np.tile(np.eye(6), (len(campaign), 1, 1))  # screw by motion
+    arm = place[:, :3, :3] @ centre
+    screws[:, 3:, :3] = np.swapaxes(np.cross(np.eye(3), -arm[:, None]), 1, 2)
+    return np.asarray(reading @ screws)
