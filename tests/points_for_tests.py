@@ -5,9 +5,11 @@ machine repeats (noise that the points of a row have in common), and on top of t
 reading has noise of the device.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from assembly.files.robot_file import write_robot
@@ -16,7 +18,7 @@ from validation.campaign.campaign import Campaign
 from validation.campaign.campaign_file import read_campaign
 from validation.synthetic.design import CampaignDesign
 from validation.synthetic.generator import Noise, Synthetic, generate_campaign
-from validation.synthetic.machine import nominal_pose, with_point
+from validation.synthetic.machine import Hidden, nominal_pose, with_point
 
 TARGETS = {
     "A": np.array([0.08, 0.0, 0.02]),
@@ -28,8 +30,8 @@ MACHINE = np.repeat([2e-4, 2e-5], 3)  # [rad, m] by which the machine repeats
 
 
 def simulated(
-    robot: Robot, wanted: dict[str, float], design: CampaignDesign, seed: int,
-    noise: float,
+    robot: Robot, wanted: Mapping[str, float] | Sequence[tuple[Hidden, float]],
+    design: CampaignDesign, seed: int, noise: float,
 ) -> Synthetic:  # fmt: skip
     """A simulated machine, its effects so many times the noise ``noise`` [m]."""
     size = Noise(rotation=10 * noise, position=noise)
@@ -37,7 +39,7 @@ def simulated(
 
 
 def write_points(
-    made: Synthetic, folder: Path, seed: int, *, common=MACHINE,
+    made: Synthetic, folder: Path, seed: int, *, common: NDArray = MACHINE,
     device: float = DEVICE, stated: float = DEVICE,
 ) -> Campaign:  # fmt: skip
     """Write what a device reads of three points, and read the campaign back.

@@ -35,12 +35,14 @@ def common_sizes(state: State) -> tuple[float, float]:
         zero for what is not better than none by more than its cost.
     """
     fit = state.fit
-    loadings = fit.columns.loadings(fit.cells)
+    cells = fit.cells.copy()
+    cells[cells] = fit.sampled
+    loadings = fit.columns.loadings(cells)
     if loadings is None:
         return NONE
     squares = [float((loadings[:, k : k + 3] ** 2).sum()) for k in (0, 3)]
     units = [math.sqrt(len(loadings) / s) if s > 0 else 0.0 for s in squares]
-    visits = len(np.unique(fit.columns.visit[fit.cells]))
+    visits = len(np.unique(fit.columns.visit[cells]))
     cost = size_penalty(3.0 * visits) + IN_USE[0]
     best, worth = NONE, _evidence(state, NONE)
     for kinds in ((0, 1), (1,), (0,)):
@@ -76,8 +78,10 @@ def _largest(
 
 def _evidence(state: State, sizes: tuple[float, float]) -> float:
     """Return the log posterior of a model's elements with some noise in common."""
-    fit = state.fit
-    other = Fitting(fit.columns, fit.given, fit.cells, fit.weights, sizes)
+    fit, drawn = state.fit, state.fit.sampled
+    cells = fit.cells.copy()
+    cells[cells] = drawn
+    other = Fitting(fit.columns, fit.given[drawn], cells, fit.weights[drawn], sizes)
     return other.state(state.elements, state.mode, state).score - other.log_det / 2
 
 

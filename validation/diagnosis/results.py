@@ -54,7 +54,6 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
             "noise": {
                 "position": diagnosis.noise.position,
                 "rotation": diagnosis.noise.rotation,
-                "normalised": diagnosis.noise.normalised,
             },
             "with_outliers": {
                 "before": _errors(diagnosis.with_outliers[0]),
@@ -65,6 +64,7 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
             "value": diagnosis.noise_scale[0],
             "std": diagnosis.noise_scale[1],
             "findings": list(diagnosis.findings),
+            "normalised": diagnosis.noise.normalised,
             "common": dict(
                 zip(KINDS, diagnosis.traced.selected.noise.common, strict=True)
             ),
