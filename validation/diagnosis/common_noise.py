@@ -20,6 +20,7 @@ NONE = (0.0, 0.0)
 _STEP = 1.0  # of the logarithms of both sizes, at the start
 _CLOSE = 0.05  # of a logarithm, that ends the search
 _LEAST = 0.02  # [sigma] contribution to the readings that is none
+_CLEAR = 1.0  # [sigma] contribution to the readings from which a size is needed
 _EVALUATIONS = 40
 _STABLE = 0.1  # change of a logarithm that changes no decision
 
@@ -44,19 +45,22 @@ def common_sizes(state: State) -> tuple[float, float]:
     units = [math.sqrt(len(loadings) / s) if s > 0 else 0.0 for s in squares]
     visits = len(np.unique(fit.columns.visit[cells]))
     cost = size_penalty(3.0 * visits) + IN_USE[0]
-    best, worth = NONE, _evidence(state, NONE)
+    best, worth, both = NONE, _evidence(state, NONE), (1.0, 1.0)
     for kinds in ((0, 1), (1,), (0,)):
         if not all(units[k] for k in kinds):
             continue
-        start = [best[k] / units[k] if best[k] else 1.0 for k in kinds]
-        sizes, value = _largest(state, kinds, units, np.log(start))
+        if len(kinds) == 1 and both[1 - kinds[0]] > _CLEAR:
+            continue
+        sizes, value = _largest(state, kinds, units)
+        if len(kinds) == 2:
+            both = sizes[0] / units[0], sizes[1] / units[1]
         if value - cost * len(kinds) > worth:
             best, worth = sizes, value - cost * len(kinds)
     return best
 
 
 def _largest(
-    state: State, kinds: tuple[int, ...], units: list[float], start: NDArray
+    state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
     """Return the sizes of largest evidence, and that."""
 
@@ -64,6 +68,7 @@ def _largest(
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
         return own.get(0, 0.0) * units[0], own.get(1, 0.0) * units[1]
 
+    start = np.zeros(len(kinds))
     simplex = np.vstack([start, start + _STEP * np.eye(len(kinds))])
     found = minimize(
         lambda logs: -_evidence(state, sizes(logs)), start, method="Nelder-Mead",
