@@ -92,6 +92,17 @@ def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
     assert len(told) == any(sizes)
 
 
+def test_points_measured_at_once_are_drawn_together():
+    """Of 600 rows some 500 score functions first: all three of a measurement."""
+    campaign = three_points(200)
+    columns = Columns(campaign, with_second_order(conditions_of(campaign)))
+    rows = np.unique(columns.row[columns.sampled])
+    visits, count = np.unique(campaign.measured_at_once[rows], return_counts=True)
+    assert 480 < len(rows) <= 500
+    assert (count == 3).all()
+    assert len(visits) == len(rows) / 3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_length_is_found_beside_noise_in_common(columns, seed):
