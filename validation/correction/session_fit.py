@@ -12,8 +12,13 @@ C       ``covariance`` (k, k)     of x
 Of a session are its values (:mod:`.session_unknowns`), flat or with a prior; u
 (:mod:`.machine_numbers`) is common to all, N(0, k).  How much more than sigma the
 readings scatter about the saved robot, tau, is known from its diagnosis with 20 degrees
-of freedom; k has the largest evidence on a grid, tau marginalised.  Rows of one
-configuration tell the same: readings weigh as if there were one of each.
+of freedom.  Rows of one configuration tell the same: readings weigh as if there were
+one of each.
+
+k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
+fit to the others.  It is the least that no other predicts better by a standard error
+and by a part of the noise that matters.  The evidence of k is no judge: it takes for
+granted that the machine changed in the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -31,14 +36,16 @@ from validation.campaign.campaign import Campaign
 from validation.correction.machine_numbers import MachineNumbers
 from validation.correction.session_unknowns import SessionUnknowns, without_session
 from validation.correction.spread import number_slopes
-from validation.diagnosis.gaussian import deviance
-from validation.diagnosis.noise import FREEDOM, scale
+from validation.diagnosis.gaussian import leave_block_out, marginalise
+from validation.diagnosis.noise import scale
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import coarse_frame
 
 _STEPS = 8
 _SETTLED = 1e-3  # [sigma of the value] a step that changes nothing
-_WIDENED = 4.0 ** np.arange(-3, 8)  # k that are tried
+_WIDENED = 4.0 ** np.arange(8)  # k that are tried
+_SURE = 1.0  # standard errors by which a larger k must predict better
+_MATTERS = 0.03  # of the noise's variance
 _RANK = 1e-9  # relative singular value of a value that others do as well
 _AT_ONCE = 1000  # rows, so that memory stays small
 
@@ -284,16 +291,30 @@ def _widened(
     Q = Q[:, size > _RANK * size.max(initial=0.0)]
     z, A = z - Q @ (Q.T @ z), (A - Q @ (Q.T @ A))[:, ~flat]
     known = precision[precision > 0.0] ** -0.5
-    count, best = len(z) - Q.shape[1], (-np.inf, 1.0, 1.0)
-    for k in _WIDENED if len(machine) else _WIDENED[:1]:
-        B = A * np.append(known, np.full(len(machine), np.sqrt(k)))
-        M = np.eye(B.shape[1]) + B.T @ B
-        along = B.T @ z
-        squares = float(z @ z - along @ np.linalg.solve(M, along))
-        score = -float(np.linalg.slogdet(M)[1]) - float(
-            deviance(squares, count, FREEDOM)
-        )
-        if score > best[0]:
-            tau = scale(squares, count)[0]
-            best = score, max(1.0, float(k) * tau**2), tau
-    return best[1], best[2]
+    blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
+
+    def predicted(k: float) -> tuple[NDArray, float]:
+        """Squared errors of every block, and tau."""
+        std = np.append(known, np.full(len(machine), np.sqrt(k)))
+        marginal = marginalise(A, std, z, Q)
+        errors, _ = leave_block_out(marginal, blocks)
+        tau = scale(marginal.squares, len(z) - Q.shape[1])[0]
+        return np.bincount(blocks, errors**2), tau
+
+    grid = _WIDENED.tolist() if len(machine) else [1.0]
+    squares, taus = zip(*map(predicted, grid), strict=True)
+    least = min(squares, key=np.sum)
+    for k, own, tau in zip(grid, squares, taus, strict=True):
+        more = own - least
+        error = float(more.std(ddof=min(1, len(more) - 1))) * np.sqrt(len(more))
+        if more.sum() <= max(_SURE * error, _MATTERS * len(z)):
+            break
+    return max(1.0, k * tau**2), tau
+
+
+def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
+    """(n,) configuration of every set-up cell, counted over all sessions."""
+    before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
+    own = sessions[number].own
+    rows = np.nonzero(own.cells)[0]
+    return before + np.unique(own.configuration, return_inverse=True)[1][rows]
