@@ -1,10 +1,13 @@
 """Surfaces and tetrahedra made by formula, so that no test hangs on one mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import Delaunay
 
 from stiffness.fem.elements import lame
 from stiffness.mesh.solid import Solid, boundary_faces
+from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import check_surface
 
@@ -206,3 +209,44 @@ def fillet_profile(radius, height, steps):
     angle = np.pi / 2 * np.arange(steps + 1) / steps
     foot = [(radius * (1 - np.sin(a)), radius * (1 - np.cos(a))) for a in angle]
     return [*foot, (0.0, height)]
+
+
+def bar_of_two_boxes(width, height, near, far):
+    """A bar along z whose two halves are solids of their own, as of a STEP file."""
+    levels = (0.0, near, near + far)
+    corners = [[x, y, z] for z in levels for y in (0, height) for x in (0, width)]
+    quads = [((0, 2, 3, 1), 0, -1), ((4, 5, 7, 6), 0, 1), ((8, 9, 11, 10), 1, -1)]
+    for k in (0, 1):
+        for a, b in ((0, 1), (1, 3), (3, 2), (2, 0)):
+            quads.append(((4 * k + a, 4 * k + b, 4 * k + 4 + b, 4 * k + 4 + a), k, -1))
+    triangles = [t for (a, b, c, d), *_ in quads for t in ((a, b, c), (a, c, d))]
+    sides = np.repeat([pair for _, *pair in quads], 2, axis=0)
+    return surface_of_solids(
+        ("near", "far"), np.array(corners), np.array(triangles), sides
+    )
+
+
+def rod_in_tube(inner, outer, length, facets=48):
+    """A round rod glued into a tube along z, two solids as of a STEP file."""
+    points, triangles = cylinder(inner, length, facets)
+    wide, _ = cylinder(outer, length, facets)
+    shift, count = len(points), len(triangles)
+    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
+    a, b, c, d = shift + i, shift + j, shift + j + facets, shift + i + facets
+    mantle = [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
+    ends = [np.column_stack(t) for t in ((i, j, b), (i, b, a), (j + facets,
+            i + facets, d), (j + facets, d, c))]  # fmt: skip
+    every = np.concatenate([triangles, *mantle, *ends])
+    sides = np.tile([1, -1], (len(every), 1))
+    sides[:count] = [0, -1]
+    sides[: 2 * facets] = [0, 1]
+    return surface_of_solids(
+        ("rod", "tube"), np.concatenate([points, wide[: 2 * facets]]), every, sides
+    )
+
+
+def surface_of_solids(names, points, triangles, sides):
+    """The surface around solids, and the solids."""
+    outer = triangles[(sides < 0).any(axis=1)]
+    solids = FilledSolids(names, points, triangles, sides)
+    return replace(check_surface(points, outer, "part.step#*"), solids=solids)

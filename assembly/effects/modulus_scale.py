@@ -17,7 +17,13 @@ def links(robot: Robot) -> tuple[str, ...]:
 
 def _scaled(frame: Frame, factor: float) -> Frame:
     link = frame.link
-    if isinstance(link, BeamLink | MeshLink):
+    if isinstance(link, MeshLink):
+        from stiffness.fem.part_text import scaled_part
+
+        parts = tuple(scaled_part(text, factor) for text in link.parts)
+        link = replace(link, young=link.young * factor, parts=parts)
+        return replace(frame, link=link)
+    if isinstance(link, BeamLink):
         return replace(frame, link=replace(link, young=link.young * factor))
     assert isinstance(link, MatrixLink)
     return replace(frame, link=MatrixLink(link.stiffness * factor))

@@ -124,6 +124,8 @@ def _section(beam: Table) -> dict[str, float]:
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
     """``mesh = { surface, base, tip, ... }`` and its material."""
+    from stiffness.fem.part_text import read_parts
+
     mesh = link.table("mesh")
     ends = {key: _interface(mesh, key) for key in ("base", "tip")}
     up = _direction(mesh, "up")
@@ -143,6 +145,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
         frame_up=frame_up,
         axis=_direction(mesh, "axis"),
         interface=mesh.choice("interface", ("rigid", "distributing"), "rigid"),
+        parts=read_parts(link),
     )
     mesh.finish()
     return result
@@ -251,6 +254,8 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
     table = {key: value for key, value in table.items() if value is not None}
     if isinstance(link, BeamLink) and link.pieces > 1:
         table["pieces"] = link.pieces
+    if isinstance(link, MeshLink) and link.parts:
+        table["parts"] = list(link.parts)
     up = link.frame_up if isinstance(link, MeshLink) else None
     return {"link": table} if up is None else {"link": table, "up": list(up)}
 

@@ -101,6 +101,7 @@ class MeshLink:
         axis: direction from base to tip in the frame's axes; None from the parent's
             origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
+        parts: of another material, as :func:`stiffness.fem.part_text.parse_part` reads.
     """
 
     surface: Path
@@ -114,6 +115,7 @@ class MeshLink:
     frame_up: tuple[float, float, float] | None = None
     interface: str = "rigid"
     axis: tuple[float, float, float] | None = None
+    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

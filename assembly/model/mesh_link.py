@@ -75,14 +75,16 @@ def solved_mesh(
     """
     from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_part
 
     density = link.density or 0.0
     key = (*_shape_key(link, place), link.young, link.poisson, density, link.interface,
-           accuracy)  # fmt: skip
+           link.parts, accuracy)  # fmt: skip
     if key not in _SOLVED:
+        parts = [parse_part(f"{place}.parts", text) for text in link.parts]
         _SOLVED[key] = solve_link(
             *_shape(link, place),
-            (Material(link.young, link.poisson, density),),
+            (Material(link.young, link.poisson, density), *parts),
             options=FemOptions(accuracy, link.interface),
         )
     return _SOLVED[key]

@@ -5,11 +5,12 @@ Every error message names its option.
 
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from forcefit.inputs.assignments import parse_assignments
 from forcefit.inputs.errors import BadInput, checked, describe, nearest
 from forcefit.inputs.writing import check_json
 
@@ -344,47 +345,6 @@ def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
 
 def _names_session(assignment: str) -> bool:
     return assignment.partition("=")[0].strip() == "session" and "=" in assignment
-
-
-def parse_assignments(
-    texts: Iterable[str], option: str, largest: float = 1e40
-) -> dict[str, float]:
-    """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
-
-    Args:
-        texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
-        option: their name, for messages.
-        largest: no sound value is larger than this, either sign.
-
-    Returns:
-        The numbers by name.
-
-    Raises:
-        BadInput: not of that form, not a finite number, too large, or a name given
-            twice.
-    """
-    values: dict[str, float] = {}
-    for part in ",".join(texts).split(","):
-        name, equals, text = (piece.strip() for piece in part.partition("="))
-        try:
-            value = float(text)
-        except ValueError:
-            equals = ""
-        if not (name and equals):
-            raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
-        if name in values:
-            raise BadInput(f'{option}: "{name[:60]}" is given twice')
-        if not math.isfinite(value):
-            raise BadInput(
-                f"{option} {name[:60]}: found {value}, expected a finite number"
-            )
-        if abs(value) > largest:
-            raise BadInput(
-                f"{option} {name[:60]}: found {value:g}, expected a number of size at "
-                f"most {largest:g}"
-            )
-        values[name] = value
-    return values
 
 
 def parse_axis(option: str, text: str) -> "NDArray":

@@ -22,6 +22,7 @@ from forcefit.commands.stiffness_options import (
     Masses,
     Parts,
     Poisson,
+    PoissonOfRest,
     Radius,
     SectionText,
     Surface,
@@ -32,6 +33,7 @@ from forcefit.commands.stiffness_options import (
     Up,
     Width,
     Young,
+    YoungOfRest,
 )
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from forcefit.commands.beam_options import BeamOptions
+    from stiffness.fem.material import Material
     from stiffness.link import LinkStiffness
     from stiffness.surface.interface import Interface
 
@@ -72,6 +75,30 @@ def _up(text: str | None) -> "NDArray | None":
     from forcefit.commands.options import parse_axis
 
     return None if text is None else parse_axis("--up", text)
+
+
+def _materials(
+    young: float | None, poisson: float | None, density: float, parts: list[str] | None
+) -> "list[Material]":
+    """The link's materials: one that fills it, then those of its parts."""
+    from forcefit.commands.beam_options import BeamOptions
+    from forcefit.inputs.errors import checked
+    from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_part
+
+    others = [parse_part("--part", text) for text in parts or ()]
+    if (young is None) != (poisson is None):
+        raise BadInput("--young, --poisson: found one of them, expected both")
+    if young is None or poisson is None:
+        if not (others and others[0].solid):
+            raise BadInput(
+                "--young: missing; expected a modulus [Pa], or --part "
+                '"solid=.../young=...,poisson=..." for every solid'
+            )
+        return others
+    E, nu = BeamOptions(young, poisson).material()
+    density = checked("--density", density, "kg/m^3", least=0)
+    return [Material(E, nu, density), *others]
 
 
 def _accuracy(value: float) -> float:
@@ -156,8 +183,8 @@ def fea(
     surface: Surface,
     base: Base,
     tip: Tip,
-    young: Young,
-    poisson: Poisson,
+    young: YoungOfRest = None,
+    poisson: PoissonOfRest = None,
     unit: Unit = "m",
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
@@ -168,21 +195,16 @@ def fea(
     json: JsonOption = None,
 ) -> None:
     """K_E by finite elements, refined to the asked accuracy."""
-    from forcefit.commands.beam_options import BeamOptions
-    from forcefit.commands.parts import parse_mass, parse_part
     from forcefit.inputs.errors import checked
     from stiffness.fem.fea import Budget, FemOptions, solve_link
-    from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_mass
     from stiffness.report.results import link_results, link_text
     from stiffness.surface.surface import read_surface
 
-    E, nu = BeamOptions(young, poisson).material()
     held, moved = _interfaces(base, tip)
-    density = checked("--density", density, "kg/m^3", least=0)
     budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
     options = FemOptions(_accuracy(accuracy), interface, budget)
-    materials = [Material(E, nu, density)]
-    materials += [parse_part("--part", text) for text in part or ()]
+    materials = _materials(young, poisson, density, part)
     masses = [parse_mass("--mass", text) for text in mass or ()]
     _tell_progress()
     link = solve_link(
@@ -329,9 +351,10 @@ def stress(
     surface: Surface,
     base: Base,
     tip: Tip,
-    young: Young,
-    poisson: Poisson,
     wrench: Annotated[list[str], typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")],
+    young: YoungOfRest = None,
+    poisson: PoissonOfRest = None,
+    part: Parts = None,
     away: Annotated[
         float | None,
         typer.Option(help="From the interfaces [m]; one interface radius if absent."),
@@ -358,13 +381,14 @@ def stress(
     from forcefit.commands.options import parse_load
     from forcefit.inputs.errors import checked
     from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.material import Material
     from stiffness.fem.stress import peak_stress, stress_influence
     from stiffness.report.results import stress_results, stress_text
     from stiffness.surface.surface import read_surface
 
-    options = BeamOptions(young, poisson, radius, inner_radius, width, height, section)
-    (E, nu), roll = options.material(), _up(up)
+    materials, roll = _materials(young, poisson, 0.0, part), _up(up)
+    options = BeamOptions(
+        materials[0].E, materials[0].nu, radius, inner_radius, width, height, section
+    )
     load = np.array(parse_load(wrench, "--wrench"))
     declared = options.declared() if options.has_section() else None
     held, moved = _interfaces(base, tip)
@@ -375,7 +399,7 @@ def stress(
         check_writable(figure, PICTURE)
     _tell_progress()
     solved = solve_link(
-        read_surface(surface, unit), held, moved, [Material(E, nu)],
+        read_surface(surface, unit), held, moved, materials,
         options=FemOptions(accuracy, interface),
     )  # fmt: skip
     peak = peak_stress(solved, load, section=declared, up=roll, away=away)

@@ -10,6 +10,13 @@ Surface = Annotated[
 ]
 Young = Annotated[float, typer.Option(help="Young's modulus [Pa].")]
 Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
+YoungOfRest = Annotated[
+    float | None,
+    typer.Option("--young", help="Young's modulus [Pa]; of what no --part names."),
+]
+PoissonOfRest = Annotated[
+    float | None, typer.Option("--poisson", help="Poisson's ratio, likewise.")
+]
 Radius = Annotated[float | None, typer.Option(help="Outer radius [m].")]
 InnerRadius = Annotated[float | None, typer.Option(help="Of a tube's hole [m].")]
 Width = Annotated[float | None, typer.Option(help="Across `up` [m].")]
@@ -39,8 +46,9 @@ Parts = Annotated[
     list[str] | None,
     typer.Option(
         "--part",
-        help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800"; '
-        "a box along the mesh's axes [m]. May be repeated; the last counts.",
+        help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800", '
+        'a box along the mesh\'s axes [m], or "solid=one+other/young=...", of a STEP '
+        "file. May be repeated; the last counts.",
     ),
 ]
 Masses = Annotated[

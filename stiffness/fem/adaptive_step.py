@@ -41,6 +41,7 @@ from stiffness.mesh.edge_grading import (
 )
 from stiffness.mesh.improve import fitted
 from stiffness.mesh.refine import refine
+from stiffness.mesh.regions import is_jagged
 from stiffness.mesh.solid import Solid
 
 # effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
@@ -111,7 +112,8 @@ def solve_level(
     mesh = isoparametric(solid, ORDER, parts)
     if check is not None:
         check(3 * len(mesh.nodes))
-    material = material_of_elements(mesh, materials)
+    region = None if solid.region is None else solid.region[parts.parent]
+    material = material_of_elements(mesh, materials, region)
     lam, mu = material[:, 0], material[:, 1]
     solution = condense(mesh, lam, mu, centers, interface)
     on_edge = np.zeros(len(mesh.nodes), dtype=bool)
@@ -135,7 +137,7 @@ def solve_level(
         mesh, solid.shapes, solution.fields, lam, mu, solid.surface
     )
     np.add.at(geometry, parts.parent[mesh.owner], by_face)
-    if not all(region.planes for region in regions):
+    if is_jagged(solid, regions):
         jagged = material_errors(
             mesh, solution.fields, lam, mu, lambda p: material_at(p, materials)[:, 1]
         )

@@ -28,11 +28,11 @@ from stiffness.fem.adaptive_step import (
 from stiffness.fem.condensation import KINDS
 from stiffness.fem.mass_properties import PointMass, mass_properties
 from stiffness.fem.material import Material, check_materials, regions_of
+from stiffness.fem.material_of_solids import placed_materials
 from stiffness.fem.quality import mesh_report
 from stiffness.fem.sparse_solver import expected_cost, solver_name
 from stiffness.link import LinkStiffness, inverted, scaled
 from stiffness.mesh.fit_to_patches import MeshFailed
-from stiffness.mesh.improve import fitted
 from stiffness.mesh.mesh import mesh_solid
 from stiffness.mesh.regions import cut_by_regions
 from stiffness.mesh.slender_bar import slender_bar
@@ -159,7 +159,8 @@ def solve_link(
         surface: of the link.
         base: the held interface.
         tip: the interface that moves.
-        materials: the first fills the link, later ones where they say.
+        materials: the first fills the link, later ones where they say; or one for each
+            solid of a STEP file.
         options: how it is solved.
         point_masses: added to mass, centre and inertia.
 
@@ -167,11 +168,12 @@ def solve_link(
         The link and its finest mesh.
 
     Raises:
-        BadInput: an interface is not proper, the two share an edge, or there is no
-            material.
+        BadInput: an interface is not proper, the two share an edge, there is no
+            material, or a solid that has one does not exist.
     """
     start = time.monotonic()
     check_materials(materials)
+    materials = placed_materials(surface, materials)
     if options.interface == "rigid":
         refuse_common_edges(surface, base, tip)
     centers = np.array([
@@ -179,7 +181,7 @@ def solve_link(
         for side, name in ((base, "base"), (tip, "tip"))
     ])
     first = first_mesh(surface, base, tip, options.budget, options.cache)
-    first = fitted(cut_by_regions(first, regions_of(materials)))
+    first = cut_by_regions(first, regions_of(materials))
     level, K, error, report = _refined(first, materials, centers, options, start)
     report |= {
         "surface_volume": surface.volume,

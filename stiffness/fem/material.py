@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from forcefit.inputs.table import BadInput
 from stiffness.beam.sections import check_material
 from stiffness.fem.elements import Elements, lame
-from stiffness.mesh.regions import Region
-from stiffness.surface.primitives import Plane
+from stiffness.mesh.cut_face import CutFace
+from stiffness.mesh.regions import Region, region_of_places
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +24,17 @@ class Material:
         density: [kg/m^3], 0 for a link without mass.
         where: which of the points (n, 3) [m], in the mesh's axes, are of this material;
             the last material that contains an element's centre applies.
-        planes: of the faces of where it is; the mesh is cut along them.
+        faces: of where it is; the mesh is cut along them.
+        solid: of a STEP file of several, the solid that is of this material, or
+            ``one+other``, in place of ``where`` and ``faces``.
     """
 
     E: float
     nu: float
     density: float = 0.0
     where: Callable[[NDArray], NDArray] | None = None
-    planes: tuple[Plane, ...] = ()
+    faces: tuple[CutFace, ...] = ()
+    solid: str = ""
 
     def __post_init__(self) -> None:
         check_material("material", self.E, self.nu)
@@ -39,12 +42,16 @@ class Material:
             raise BadInput(f"material: density = {self.density:g} must be >= 0")
 
 
-def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArray:
+def material_of_elements(
+    mesh: Elements, materials: Sequence[Material], cut_region: NDArray | None = None
+) -> NDArray:
     """Material of each element, taken at its centre.
 
     Args:
         mesh: the tetrahedra.
         materials: the first fills the link, later ones where they say.
+        cut_region: (t,) region of each element, of those whose faces the mesh was cut
+            along; None if it was not cut.
 
     Returns:
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
@@ -53,10 +60,12 @@ def material_of_elements(mesh: Elements, materials: Sequence[Material]) -> NDArr
         BadInput: there is none, or the first does not fill the link.
     """
     check_materials(materials)
-    table = material_at(mesh.nodes[mesh.cells[:, :4]].mean(axis=1), materials)
-    if not (table[:, 1] > 0).all():
+    centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
+    first = materials[0].where
+    number = region_of_places(centers, regions_of(materials), cut_region)
+    if first is not None and not first(centers[number == 0]).all():
         raise BadInput("materials: the first must fill the whole link")
-    return table
+    return _constants(materials)[number]
 
 
 def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
@@ -69,12 +78,12 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
     Returns:
         (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
     """
-    table = np.zeros((len(points), 3))
-    for material in materials:
-        lam, mu = lame(material.E, material.nu)
-        where = material.where or (lambda points: np.ones(len(points), dtype=bool))
-        table[where(points)] = lam, mu, material.density
-    return table
+    return _constants(materials)[region_of_places(points, regions_of(materials), None)]
+
+
+def _constants(materials: Sequence[Material]) -> NDArray:
+    """(m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
+    return np.array([(*lame(m.E, m.nu), m.density) for m in materials])
 
 
 def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
@@ -87,10 +96,13 @@ def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
         The regions, later ones count more.
     """
     return tuple(
-        Region(material.where, material.planes)
+        Region(material.where or _everywhere, material.faces)
         for material in materials[1:]
-        if material.where is not None
     )
+
+
+def _everywhere(points: NDArray) -> NDArray:
+    return np.ones(len(points), dtype=bool)
 
 
 def check_materials(materials: Sequence[Material]) -> None:

@@ -25,6 +25,7 @@ from stiffness.fem.stress_error import (
     ZONE,
     element_stresses,
     estimated_error,
+    nodes_by_material,
     off_shapes,
     on_facets,
     on_inner_edges,
@@ -40,7 +41,8 @@ class StressSource:
     """The mesh that stresses are of.
 
     Attributes:
-        level: the solved mesh, of n nodes.
+        level: the solved mesh, of n nodes by
+            :func:`stiffness.fem.stress_error.nodes_by_material`.
         far: (n,) nodes whose stresses count.
         singular: (n,) nodes on re-entrant edges without a fillet.
         faceted: (n,) nodes on a surface of no recognised shape.
@@ -85,8 +87,9 @@ class StressInfluence:
         )
         if self.reentrant_edges:
             words += (
-                "; some of them on inner edges without a fillet, where stress is "
-                "singular too and grows with the mesh's fineness"
+                "; some of them on inner edges without a fillet or between two "
+                "materials, where stress is singular too and grows with the mesh's "
+                "fineness"
             )
         if self.source is not None and self.source.left_out.any():
             words += (
@@ -232,8 +235,8 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     """Stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: from :func:`stiffness.fem.fea.solve_link`; of one material, or read the
-            stresses at the seams of several with care: they are averaged there.
+        solved: from :func:`stiffness.fem.fea.solve_link`; where two materials meet, a
+            node counts once for each.
         away: [m] from the interfaces; one interface radius if absent.
 
     Returns:
@@ -245,28 +248,29 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     from scipy.spatial import cKDTree
 
     level = solved.level
-    mesh = level.mesh
+    mesh, (_, node) = level.mesh, nodes_by_material(level)
     radii = [_interface_radius(mesh, k) for k in (0, 1)]
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
-    gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes)[0]
+    gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
     far = gap >= distance * (1 - 1e-9)  # a layer of nodes at just that distance
     if not far.any():
         raise BadInput(
             f"stress: nothing of the link is {distance:.4g} m away from its "
             f"interfaces; the furthest node is {gap.max():.4g} m"
         )
-    off = off_shapes(level)
+    off = off_shapes(level)[node]
     left_out = far & off if (far & ~off).any() else np.zeros_like(far)
     far &= ~left_out
     per_screw = _nodal_stresses(level)[far]
     # the fields' own: they balance the wrench exactly
     C_h = inverted(level.solution.stiffness)
     influence = np.einsum("pks,kw->pws", per_screw, C_h)
-    source = StressSource(level, far, on_inner_edges(level), on_facets(level), left_out)
+    singular, faceted = on_inner_edges(level)[node], on_facets(level)[node]
+    source = StressSource(level, far, singular, faceted, left_out)
     reentrant = bool(source.singular[far].any())
     return StressInfluence(
-        mesh.nodes[far], influence, float(distance), reentrant, source
+        mesh.nodes[node[far]], influence, float(distance), reentrant, source
     )
 
 
@@ -289,11 +293,11 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 def _nodal_stresses(level: Level) -> NDArray:
     """(n, 6, 6) stress of each unit screw at each node, averaged over elements."""
-    mesh = level.mesh
-    total = np.zeros((len(mesh.nodes), 6, 6))
-    count = np.bincount(mesh.cells.ravel(), minlength=len(mesh.nodes))
-    for first in range(0, len(mesh.cells), _CHUNK):
-        some = np.arange(first, min(first + _CHUNK, len(mesh.cells)))
+    cells, nodes = nodes_by_material(level)
+    total = np.zeros((len(nodes), 6, 6))
+    count = np.bincount(cells.ravel(), minlength=len(nodes))
+    for first in range(0, len(cells), _CHUNK):
+        some = np.arange(first, min(first + _CHUNK, len(cells)))
         stress = element_stresses(level, some, np.eye(6))
-        np.add.at(total, mesh.cells[some], stress)
+        np.add.at(total, cells[some], stress)
     return total / np.maximum(count, 1)[:, None, None]

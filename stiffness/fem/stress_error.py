@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from stiffness.fem.elements import node_gradients
 from stiffness.fem.error_indicator import VOIGT
 from stiffness.mesh.edge_grading import singular_edges
+from stiffness.mesh.regions import edges_between
 from stiffness.surface.facets import Facets
 
 if TYPE_CHECKING:
@@ -79,13 +80,32 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
     return np.concatenate(parts)
 
 
+def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
+    """Number the nodes of each material by themselves: stresses jump between them.
+
+    Args:
+        level: a solved mesh of n nodes.
+
+    Returns:
+        (t, k) numbers of the elements' nodes, and (m,) the node of each number; m is n
+        for a link of one material.
+    """
+    cells, constants = level.mesh.cells, level.material[:, :2]
+    kind = np.unique(constants, axis=0, return_inverse=True)[1].reshape(-1)
+    kinds = int(kind.max()) + 1
+    if kinds == 1:
+        return cells, np.arange(len(level.mesh.nodes))
+    code, index = np.unique(cells * kinds + kind[:, None], return_inverse=True)
+    return index.reshape(cells.shape), code // kinds
+
+
 def estimated_error(
     level: "Level", motion: NDArray, node: int, zone: NDArray, left_out: NDArray
 ) -> float:
     """Estimated error of a peak stress.
 
     Args:
-        level: a solved mesh of n nodes.
+        level: a solved mesh of n nodes, by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
         node: index of the peak.
         zone: (n,) nodes where the stress is nearly as large.
@@ -95,7 +115,7 @@ def estimated_error(
         [Pa].
     """
     mean, largest = _means_and_deviations(level, motion)
-    cells = level.mesh.cells
+    cells, _ = nodes_by_material(level)
     near = np.unique(cells[(cells == node).any(axis=1)])
     squares = [np.mean(largest[part] ** 2) for part in (near, zone)]
     beyond = von_mises(mean[left_out]).max(initial=0.0) - von_mises(mean[node])
@@ -104,7 +124,8 @@ def estimated_error(
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
     """(n, 6) [Pa] stresses at nodes, and (n,) the largest deviation from them."""
-    cells, count = level.mesh.cells, len(level.mesh.nodes)
+    cells, nodes = nodes_by_material(level)
+    count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
     stress = element_stresses(level, np.arange(len(cells)), motion)[:, :, 0]
     np.add.at(total, cells, stress)
@@ -115,21 +136,23 @@ def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDA
 
 
 def on_inner_edges(level: "Level") -> NDArray:
-    """Nodes of elements at re-entrant edges without a fillet.
+    """Nodes of elements at re-entrant edges without a fillet, or between materials.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
         (n,) whether an element there touches an edge at which the shapes themselves
-        meet at an angle.
+        meet at an angle, or at which two regions of the link come to its surface.
     """
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
         # coarse faces of a fillet meet at an angle too, its shapes do not
         on[edges[_meet_at_an_angle(level, edges)]] = True
-        on[cells[on[cells[:, :4]].any(axis=1)]] = True
+    if level.solid.region is not None:
+        on[edges_between(level.solid, level.solid.region)] = True
+    on[cells[on[cells[:, :4]].any(axis=1)]] = True
     return on
 
 

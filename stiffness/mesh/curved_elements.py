@@ -67,10 +67,12 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
     straight = np.zeros((count, 3))
     share = lattice(order) / order
     straight[cells] = np.einsum("nk,tkx->tnx", share, solid.points[corners])
-    patch = patches_of_cells(solid, corners)
-    row, face = np.nonzero(patch >= 0)
+    patch = patches_of_cells(solid.faces, solid.patch, corners)
+    inner = patches_of_cells(solid.inner, solid.inner_patch, corners)
+    on_shape = np.maximum(patch, inner)
+    row, face = np.nonzero(on_shape >= 0)
     members = cells[row[:, None], face_nodes(order)[face]]
-    groups = node_patches(count, members, patch[row, face])
+    groups = node_patches(count, members, on_shape[row, face])
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     nodes = straight.copy()
 
@@ -93,35 +95,38 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
         nodes[cells[moved, 16:]] += _face_nodes_by_edges(
             (nodes - straight)[cells[moved]]
         )
-        faces, reach = (nodes[members], patch[row, face]), _LARGEST_MOVE * size
+        faces, reach = (nodes[members], on_shape[row, face]), _LARGEST_MOVE * size
         nodes[members[:, 9]] += _cubic_faces(*faces, solid.shapes, reach)
     nodes, inverted = _straightened(straight, nodes, cells, order)
     off = np.abs(nodes - straight).max(axis=1) > 1e-12 * size
     return CurvedElements(cells, nodes, patch, off[cells].any(axis=1), inverted)
 
 
-def patches_of_cells(solid: Solid, corners: NDArray) -> NDArray:
-    """Patches of the tetrahedra's faces.
+def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
+    """Patches of tetrahedra's faces.
 
     Args:
-        solid: with patch numbers of its boundary.
-        corners: (t, 4) its tetrahedra's corners in rising order.
+        faces: (f, 3) corners of the triangles that are on patches.
+        patch: (f,) their numbers.
+        corners: (t, 4) the tetrahedra's corners in rising order.
 
     Returns:
-        (t, 4) in the order of ``FACES``; -1 inside the solid.
+        (t, 4) in the order of ``FACES``; -1 for a face that is on no patch.
     """
-    total = np.int64(len(solid.points))
+    if not len(faces):
+        return np.full((len(corners), 4), -1)
+    total = np.int64(max(corners.max(), faces.max()) + 1)
 
     def code(corners: NDArray) -> NDArray:
         a, b, c = np.moveaxis(corners, -1, 0)
         return (a * total + b) * total + c
 
-    known = code(np.sort(solid.faces, axis=1))
+    known = code(np.sort(faces, axis=1))
     order = np.argsort(known)
     wanted = code(corners[:, FACES])
     place = np.searchsorted(known, wanted, sorter=order)
     place = order[np.minimum(place, len(known) - 1)]
-    return np.where(known[place] == wanted, solid.patch[place], -1)
+    return np.where(known[place] == wanted, patch[place], -1)
 
 
 def refine_inverted(solid: Solid, order: int) -> Solid:

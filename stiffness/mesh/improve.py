@@ -18,11 +18,11 @@ from stiffness.mesh.lagrange import EDGES
 from stiffness.mesh.refine import edge_code, edges_of, split_edges
 from stiffness.mesh.solid import (
     Solid,
+    corner_groups,
     corners_on_shapes,
     element_quality,
     meeting_shapes,
     moved_onto_shapes,
-    node_patches,
     tetrahedra_quality,
 )
 from stiffness.mesh.split_crossing import one_of_each
@@ -34,11 +34,13 @@ _STEPS = 10  # of a corner's search, each half as long as the last that did not 
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
-def fitted(solid: Solid) -> Solid:
+def fitted(solid: Solid, limit: float | None = None) -> Solid:
     """Corners on their shapes, and tetrahedra mended that this flattened.
 
     Args:
         solid: whose corners may be off the shapes of their patches.
+        limit: [1] quality below which tetrahedra are mended; :data:`POOR` if absent,
+            or less where the solid's own are worse.
 
     Returns:
         The solid, with more tetrahedra where some had to be split; where mending fails,
@@ -47,7 +49,7 @@ def fitted(solid: Solid) -> Solid:
     least = float(element_quality(solid).min())
     # elements of a structured bar are long on purpose
     good = solid.surface is None or least > POOR / 4
-    poor = min(POOR, least / 2) if good else POOR
+    poor = limit or (min(POOR, least / 2) if good else POOR)
     target = corners_on_shapes(solid)
     if np.allclose(target, solid.points, rtol=0, atol=1e-12 * np.abs(target).max()):
         moved = solid
@@ -88,7 +90,7 @@ def _relaxed(solid: Solid, limit: float) -> Solid:
     """Move the corners of poor tetrahedra, those inside the part first."""
     points = solid.points.copy()
     shapes_of: dict[int, tuple[int, ...]] = {}
-    for key, group in node_patches(len(points), solid.faces, solid.patch):
+    for key, group in corner_groups(solid):
         shapes_of |= dict.fromkeys(group.tolist(), key)
     corners = np.unique(solid.cells[element_quality(solid) < limit])
     for corner in sorted(corners.tolist(), key=lambda c: c in shapes_of):

@@ -76,12 +76,28 @@ def split_edges(
     if places is None:
         places = solid.points[ends[split]].mean(axis=1)
     points = np.concatenate([solid.points, places])
-    pairs = np.sort(solid.faces[:, _TRIANGLE], axis=2)
-    of_face = np.searchsorted(edge_code(ends, count), edge_code(pairs, count))
-    faces, face_row = _halved(solid.faces, middle[of_face], _TRIANGLE)
+    code = edge_code(ends, count)
+
+    def halved(faces: NDArray, patch: NDArray) -> tuple[NDArray, NDArray]:
+        pairs = np.sort(faces[:, _TRIANGLE], axis=2)
+        of_face = np.searchsorted(code, edge_code(pairs, count))
+        finer, row = _halved(faces, middle[of_face], _TRIANGLE)
+        return finer, np.r_[patch, patch[row]]
+
+    faces, patch = halved(solid.faces, solid.patch)
+    inner, inner_patch = halved(solid.inner, solid.inner_patch)
     cells, row = _halved(solid.cells, middle[of_cell], EDGES)
-    patch = np.r_[solid.patch, solid.patch[face_row]]
-    finer = replace(solid, points=points, cells=cells, faces=faces, patch=patch)
+    region = None if solid.region is None else np.r_[solid.region, solid.region[row]]
+    finer = replace(
+        solid,
+        points=points,
+        cells=cells,
+        faces=faces,
+        patch=patch,
+        inner=inner,
+        inner_patch=inner_patch,
+        region=region,
+    )
     return finer, row
 
 

@@ -1,4 +1,8 @@
-"""Regions of different materials, and a mesh cut along the planes between them."""
+"""Regions of different materials, and a mesh cut along the faces between them.
+
+Faces of known places, planes of a box or faces between two solids, become faces of
+tetrahedra; in what follows, corners on them stay on their shapes.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,15 +10,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from stiffness.mesh.cut_face import (
+    ON_FACE,
+    CutFace,
+    cut,
+    face_code,
+    faces_inside,
+    without_chords,
+)
+from stiffness.mesh.improve import fitted
 from stiffness.mesh.lagrange import FACES
-from stiffness.mesh.refine import edge_code, edges_of
-from stiffness.mesh.solid import Solid, corners_on_shapes
-from stiffness.mesh.split_crossing import split_crossing
-from stiffness.surface.primitives import Plane
+from stiffness.mesh.refine import edge_code
+from stiffness.mesh.solid import Solid
 
-_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the plane
-_REACH = 0.005  # of the part's size: a corner is moved by no more
-_LEAST = 0.2  # of a tetrahedron's volume that is left when its corners are moved
+_POOR = 0.2  # quality of tetrahedra that bend with a curved face and stay proper
+_AGREED = 0.9  # of a piece's volume in one region: all of it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,12 +33,12 @@ class Region:
 
     Attributes:
         where: which of the points (n, 3) [m] are in it.
-        planes: of its faces, along which the mesh is cut; a face of another shape is
-            as jagged as the elements.
+        faces: along which the mesh is cut; a region without is as jagged as the
+            elements.
     """
 
     where: Callable[[NDArray], NDArray]
-    planes: tuple[Plane, ...] = ()
+    faces: tuple[CutFace, ...] = ()
 
 
 def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
@@ -42,26 +52,77 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
         (t,) 1 for the first region, and so on; 0 outside all.
     """
     centers = solid.points[solid.cells].mean(axis=1)
-    label = np.zeros(len(centers), dtype=int)
+    return region_of_places(centers, regions, solid.region)
+
+
+def region_of_places(
+    places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
+) -> NDArray:
+    """The region of places inside tetrahedra.
+
+    Args:
+        places: (n, 3) [m].
+        regions: later ones count more.
+        cut_region: (n,) of the regions whose faces the mesh was cut along, the one that
+            the tetrahedron of each place is in; None if it was not cut.
+
+    Returns:
+        (n,) 1 for the first region, and so on; 0 outside all.
+    """
+    label = np.zeros(len(places), dtype=int) if cut_region is None else cut_region
     for number, region in enumerate(regions, 1):
-        label[region.where(centers)] = number
+        if cut_region is None or not region.faces:
+            inside = region.where(places) & (number > label)
+            label = np.where(inside, number, label)
     return label
 
 
 def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
-    """Cut a mesh so that regions' plane faces are faces of tetrahedra.
+    """Cut a mesh so that regions' faces are faces of tetrahedra.
 
     Args:
         solid: any.
         regions: of the link.
 
     Returns:
-        The solid, whose ``kept`` planes its corners stay on.
+        The solid, with the region of each tetrahedron and the triangles between them.
     """
+    if not any(region.faces for region in regions):
+        return solid
     for region in regions:
-        for plane in region.planes:
-            solid = _cut(solid, plane)
-    return solid
+        for face in region.faces:
+            solid = cut(solid, face)
+    label = np.zeros(len(solid.cells), dtype=int)
+    places, piece = _places_inside(solid), _pieces(solid)
+    volumes = solid.volumes()
+    whole = np.bincount(piece, volumes)
+    for number, region in enumerate(regions, 1):
+        if region.faces:
+            inside = region.where(places)
+            share = (np.bincount(piece, volumes * inside) / whole)[piece]
+            inside = np.where(share > _AGREED, True, inside)
+            label[np.where(share < 1 - _AGREED, False, inside)] = number
+    solid = _between_regions(fitted(replace(solid, region=label)))
+    return fitted(without_chords(solid), _POOR)
+
+
+def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
+    """Whether a face between regions runs through tetrahedra.
+
+    Args:
+        solid: any.
+        regions: of the link.
+
+    Returns:
+        True if a region has no faces, or cutting along them did not succeed.
+    """
+    if not regions:
+        return False
+    if solid.region is None or not all(region.faces for region in regions):
+        return True
+    _, owners = faces_inside(solid.cells)
+    one, other = solid.region[owners].T
+    return bool((one != other).sum() > len(solid.inner))
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
@@ -76,8 +137,21 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
     """
     if not regions:
         return np.zeros((0, 2), dtype=int)
+    return edges_between(solid, region_of_cells(solid, regions))
+
+
+def edges_between(solid: Solid, region: NDArray) -> NDArray:
+    """Edges of the boundary at which two regions meet.
+
+    Args:
+        solid: any.
+        region: (t,) of each tetrahedron.
+
+    Returns:
+        (e, 2) corners.
+    """
     count = len(solid.points)
-    label = region_of_cells(solid, regions)[_owners(solid)]
+    label = region[_owners(solid)]
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
@@ -88,53 +162,57 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
 def _owners(solid: Solid) -> NDArray:
     """(f,) the tetrahedron of each boundary triangle."""
-    total = np.int64(len(solid.points))
-
-    def code(corners: NDArray) -> NDArray:
-        a, b, c = np.moveaxis(np.sort(corners, axis=-1), -1, 0)
-        return np.asarray((a * total + b) * total + c)
-
-    known = code(solid.cells[:, FACES]).ravel()
+    known = face_code(solid.cells[:, FACES], len(solid.points)).ravel()
     order = np.argsort(known)
-    place = np.searchsorted(known, code(solid.faces), sorter=order)
+    wanted = face_code(solid.faces, len(solid.points))
+    place = np.searchsorted(known, wanted, sorter=order)
     return np.asarray(order[place] // len(FACES))
 
 
-def _cut(solid: Solid, plane: Plane) -> Solid:
-    """Cut a mesh along a plane, through all of it: regions' edges are cut as well."""
-    size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    solid, on = _onto(replace(solid, kept=(*solid.kept, plane)), plane, size)
-
-    def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
-        low, high = np.where(on, 0.0, plane.signed(finer.points)[0])[ends].T
-        across = low * high < 0
-        share = np.divide(low, low - high, out=np.zeros_like(low), where=across)
-        return across, share
-
-    return split_crossing(solid, on, crossing)[0]
+def _places_inside(solid: Solid) -> NDArray:
+    """(t, 3) [m] places in tetrahedra, away from the faces they were cut along."""
+    on = np.zeros(len(solid.points), dtype=bool)
+    on[solid.inner] = True
+    off = ~on[solid.cells]
+    weight = 0.125 + 0.5 * off / np.maximum(off.sum(axis=1), 1)[:, None]
+    weight /= weight.sum(axis=1)[:, None]
+    return np.asarray(np.einsum("tc,tcx->tx", weight, solid.points[solid.cells]))
 
 
-def _onto(solid: Solid, plane: Plane, size: float) -> tuple[Solid, NDArray]:
-    """Corners near a plane moved onto it, and which lie on it."""
-    ends, _ = edges_of(solid.cells, len(solid.points))
-    start, end = solid.points[ends].swapaxes(0, 1)
-    length = np.linalg.norm(end - start, axis=1)
-    reach = np.full(len(solid.points), _REACH * size)
-    for k in (0, 1):
-        np.minimum.at(reach, ends[:, k], _NEAR * length)
-    height = plane.signed(solid.points)[0]
-    near = np.abs(height) < reach
-    target = solid.points - np.where(near, height, 0.0)[:, None] * plane.normal
-    # those of the boundary stay on their shapes: another place on the plane, or none
-    target = np.where(
-        near[:, None], corners_on_shapes(replace(solid, points=target)), solid.points
+def _pieces(solid: Solid) -> NDArray:
+    """(t,) the piece of each tetrahedron, between the faces the mesh was cut along."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces, owners = faces_inside(solid.cells)
+    count = len(solid.points)
+    cuts = np.isin(face_code(faces, count), face_code(solid.inner, count))
+    joined = owners[~cuts].T
+    shape = (len(solid.cells),) * 2
+    graph = coo_array((np.ones(joined.shape[1]), tuple(joined)), shape)
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _between_regions(solid: Solid) -> Solid:
+    """Keep those cuts only that lie between two regions, and all of these."""
+    assert solid.region is not None
+    faces, owners = faces_inside(solid.cells)
+    one, other = solid.region[owners].T
+    faces, count = faces[one != other], len(solid.points)
+    between, known = face_code(faces, count), face_code(solid.inner, count)
+    kept = np.isin(known, between)
+    inner, patch = [solid.inner[kept]], [solid.inner_patch[kept]]
+    lacking = faces[~np.isin(between, known)]
+    # a corner may have come onto the face when it was moved onto the boundary
+    close = ON_FACE * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    for number in np.unique(solid.inner_patch):
+        shape = solid.shapes[number]
+        assert shape is not None
+        off = np.abs(shape.signed(solid.points[lacking].reshape(-1, 3))[0])
+        on = (off.reshape(-1, 3) < close).all(axis=1)
+        inner.append(lacking[on])
+        patch.append(np.full(int(on.sum()), number))
+        lacking = lacking[~on]
+    return replace(
+        solid, inner=np.concatenate(inner), inner_patch=np.concatenate(patch)
     )
-    on = near & (np.abs(plane.signed(target)[0]) < 1e-12 * size)
-    already, before = np.abs(height) < 1e-12 * size, solid.volumes()
-    while True:
-        points = np.where(on[:, None], target, solid.points)
-        moved = replace(solid, points=points)
-        bad = np.unique(solid.cells[moved.volumes() < _LEAST * before])
-        if not (on[bad] & ~already[bad]).any():
-            return moved, on
-        on[bad] &= already[bad]

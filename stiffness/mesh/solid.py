@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.mesh.lagrange import EDGES
-from stiffness.surface.primitives import Plane, Shape, project
+from stiffness.surface.primitives import Shape, project
 from stiffness.surface.true_surface import TrueSurface
 
-_ON_KEPT = 1e-9  # of the part's size: a corner on a kept plane
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # outward
 
 
@@ -28,7 +27,10 @@ class Solid:
         walls: of pairs of an interface and a patch that it goes over into smoothly,
             the wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
         surface: that the boundary is to have; None if its patches' shapes are all.
-        kept: planes inside the link; corners on them stay there.
+        inner: (k, 3) corners of triangles inside, between regions of the link.
+        inner_patch: (k,) number of the shape that each of them lies on.
+        region: (t,) of each tetrahedron, the region of
+            :mod:`stiffness.mesh.regions` it is in; None if the mesh was not cut.
     """
 
     points: NDArray
@@ -38,7 +40,9 @@ class Solid:
     shapes: tuple[Shape | None, ...]
     walls: Mapping[tuple[int, int], Shape] = field(default_factory=dict)
     surface: TrueSurface | None = None
-    kept: tuple[Plane, ...] = ()
+    inner: NDArray = field(default_factory=lambda: np.zeros((0, 3), dtype=int))
+    inner_patch: NDArray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    region: NDArray | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -56,16 +60,26 @@ def meeting_shapes(
     Args:
         solid: any.
         key: the patches they lie on; none for corners inside.
-        points: (n, 3) [m] the corners' places, all on the same kept planes.
+        points: (n, 3) [m] the corners' places.
 
     Returns:
-        The patches' shapes, or what takes their place where two meet smoothly, and the
-        kept planes.
+        The patches' shapes, or what takes their place where two meet smoothly.
     """
-    known = _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
-    near = _ON_KEPT * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    kept = [p for p in solid.kept if (np.abs(p.signed(points)[0]) < near).all()]
-    return (*known, *kept)
+    return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
+
+
+def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
+    """Corners of a solid that are to lie on shapes.
+
+    Args:
+        solid: any.
+
+    Returns:
+        As of :func:`node_patches`, of the boundary and of faces between regions.
+    """
+    faces = np.concatenate([solid.faces, solid.inner])
+    patch = np.r_[solid.patch, solid.inner_patch]
+    return node_patches(len(solid.points), faces, patch)
 
 
 def _meeting_shapes(
@@ -201,17 +215,9 @@ def corners_on_shapes(solid: Solid) -> NDArray:
         (n, 3) [m] those on the boundary projected, unless it is a hundredth of the
         part's size away.
     """
-    groups = node_patches(len(solid.points), solid.faces, solid.patch)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
-    target = on_shapes(solid.points, groups, solid.shapes, 0.01 * size, solid.walls)
-    for plane in solid.kept:
-        on = np.abs(plane.signed(solid.points)[0]) < _ON_KEPT * size
-        for key, group in groups:
-            some = group[on[group]]
-            if len(some):
-                known = meeting_shapes(solid, key, solid.points[some])
-                target[some] = project(solid.points[some], known)
-    return target
+    groups = corner_groups(solid)
+    return on_shapes(solid.points, groups, solid.shapes, 0.01 * size, solid.walls)
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:

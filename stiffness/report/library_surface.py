@@ -43,6 +43,7 @@ class SurfaceLink:
         accuracy: [1] asked of every entry of K.
         family: of parts that differ in their sizes, empty for a part by itself.
         sizes: [m] of a part of a family, by name.
+        parts: of another material, as on the command line.
     """
 
     name: str
@@ -57,6 +58,7 @@ class SurfaceLink:
     accuracy: float = 0.005
     family: str = ""
     sizes: Mapping[str, float] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -81,6 +83,8 @@ class SurfaceLink:
                 f"{self.surface}: cannot be read: {error.strerror}"
             ) from None
         given = {k: v for k, v in asdict(self).items() if k not in {"name", "surface"}}
+        if not self.parts:
+            del given["parts"]
         if not self.family:  # a part by itself
             del given["family"], given["sizes"]
         if solid:
@@ -96,17 +100,20 @@ class SurfaceLink:
         Raises:
             BadInput: the surface or an interface is not usable.
         """
-        from stiffness.fem.fea import FemOptions, mesh_link
+        from stiffness.fem.fea import FemOptions, solve_link
         from stiffness.fem.material import Material
+        from stiffness.fem.part_text import parse_part
+        from stiffness.surface.surface import read_surface
 
+        first = Material(self.young, self.poisson, self.density)
         try:
-            return mesh_link(
-                self.surface,
+            return solve_link(
+                read_surface(self.surface, self.unit),
                 parse_interface(self.base, "base"),
                 parse_interface(self.tip, "tip"),
-                Material(self.young, self.poisson, self.density), unit=self.unit,
+                [first, *(parse_part("parts", text) for text in self.parts)],
                 options=FemOptions(self.accuracy, self.interface),
-            )  # fmt: skip
+            ).link
         except BadInput as error:
             raise BadInput(f"link {quoted(self.name)}: {error}") from None
 
@@ -152,6 +159,7 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
     """What tables of a link and of a family have in common."""
     from stiffness.fem.condensation import KINDS
+    from stiffness.fem.part_text import read_parts
 
     name = table.text("name")
     if not _NAME.fullmatch(name):
@@ -168,6 +176,7 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
         unit=table.choice("unit", UNITS, "m"),
         interface=table.choice("interface", KINDS, "rigid"),
         accuracy=table.number("accuracy", "1", accuracy, least=1e-5, below=0.5),
+        parts=read_parts(table),
     )
     table.finish()
     return link

@@ -61,6 +61,11 @@ class Facets:
         sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
         return np.asarray(np.max(sides, axis=0))
 
+    def distance(self, points: NDArray) -> NDArray:
+        """(n,) [m] of points from the flat facets."""
+        _, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
+        return np.asarray(np.linalg.norm(points - np.atleast_2d(foot), axis=1))
+
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
         """Signed distances (n,) [m] from the lifted facets, and unit gradients."""
         cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)

@@ -1,11 +1,12 @@
-"""STEP files, read by gmsh: their solids, and one of them cut into fine triangles.
+"""STEP files, read by gmsh: their solids, and some of them cut into fine triangles.
 
 A damaged file can end gmsh together with its process, so these run in one of their own
 (:mod:`stiffness.surface.surface_worker`).
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # of a full circle
+_TOUCHING = 1e-6  # of a solid's volume: less in common is rounding of the file
 _ALL, _AND = "*", "+"  # all solids of a file, several, as one
 
 
@@ -67,8 +69,27 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.finalize()
 
 
-def read_step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """Cut a solid of a STEP file into fine triangles, in metres by its own unit.
+@dataclass(frozen=True, eq=False)
+class StepTriangles:
+    """Triangles of the solids that are meant, which share those between them.
+
+    Attributes:
+        points: (n, 3) [m].
+        triangles: (m, 3) indices of points.
+        sides: (m, 2) the solids on both sides, by their place in ``names``; -1 outside.
+        names: of the solids; none where the file's faces belong to no solid.
+        overlaps: pairs of them that fill the same place, one line each.
+    """
+
+    points: NDArray
+    triangles: NDArray
+    sides: NDArray
+    names: tuple[str, ...]
+    overlaps: tuple[str, ...] = ()
+
+
+def read_step(path: Path, solid: str) -> StepTriangles:
+    """Cut solids of a STEP file into fine triangles, in metres by its own unit.
 
     Args:
         path: of the file.
@@ -76,22 +97,39 @@ def read_step(path: Path, solid: str) -> tuple[NDArray, NDArray]:
             where the file holds one.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points.
+        The triangles, also those between two solids.
 
     Raises:
-        BadInput: the file cannot be read, no such solid, or gmsh is not installed.
+        BadInput: the file cannot be read, no such solid, they do not touch, or gmsh is
+            not installed.
     """
     with _gmsh_model(path) as model:
-        of_solid = sides(model, path, solid)
+        chosen = chosen_solids(model, path, solid)
+        names, overlaps = tuple(chosen), tuple[str, ...]()
+        if len(chosen) > 1:
+            owners, overlaps = _fragments(model, path, chosen)
+        else:
+            owners = dict.fromkeys(chosen.values(), 0)
+        sides_of = sides(model, owners)
         model.mesh.generate(2)
         tags, points, _ = model.mesh.getNodes()
-        corners = np.concatenate([
-            model.mesh.getElementsByType(2, side)[1] for side in of_solid
-        ])
-    used, faces = np.unique(corners.astype(np.int64), return_inverse=True)
+        corners = {t: model.mesh.getElementsByType(2, t)[1] for t in sides_of}
+    used, faces = np.unique(
+        np.concatenate([*corners.values(), []]).astype(np.int64), return_inverse=True
+    )
     index = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
     index[tags.astype(np.int64)] = np.arange(len(tags))
-    return points.reshape(-1, 3)[index[used]], faces.reshape(-1, 3)
+    return StepTriangles(
+        points=points.reshape(-1, 3)[index[used]],
+        triangles=faces.reshape(-1, 3),
+        sides=np.repeat(
+            np.reshape(list(sides_of.values()), (-1, 2)),
+            [len(c) // 3 for c in corners.values()],
+            axis=0,
+        ),
+        names=names,
+        overlaps=overlaps,
+    )
 
 
 def _solids(model: Any) -> dict[str, int]:
@@ -103,8 +141,8 @@ def _solids(model: Any) -> dict[str, int]:
     return solids
 
 
-def sides(model: Any, path: Path, solid: str) -> list[int]:
-    """Find the faces of the solid that is meant.
+def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
+    """Find the solids that are meant.
 
     Args:
         model: gmsh's, of the file.
@@ -112,7 +150,7 @@ def sides(model: Any, path: Path, solid: str) -> list[int]:
         solid: as in :func:`read_step`; must be given where there are several.
 
     Returns:
-        Tags of the faces.
+        Their tags by name; none where the file's faces belong to no solid.
 
     Raises:
         BadInput: no such solid, or which one is not said.
@@ -130,23 +168,70 @@ def sides(model: Any, path: Path, solid: str) -> list[int]:
             f"as {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
             f"them as one; forcefit stiffness solids {path.name} lists them"
         )
-    if not solid:  # one, or faces that belong to none
-        return [tag for _, tag in model.getEntities(2)]
-    chosen = [solids[solid]] if solid in solids else [solids[n] for n in several]
-    if len(chosen) > 1:
-        chosen = _fused(model, path, chosen)
-    return [tag for _, tag in model.getBoundary([(3, chosen[0])], oriented=False)]
+    if not solid:
+        return solids
+    return {n: solids[n] for n in ([solid] if solid in solids else several)}
 
 
-def _fused(model: Any, path: Path, tags: list[int]) -> list[int]:
-    """The one solid that several become when they are united."""
-    solids = [(3, tag) for tag in tags]
-    united, _ = model.occ.fuse(solids[:1], solids[1:])
+def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
+    """Find the faces of solids, and the solids on both sides.
+
+    Args:
+        model: gmsh's.
+        owners: number of the solid that each volume belongs to.
+
+    Returns:
+        By the faces' tags; -1 outside.  All faces of a model where none is a volume's.
+    """
+    found: dict[int, list[int]] = {}
+    for volume, owner in owners.items():
+        for _, face in model.getBoundary([(3, volume)], oriented=False):
+            found.setdefault(face, []).append(owner)
+    if not owners:
+        return {tag: (-1, -1) for _, tag in model.getEntities(2)}
+    both = {face: (solids[0], [*solids, -1][1]) for face, solids in found.items()}
+    return {face: pair for face, pair in both.items() if pair[0] != pair[1]}
+
+
+def _fragments(
+    model: Any, path: Path, chosen: Mapping[str, int]
+) -> tuple[dict[int, int], tuple[str, ...]]:
+    """Solids cut at their common faces: the solid of each volume, and overlaps."""
+    solids, names = [(3, tag) for tag in chosen.values()], list(chosen)
+    volume = [float(model.occ.getMass(*solid)) for solid in solids]
+    _, made = model.occ.fragment(solids[:1], solids[1:])
     model.occ.synchronize()
-    volumes = [tag for dimension, tag in united if dimension == 3]
-    if len(volumes) != 1:
+    owners: dict[int, int] = {}
+    overlaps = []
+    for number, parts in enumerate(made):
+        for _, tag in parts:
+            other = owners.setdefault(tag, number)
+            common = 0.0 if other == number else float(model.occ.getMass(3, tag))
+            if common > _TOUCHING * min(volume[other], volume[number]):
+                overlaps.append(
+                    f"solids {quoted(names[other])} and {quoted(names[number])} have "
+                    f"{common:.4g} m^3 in common"
+                )
+    bodies = _bodies(model, list(owners))
+    if bodies != 1:
         raise BadInput(
-            f"{path}: {len(tags)} solids unite to {len(volumes)} bodies, expected one: "
+            f"{path}: {len(chosen)} solids unite to {bodies} bodies, expected one: "
             "solids of one link must touch"
         )
-    return volumes
+    return owners, tuple(overlaps)
+
+
+def _bodies(model: Any, volumes: list[int]) -> int:
+    """How many bodies volumes are that are joined at common faces."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = [
+        (number, face)
+        for number, tag in enumerate(volumes)
+        for _, face in model.getBoundary([(3, tag)], oriented=False)
+    ]
+    rows, faces = np.array(pairs).T
+    shape = (len(volumes), int(faces.max()) + 1)
+    on = coo_array((np.ones(len(rows)), (rows, faces)), shape).tocsr()
+    return int(connected_components(on @ on.T, directed=False)[0])

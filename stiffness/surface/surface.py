@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.surface_files import STEP, named_solid, read_triangles
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -30,12 +31,14 @@ class Surface:
         triangles: (m, 3) indices of points.
         name: of the file, for messages.
         repairs: what was repaired, in words.
+        solids: of a STEP file, where they are several.
     """
 
     points: NDArray
     triangles: NDArray
     name: str
     repairs: tuple[str, ...] = ()
+    solids: FilledSolids | None = None
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -125,15 +128,18 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
     if unit not in UNITS:
         raise BadInput(f"unit: found {describe(unit)}{nearest(str(unit), UNITS)}")
     file, solid = named_solid(path)
-    points, triangles = _read_triangles(file, solid)
+    points, triangles, solids = _read_triangles(file, solid)
     scale = UNITS[unit]
     if file.suffix.lower() in STEP:
         scale, unit = 1.0, _STATED
-    return check_surface(points * scale, triangles, str(path), unit)
+    surface = check_surface(points * scale, triangles, str(path), unit)
+    return replace(surface, solids=solids)
 
 
-def _read_triangles(path: Path, solid: str) -> tuple[NDArray, NDArray]:
-    """Points and triangles of a file, in its unit."""
+def _read_triangles(
+    path: Path, solid: str
+) -> tuple[NDArray, NDArray, FilledSolids | None]:
+    """Points and triangles of a file, in its unit, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -266,7 +272,7 @@ def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
     """Orient all triangles outward; refuse several bodies."""
-    triangles, shell, flipped = _orient_shells(triangles)
+    triangles, shell, flipped = orient_shells(triangles)
     repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
     shells = [triangles[shell == k] for k in range(shell.max() + 1)]
     volumes = np.array([signed_volume(points, part) for part in shells])
@@ -287,8 +293,15 @@ def _orient(
     return np.concatenate(shells), repairs
 
 
-def _orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
-    """Consistent orientation; shell of each triangle, and how many were flipped."""
+def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
+    """Turn the triangles of closed shells so that neighbours agree.
+
+    Args:
+        triangles: (m, 3) indices of points.
+
+    Returns:
+        The triangles, (m,) the shell of each, and how many were turned.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 

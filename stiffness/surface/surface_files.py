@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput
+from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.stl_file import read_stl
 
 STEP = (".step", ".stp")
@@ -40,7 +41,9 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
     return Path(path), ""
 
 
-def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]:
+def read_triangles(
+    path: Path | str, solid: str = ""
+) -> tuple[NDArray, NDArray, FilledSolids | None]:
     """Points and triangles of a surface file, in the file's unit; STEP in metres.
 
     Args:
@@ -48,7 +51,8 @@ def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]
         solid: of a STEP file with several, by its name.
 
     Returns:
-        (n, 3) points and (m, 3) indices of points.
+        (n, 3) points and (m, 3) indices of points, and the solids they bound where a
+        STEP file has several.
 
     Raises:
         BadInput: the content is not what the name says, or the package that reads it
@@ -56,13 +60,20 @@ def read_triangles(path: Path | str, solid: str = "") -> tuple[NDArray, NDArray]
     """
     path = Path(path)
     if path.suffix.lower() == ".stl":
-        return read_stl(path)
+        return *read_stl(path), None
     read = _in_own_process("triangles", path, solid)
-    points, faces = read["points"], read["faces"]
+    points, faces, solids = read["points"], read["faces"], None
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         kind = path.suffix[1:].upper()
         raise BadInput(f"{path}: holds no triangles, or is not {kind}")
-    return points, faces.astype(np.int64)
+    faces = faces.astype(np.int64)
+    if len(read.get("names", ())) > 1:
+        names, overlaps = (
+            tuple(str(text) for text in read[k]) for k in ("names", "overlaps")
+        )
+        solids = FilledSolids(names, points, faces, read["sides"], overlaps)
+        faces = faces[(read["sides"] < 0).any(axis=1)]
+    return points, faces, solids
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,10 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
     Args:
         wanted: "triangles", or "solids" of a STEP file.
         path: of an existing file.
-        made: ``points`` (n, 3) and ``faces`` (m, 3); or ``names`` (n,), ``volumes``
-            (n,) and ``boxes`` (n, 6); or ``refused``, one line.
+        made: ``points`` (n, 3) and ``faces`` (m, 3), of STEP also ``sides`` (m, 2),
+            ``names`` and ``overlaps``, see
+            :class:`stiffness.surface.step_file.StepTriangles`; or ``names`` (n,),
+            ``volumes`` (n,) and ``boxes`` (n, 6); or ``refused``, one line.
         solid: of a STEP file with several, by its name.
     """
     _limit_memory()
@@ -35,10 +37,15 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
             np.savez(made, names=names, volumes=volumes, boxes=boxes)
             return
         if path.suffix.lower() in {".step", ".stp"}:
-            points, faces = read_step(path, solid)
-        else:
-            read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
-            points, faces = read(path)
+            step = read_step(path, solid)
+            np.savez(
+                made, points=step.points, faces=step.triangles, sides=step.sides,
+                names=np.array(step.names, dtype=str),
+                overlaps=np.array(step.overlaps, dtype=str),
+            )  # fmt: skip
+            return
+        read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
+        points, faces = read(path)
     except BadInput as error:
         np.savez(made, refused=str(error))
         return

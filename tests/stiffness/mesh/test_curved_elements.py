@@ -198,7 +198,7 @@ def test_a_cells_faces_are_of_the_boundarys_patches_or_inside():
         [known.get(frozenset(np.delete(cell, 3 - k)), -1) for k in range(4)]
         for cell in corners
     ]
-    assert patches_of_cells(solid, corners).tolist() == expected
+    assert patches_of_cells(solid.faces, solid.patch, corners).tolist() == expected
 
 
 @pytest.mark.parametrize("order", [2, 3])

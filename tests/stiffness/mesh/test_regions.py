@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.commands.parts import parse_part
 from stiffness.fem.adaptive_step import estimated_error, middle_stiffness, solve_level
 from stiffness.fem.material import Material, regions_of
+from stiffness.fem.part_text import parse_part
 from stiffness.link import scaled
 from stiffness.mesh.regions import cut_by_regions, material_edges, region_of_cells
 from tests.solids_for_tests import box_solid, with_plane_sides
@@ -70,7 +70,7 @@ def test_layers_in_series_stretch_as_springs_do(contrast):
 def test_a_face_through_elements_is_part_of_the_error(contrast):
     """A layer that is given as a function of the points alone: the mesh is not cut, and
     the stated error covers what the uniform stress shows."""
-    jagged = replace(layer(contrast), planes=())
+    jagged = replace(layer(contrast), faces=())
     materials = [Material(E, 0.0), jagged]
     level = solve_level(block(), materials, CENTERS, "rigid")
     history = [level.totals()]

@@ -71,7 +71,7 @@ def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
     """What is said beside it does not count; for other files it does."""
     points, triangles = cylinder()
     monkeypatch.setattr(
-        surface_module, "_read_triangles", lambda *_: (points, triangles)
+        surface_module, "_read_triangles", lambda *_: (points, triangles, None)
     )
     assert read_surface("bar.STEP", "mm").diagonal == pytest.approx(
         read_surface("bar.stl", "m").diagonal
@@ -85,7 +85,7 @@ def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkey
     """A part of 0.1 m whose numbers are metres under the head of millimetres."""
     points, triangles = cylinder(0.2 * size, size)
     monkeypatch.setattr(
-        surface_module, "_read_triangles", lambda *_: (points, triangles)
+        surface_module, "_read_triangles", lambda *_: (points, triangles, None)
     )
     with pytest.raises(
         BadInput, match=f'"stated in the file"; is the file in "{unit}"'

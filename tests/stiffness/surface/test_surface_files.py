@@ -11,7 +11,7 @@ from stiffness.surface import surface_files
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Cone, Plane
-from stiffness.surface.step_file import read_step, sides
+from stiffness.surface.step_file import chosen_solids, read_step, sides
 from stiffness.surface.surface import read_surface
 from stiffness.surface.surface_files import step_solids
 from tests.solids_for_tests import cylinder
@@ -268,18 +268,31 @@ class Model:
         return [(2, face) for face in self.faces[self.tags[tag]]]
 
 
+def faces_of(model, path, solid):
+    """Faces of one solid of a model."""
+    chosen = chosen_solids(model, path, solid)
+    return list(sides(model, dict.fromkeys(chosen.values(), 0)))
+
+
 def test_the_faces_are_those_of_the_solid_that_is_named(tmp_path):
     path = tmp_path / "arm.step"
-    assert sides(Model(arm=[1, 2]), path, "") == [1, 2]
+    assert faces_of(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
-    assert sides(both, path, "bolt") == [3]
-    assert sides(both, path, "bolt-13") == [4, 5]
-    assert sides(both, path, "solid14") == [6]
+    assert faces_of(both, path, "bolt") == [3]
+    assert faces_of(both, path, "bolt-13") == [4, 5]
+    assert faces_of(both, path, "solid14") == [6]
     with pytest.raises(BadInput, match=r"no solid .*bolz.*bolt"):
-        sides(both, path, "bolz")
+        faces_of(both, path, "bolz")
     several = r"found 4 solids \(arm, bolt, bolt-13, solid14\).*arm\.step#arm"
     with pytest.raises(BadInput, match=several):
-        sides(both, path, "")
+        faces_of(both, path, "")
     crowd = Model(**{f"part{k}": [k] for k in range(25)})
     with pytest.raises(BadInput, match=r"found 25 solids .*part19\)"):
-        sides(crowd, path, "")
+        faces_of(crowd, path, "")
+
+
+def test_faces_between_solids_have_one_on_each_side():
+    """Two solids that share face 2: it is inside, the others are outside."""
+    model = Model(arm=[1, 2], bolt=[2, 3])
+    assert sides(model, {11: 0, 12: 1}) == {1: (0, -1), 2: (0, 1), 3: (1, -1)}
+    assert sides(model, {11: 0, 12: 0}) == {1: (0, -1), 3: (0, -1)}

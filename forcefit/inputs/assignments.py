@@ -1,0 +1,47 @@
+"""Numbers given by name in a text, such as ``young=2e11,poisson=0.3``."""
+
+import math
+from collections.abc import Iterable
+
+from forcefit.inputs.errors import BadInput
+
+
+def parse_assignments(
+    texts: Iterable[str], option: str, largest: float = 1e40
+) -> dict[str, float]:
+    """Values given as ``NAME=VALUE``, several in one text by commas, or in several.
+
+    Args:
+        texts: such as ``["tx=0.1,tz=-0.5", "rz=0"]``.
+        option: their name, for messages.
+        largest: no sound value is larger than this, either sign.
+
+    Returns:
+        The numbers by name.
+
+    Raises:
+        BadInput: not of that form, not a finite number, too large, or a name given
+            twice.
+    """
+    values: dict[str, float] = {}
+    for part in ",".join(texts).split(","):
+        name, equals, text = (piece.strip() for piece in part.partition("="))
+        try:
+            value = float(text)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise BadInput(f'{option}: found "{part[:60]}", expected NAME=NUMBER')
+        if name in values:
+            raise BadInput(f'{option}: "{name[:60]}" is given twice')
+        if not math.isfinite(value):
+            raise BadInput(
+                f"{option} {name[:60]}: found {value}, expected a finite number"
+            )
+        if abs(value) > largest:
+            raise BadInput(
+                f"{option} {name[:60]}: found {value:g}, expected a number of size at "
+                f"most {largest:g}"
+            )
+        values[name] = value
+    return values

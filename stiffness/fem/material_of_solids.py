@@ -1,0 +1,110 @@
+"""Materials that are given by the solids of a STEP file: where those are."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput, nearest, quoted
+from stiffness.fem.material import Material
+from stiffness.mesh.cut_face import CutFace
+from stiffness.surface.filled_solids import FilledSolids
+from stiffness.surface.recognition import recognise
+from stiffness.surface.surface import Surface, orient_shells
+from stiffness.surface.triangle_graph import TriangleGraph
+
+
+def placed_materials(
+    surface: Surface, materials: Sequence[Material]
+) -> tuple[Material, ...]:
+    """Give the materials of solids their places.
+
+    Args:
+        surface: of the link, with its solids.
+        materials: the first fills the link, or each solid has one.
+
+    Returns:
+        The materials, of which none names a solid any more.
+
+    Raises:
+        BadInput: the surface has no such solid, solids overlap, or one has no material.
+    """
+    named = [material for material in materials if material.solid]
+    if not named:
+        return tuple(materials)
+    solids = surface.solids
+    if solids is None:
+        raise BadInput(
+            f"{surface.name}: found a material of solid {quoted(named[0].solid)}, "
+            "expected a STEP file of several solids, all of them as one: part.step#*"
+        )
+    if solids.overlaps:
+        raise BadInput(
+            f"{surface.name}: {solids.overlaps[0]}, expected solids that touch: which "
+            "material counts there?"
+        )
+    members = [_members(surface.name, solids, material) for material in materials]
+    if materials[0].solid:
+        given = {name for names in members for name in names}
+        lacking = [name for name in solids.names if name not in given]
+        if lacking:
+            raise BadInput(
+                f"{surface.name}: solid {quoted(lacking[0])} has no material; expected "
+                "one of its own, or a first one that fills the link"
+            )
+    placed = [
+        _placed(solids, names, material) if material.solid else material
+        for names, material in zip(members, materials, strict=True)
+    ]
+    # each solid has a material: what later ones do not take is the first one's
+    first = replace(materials[0], solid="") if materials[0].solid else materials[0]
+    return first, *placed[1:]
+
+
+def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
+    """Names of the solids of a material."""
+    text = material.solid
+    names = (text,) if text in solids.names or not text else tuple(text.split("+"))
+    for one in names if text else ():
+        if one not in solids.names:
+            hint = nearest(one, solids.names)
+            raise BadInput(f"{name}: no solid {quoted(one)}{hint}")
+    return names if text else ()
+
+
+def _placed(
+    solids: FilledSolids, names: tuple[str, ...], material: Material
+) -> Material:
+    """A material with the place and the faces of its solids."""
+    triangles, within = solids.around(names)
+    triangles = orient_shells(triangles)[0]
+    used, index = np.unique(triangles, return_inverse=True)
+    bound = Surface(solids.points[used], index.reshape(-1, 3), ", ".join(names))
+    graph = TriangleGraph(bound)
+    faces = [
+        CutFace(shape, graph.lifted(piece))
+        for part in graph.smooth_parts(within)
+        for piece, shape in recognise(graph, part)
+    ]
+    return replace(
+        material, solid="", where=partial(_enclosed, bound), faces=tuple(faces)
+    )
+
+
+def _enclosed(bound: Surface, points: NDArray) -> NDArray:
+    """Whether points are inside a closed surface."""
+    import pyvista
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints
+
+    inside = vtkSelectEnclosedPoints()
+    inside.SetTolerance(1e-9)
+    inside.SetInputData(pyvista.PolyData(points))
+    inside.SetSurfaceData(
+        pyvista.PolyData.from_regular_faces(bound.points, bound.triangles)
+    )
+    inside.Update()
+    chosen = inside.GetOutput().GetPointData().GetArray("SelectedPoints")
+    return np.asarray(vtk_to_numpy(chosen)) > 0

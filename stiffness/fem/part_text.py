@@ -1,0 +1,140 @@
+"""Parts of a link as text: boxes and solids of another material, added masses."""
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.assignments import parse_assignments
+from forcefit.inputs.errors import checked
+from forcefit.inputs.number_arrays import comma_numbers
+from forcefit.inputs.table import BadInput, Table, describe
+from stiffness.fem.mass_properties import PointMass
+from stiffness.fem.material import Material
+from stiffness.mesh.cut_face import CutFace
+from stiffness.surface.primitives import Plane
+
+_PART = (
+    '"z=0.2..0.4/young=2e11,poisson=0.3", "x=0..1,z=0..0.1/...,density=7800" or '
+    '"solid=one+other/..."'
+)
+_MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
+
+
+def parse_part(option: str, text: str) -> Material:
+    """A material inside a box along the mesh's axes, or of solids of a STEP file.
+
+    Args:
+        option: for the message.
+        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where axes not
+            named are unbounded, or ``solid=one+other/young=..``; the density may be
+            left out.
+
+    Returns:
+        The material.
+
+    Raises:
+        BadInput: it is not that.
+    """
+    region, slash, constants = text.rpartition("/")
+    values = parse_assignments([constants], option) if slash else {}
+    lacks = {"young", "poisson"} - set(values)
+    if lacks or set(values) - {"young", "poisson", "density"}:
+        raise BadInput(f"{option}: found {describe(text)}, expected {_PART}")
+    density = checked(option, values.get("density", 0.0), "kg/m^3", least=0)
+    constant = (values["young"], values["poisson"], density)
+    kind, _, solid = (word.strip() for word in region.partition("="))
+    try:
+        if kind == "solid" and solid:
+            return Material(*constant, solid=solid)
+        low, high = _box(option, text, region)
+        return Material(*constant, partial(_inside, low, high), _planes(low, high))
+    except BadInput as error:
+        if str(error).startswith(option):
+            raise
+        raise BadInput(f"{option}: {error}") from None
+
+
+def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
+    """Lower and upper corner of a box, infinite where an axis is not named."""
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    for part in region.split(","):
+        axis, _, span = (word.strip() for word in part.partition("="))
+        ends = comma_numbers(span.replace("..", ","))
+        if axis not in {"x", "y", "z"} or ends.shape != (2,) or ends[0] >= ends[1]:
+            raise BadInput(f"{option}: found {describe(text)}, expected {_PART}")
+        low["xyz".index(axis)], high["xyz".index(axis)] = ends
+    return low, high
+
+
+def read_parts(link: Table) -> tuple[str, ...]:
+    """Read ``parts`` of a link's table, a list of texts of :func:`parse_part`.
+
+    Args:
+        link: the table.
+
+    Returns:
+        The texts; none where there is no list.
+
+    Raises:
+        BadInput: it is not a list of such texts.
+    """
+    given = link.get("parts", [])
+    if not isinstance(given, list) or not all(isinstance(t, str) for t in given):
+        expected = 'a list such as ["solid=end/young=2e11,poisson=0.3"]'
+        raise link.bad("parts", f"found {describe(given)}, expected {expected}")
+    for text in given:
+        parse_part(f"{link.file}: {link.place}.parts", text)
+    return tuple(given)
+
+
+def scaled_part(text: str, factor: float) -> str:
+    """Scale the modulus of a part.
+
+    Args:
+        text: of :func:`parse_part`.
+        factor: [1].
+
+    Returns:
+        The same part, its modulus times the factor.
+    """
+    region, _, constants = text.rpartition("/")
+    values = parse_assignments([constants], "part")
+    values["young"] *= factor
+    return f"{region}/" + ",".join(f"{k}={v!r}" for k, v in values.items())
+
+
+def parse_mass(option: str, text: str) -> PointMass:
+    """A mass at a point, ``1.5/0,0,0.452``.
+
+    Args:
+        option: for the message.
+        text: what was given.
+
+    Returns:
+        The mass.
+
+    Raises:
+        BadInput: it is not that.
+    """
+    mass, _, place = text.partition("/")
+    weight, point = comma_numbers(mass), comma_numbers(place)
+    if weight.shape != (1,) or point.shape != (3,):
+        raise BadInput(f"{option}: found {describe(text)}, expected {_MASS}")
+    return PointMass(checked(option, float(weight[0]), "kg", above=0), point)
+
+
+def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
+    """Of a box's faces, unless they are at infinity."""
+    axes = np.eye(3)
+    return tuple(
+        CutFace(Plane(end[k] * axes[k], axes[k]))
+        for end in (low, high)
+        for k in range(3)
+        if np.isfinite(end[k])
+    )
+
+
+def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
+    """Whether points are in a box."""
+    return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

@@ -1,0 +1,271 @@
+"""A mesh cut along a face inside a link, plane or curved.
+
+Tetrahedra that are too large to follow a curved face are bisected first.  Corners near
+the face are moved onto it, the edges that still cross it are split there.  The cut runs
+a little beyond the face's border, so that what lies across the border is cut as well.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.mesh.lagrange import FACES
+from stiffness.mesh.refine import edge_code, edges_of, refine, split_edges
+from stiffness.mesh.solid import (
+    Solid,
+    corner_groups,
+    meeting_shapes,
+    moved_onto_shapes,
+)
+from stiffness.mesh.split_crossing import one_of_each, split_crossing
+from stiffness.surface.facets import Facets
+from stiffness.surface.primitives import Plane, Shape, project
+
+_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the face
+_REACH = 0.005  # of the part's size: a corner is moved by no more
+_LEAST = 0.2  # of a tetrahedron's volume that is left when its corners are moved
+ON_FACE = 1e-6  # of the part's size: a corner on the face; shapes are known to 2e-6
+_TURN = np.cos(np.radians(35.0))  # of a curved face along an edge
+_PASSES = 12  # of bisecting what is too large
+_HALVINGS = 12  # of an edge, to find where it crosses a curved face
+
+
+@dataclass(frozen=True, eq=False)
+class CutFace:
+    """A face inside a link.
+
+    Attributes:
+        shape: that it lies on.
+        facets: of the face; None for all of the shape.
+    """
+
+    shape: Shape
+    facets: Facets | None = None
+
+    def is_near(self, points: NDArray, reach: NDArray) -> NDArray:
+        """Find points near the face.
+
+        Args:
+            points: (n, 3) [m].
+            reach: (n,) [m].
+
+        Returns:
+            (n,) whether the face is no further away than that.
+        """
+        near = np.abs(self.shape.signed(points)[0]) <= reach
+        if self.facets is not None and near.any():
+            near[near] = self.facets.distance(points[near]) <= reach[near]
+        return near
+
+
+def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
+    """Faces that two tetrahedra have in common.
+
+    Args:
+        cells: (t, 4).
+
+    Returns:
+        (f, 3) corners and (f, 2) the tetrahedra.
+    """
+    faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
+    order = np.lexsort(faces.T)
+    same = np.flatnonzero((faces[order][1:] == faces[order][:-1]).all(axis=1))
+    owners = np.column_stack([order[same], order[same + 1]]) // len(FACES)
+    return faces[order[same]], owners
+
+
+def face_code(corners: NDArray, points: int) -> NDArray:
+    """Number triangles by their corners.
+
+    Args:
+        corners: (..., 3), in any order.
+        points: how many there are.
+
+    Returns:
+        (...) one number for each set of three.
+    """
+    total = np.int64(points)
+    a, b, c = np.moveaxis(np.sort(corners, axis=-1), -1, 0)
+    return np.asarray((a * total + b) * total + c)
+
+
+def cut(solid: Solid, face: CutFace) -> Solid:
+    """Cut a mesh along a face.
+
+    Args:
+        solid: any.
+        face: inside it.
+
+    Returns:
+        The solid; the triangles on the face are among its ``inner`` ones.
+    """
+    if not isinstance(face.shape, Plane):
+        solid = _resolved(solid, face)
+    solid, on = _onto(solid, face)
+
+    def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
+        return _crossing(finer, face, on, ends)
+
+    return _with_cut(*split_crossing(solid, on, crossing), face)
+
+
+def without_chords(solid: Solid) -> Solid:
+    """Split edges that join two corners of a curved face but are not on it.
+
+    Args:
+        solid: with its ``inner`` triangles.
+
+    Returns:
+        The solid; no tetrahedron has two sides on a curved face, between which it
+        would be flat once they are curved.
+    """
+    for number in np.unique(solid.inner_patch):
+        if isinstance(solid.shapes[number], Plane):
+            continue
+        for _ in range(_PASSES):
+            ends, of_cell = edges_of(solid.cells, len(solid.points))
+            inner = solid.inner[solid.inner_patch == number]
+            on = np.zeros(len(solid.points), dtype=bool)
+            on[inner] = True
+            sides = np.sort(inner[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+            code = edge_code(ends, len(on))
+            chord = on[ends].all(axis=1) & ~np.isin(code, edge_code(sides, len(on)))
+            if not chord.any():
+                break
+            split = one_of_each(chord, of_cell)
+            solid, _ = split_edges(solid, ends, of_cell, split)
+    return solid
+
+
+def _resolved(solid: Solid, face: CutFace) -> Solid:
+    """Bisect tetrahedra that are too large to follow a curved face."""
+    for _ in range(_PASSES):
+        ends, of_cell = edges_of(solid.cells, len(solid.points))
+        start, end = solid.points[ends].swapaxes(0, 1)
+        length = np.linalg.norm(end - start, axis=1)
+        (low, first), (high, last) = map(face.shape.signed, (start, end))
+        touching = np.minimum(np.abs(low), np.abs(high)) < length
+        turning = touching & (np.einsum("ei,ei->e", first, last) < _TURN)
+        middle = (start + end) / 2
+        across = face.shape.signed(middle)[0]
+        same_side = low * high >= 0
+        turning |= same_side & (across * (low + high) < 0) & (
+            np.abs(across) > 0.05 * length
+        )  # fmt: skip
+        turning[turning] = face.is_near(middle[turning], length[turning])
+        if not turning.any():
+            break
+        wanted = turning[of_cell].any(axis=1)
+        solid = refine(solid, wanted.astype(int)).solid
+    return solid
+
+
+def _crossing(
+    solid: Solid, face: CutFace, on: NDArray, ends: NDArray
+) -> tuple[NDArray, NDArray]:
+    """(e,) whether an edge crosses the face, and at which share of it."""
+    value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
+    low, high = value[ends].T
+    across = low * high < 0
+    share = np.full(len(ends), 0.5)
+    if not across.any():
+        return across, share
+    start, end = solid.points[ends[across]].swapaxes(0, 1)
+    found = _share_of_crossing(face.shape, start, end, low[across], high[across])
+    share[across] = found
+    if face.facets is not None:
+        # an edge of a tetrahedron that the face runs through is no further away
+        _, of_cell = edges_of(solid.cells, len(solid.points))
+        length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
+        reach = np.zeros(len(ends))
+        longest = length[of_cell].max(axis=1)
+        for k in range(6):
+            np.maximum.at(reach, of_cell[:, k], longest)
+        places = start + found[:, None] * (end - start)
+        across[across] = face.is_near(places, reach[across])
+    return across, share
+
+
+def _share_of_crossing(
+    shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
+) -> NDArray:
+    """(e,) share of edges at which they cross a shape, by bisection, then a secant."""
+    left, right = np.zeros(len(low)), np.ones(len(low))
+    for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
+        middle = (left + right) / 2
+        value = shape.signed(start + middle[:, None] * (end - start))[0]
+        before = value * low > 0
+        left, low = np.where(before, middle, left), np.where(before, value, low)
+        right, high = np.where(before, right, middle), np.where(before, high, value)
+    part = np.divide(low, low - high, out=np.full_like(low, 0.5), where=low != high)
+    return np.asarray(left + part * (right - left))
+
+
+def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
+    """A solid with the triangles on a face among those inside it."""
+    number, count = len(solid.shapes), len(solid.points)
+    solid = replace(solid, shapes=(*solid.shapes, face.shape))
+    faces, owners = faces_inside(solid.cells)
+    size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    known = face_code(solid.inner, count)
+    for _ in range(2):  # corners that come onto the face when others are moved
+        value = face.shape.signed(solid.points)[0]
+        on |= np.abs(value) < ON_FACE * size
+        side = np.sign(np.where(on, 0.0, value)[solid.cells].sum(axis=1))
+        new = on[faces].all(axis=1) & (side[owners].prod(axis=1) < 0)
+        new &= ~np.isin(face_code(faces, count), known)
+        known = np.r_[known, face_code(faces[new], count)]
+        inner = np.concatenate([solid.inner, faces[new]])
+        patch = np.r_[solid.inner_patch, np.full(int(new.sum()), number)]
+        solid = moved_onto_shapes(replace(solid, inner=inner, inner_patch=patch))
+    return solid
+
+
+def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
+    """Corners near a face moved onto it, and which lie on it."""
+    size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    height = np.abs(face.shape.signed(solid.points)[0])
+    ends, _ = edges_of(solid.cells, len(solid.points))
+    start, end = solid.points[ends].swapaxes(0, 1)
+    length = np.linalg.norm(end - start, axis=1)
+    reach, longest = np.full(len(solid.points), _REACH * size), 0 * height
+    for k in (0, 1):
+        np.minimum.at(reach, ends[:, k], _NEAR * length)
+        np.maximum.at(longest, ends[:, k], length)
+    near = height < reach
+    near[near] = face.is_near(solid.points[near], longest[near])
+    near |= height < ON_FACE * size  # beyond the face, where the cut runs on
+    target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
+    already, before = on & (height < ON_FACE * size), solid.volumes()
+    while True:
+        moved = replace(solid, points=np.where(on[:, None], target, solid.points))
+        bad = np.unique(solid.cells[moved.volumes() < _LEAST * before])
+        if not (on[bad] & ~already[bad]).any():
+            return moved, on
+        on[bad] &= already[bad]
+
+
+def _targets(
+    solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
+) -> tuple[NDArray, NDArray]:
+    """(n, 3) [m] where corners near a shape are to be, and which can be there."""
+    # those of the boundary, or of other faces inside, stay on their shapes
+    target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
+    free = near.copy()
+    groups = [(key, group[near[group]]) for key, group in corner_groups(solid)]
+    for _, group in groups:
+        free[group] = False
+    for key, group in [*groups, ((), np.flatnonzero(free))]:
+        if not len(group):
+            continue
+        known = meeting_shapes(solid, key, solid.points[group])
+        fixed = any(solid.shapes[number] is None for number in key)
+        place = solid.points[group] if fixed else project(
+            solid.points[group], (*known, shape)
+        )  # fmt: skip
+        off = np.max([np.abs(s.signed(place)[0]) for s in (*known, shape)], axis=0)
+        moved = np.linalg.norm(place - solid.points[group], axis=1)
+        good = (off < close) & (moved <= np.maximum(3 * reach[group], close))
+        target[group[good]], on[group[good]] = place[good], True
+    return target, on

@@ -1,0 +1,135 @@
+"""Materials by the solids of a STEP file, against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.fem.elements import integration
+from stiffness.fem.fea import FemOptions, solve_link
+from stiffness.fem.material import Material
+from stiffness.fem.material_of_solids import placed_materials
+from stiffness.fem.part_text import parse_part, scaled_part
+from stiffness.fem.stress import stress_influence, von_mises
+from stiffness.link import inverted
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.surface import check_surface
+from tests.solids_for_tests import bar_of_two_boxes, cylinder, rod_in_tube
+
+ALUMINIUM, STEEL = 7e10, 2.1e11
+NEAR, FAR, WIDTH, HEIGHT = 0.1, 0.2, 0.02, 0.03
+INNER, OUTER, LENGTH = 0.013, 0.015, 0.1
+
+
+def solved(surface, length, materials, accuracy=0.01):
+    ends = parse_interface("z=0"), parse_interface(f"z={length}")
+    return solve_link(surface, *ends, materials, options=FemOptions(accuracy))
+
+
+@pytest.fixture(scope="module")
+def bar():
+    """Two prisms in series; without Poisson's ratio sections stay what they are."""
+    surface = bar_of_two_boxes(WIDTH, HEIGHT, NEAR, FAR)
+    materials = [Material(ALUMINIUM, 0, 2700, solid="near"),
+                 Material(STEEL, 0, 7800, solid="far")]  # fmt: skip
+    return solved(surface, NEAR + FAR, materials, 0.005)
+
+
+@pytest.fixture(scope="module")
+def rod():
+    """A rod of steel glued into a tube of a third of its modulus."""
+    materials = [Material(ALUMINIUM, 0, 1600), Material(STEEL, 0, 7800, solid="rod")]
+    return solved(rod_in_tube(INNER, OUTER, LENGTH), LENGTH, materials)
+
+
+def test_prisms_in_series_follow_the_unit_load_integrals(bar):
+    """L / E A and L / E I add up; a tip force also shears, 6 / 5 of it over G A."""
+    A = WIDTH * HEIGHT
+    C = inverted(bar.level.solution.stiffness)
+    flexible = lambda I: (FAR / STEEL + NEAR / ALUMINIUM) / I  # noqa: E731
+    assert C[5, 5] == pytest.approx(flexible(A), rel=1e-6)
+    for turn, shift, I in (
+        (0, 4, WIDTH * HEIGHT**3 / 12),
+        (1, 3, HEIGHT * WIDTH**3 / 12),
+    ):
+        lever = (FAR**2 / STEEL + ((FAR + NEAR) ** 2 - FAR**2) / ALUMINIUM) / 2 / I
+        sag = (FAR**3 / STEEL + ((FAR + NEAR) ** 3 - FAR**3) / ALUMINIUM) / 3 / I
+        sag += 6 / 5 * 2 * flexible(A)
+        assert C[turn, turn] == pytest.approx(flexible(I), rel=1e-3)
+        assert abs(C[turn, shift]) == pytest.approx(lever, rel=1e-3)
+        assert C[shift, shift] == pytest.approx(sag, rel=2e-3)
+
+
+def test_mass_and_centre_are_those_of_both_solids(bar):
+    near, far = 2700 * NEAR * WIDTH * HEIGHT, 7800 * FAR * WIDTH * HEIGHT
+    center = (near * NEAR / 2 + far * (NEAR + FAR / 2)) / (near + far)
+    assert bar.link.mass == pytest.approx(near + far, rel=1e-9)
+    assert bar.link.center_of_mass[2] == pytest.approx(center, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_rod_glued_into_a_tube_twists_and_stretches_in_parallel(rod):
+    """G J and E A add up, exactly: circles turn as a whole."""
+    K = rod.level.solution.stiffness
+    areas = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
+    J = np.pi / 2 * np.array([INNER**4, OUTER**4 - INNER**4])
+    E = np.array([STEEL, ALUMINIUM])
+    assert K[5, 5] == pytest.approx(E @ areas / LENGTH, rel=2e-5)
+    assert K[2, 2] == pytest.approx(E / 2 @ J / LENGTH, rel=2e-5)
+
+
+@pytest.mark.slow
+def test_the_curved_face_between_solids_is_a_face_of_the_mesh(rod):
+    """Each modulus fills its own cylinder; facets would miss 0.3 % of it."""
+    stiff = rod.level.material[:, 2] == 7800
+    volume = sum(w[stiff[part]].sum() for part, *_, w in integration(rod.level.mesh))
+    assert volume == pytest.approx(np.pi * INNER**2 * LENGTH, rel=2e-5)
+
+
+@pytest.mark.slow
+def test_stresses_on_both_sides_of_the_face_are_their_own(rod):
+    """Strain is the same everywhere: stresses are as the moduli, none between."""
+    area = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
+    strain = 1000 / (np.array([STEEL, ALUMINIUM]) @ area)
+    stresses = von_mises(stress_influence(rod, 0.02).stresses([0, 0, 0, 0, 0, 1000]))
+    soft = stresses < 1.5 * ALUMINIUM * strain
+    np.testing.assert_allclose(stresses[soft], ALUMINIUM * strain, rtol=1e-3)
+    np.testing.assert_allclose(stresses[~soft], STEEL * strain, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["rod"], 'solid "tube" has no material; expected one of its own'),
+        (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
+        (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
+    ],
+)
+def test_a_solid_that_is_unknown_or_lacks_a_material_is_named(given, message):
+    surface = rod_in_tube(INNER, OUTER, LENGTH)
+    with pytest.raises(BadInput, match=message):
+        placed_materials(surface, [Material(STEEL, 0.3, solid=name) for name in given])
+
+
+def test_solids_that_overlap_are_refused():
+    surface = rod_in_tube(INNER, OUTER, LENGTH)
+    solids = replace(surface.solids, overlaps=("solids a and b have 1 m^3 in common",))
+    with pytest.raises(BadInput, match="a and b have 1 m.3 in common, expected solids"):
+        placed_materials(
+            replace(surface, solids=solids),
+            [Material(STEEL, 0.3), Material(STEEL, 0.3, solid="rod")],
+        )
+
+
+def test_a_surface_without_solids_is_refused():
+    surface = check_surface(*cylinder(), "part.stl")
+    with pytest.raises(BadInput, match=r'part.stl: found a material of solid "rod"'):
+        placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])
+
+
+def test_a_part_of_solids_is_read_and_scaled():
+    part = parse_part("--part", "solid=end/a+end b/young=2e11,poisson=0.3,density=7800")
+    assert (part.solid, part.E, part.density) == ("end/a+end b", 2e11, 7800)
+    twice = parse_part("--part", scaled_part("solid=a/young=2e11,poisson=0.3", 2.0))
+    assert (twice.solid, twice.E, twice.nu) == ("a", 4e11, 0.3)
