@@ -19,7 +19,7 @@ from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.zone import MARGIN_READINGS, zone_margins
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
-from assembly.model.link_stress import peak_stresses
+from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
@@ -282,6 +282,8 @@ def _record_wrenches(
     if question.strength is not None:
         stress = peak_stresses(robot, wrenches, at_tips)
         out["stress"][rows] = stress
+        errors = [link.relative_error for link in stressed_links(robot)]
+        out["stress_error"][rows] = errors
         with np.errstate(divide="ignore"):
             out["safety"][rows] = question.strength / stress.max(axis=1)
 

@@ -148,6 +148,10 @@ def variables(question: Question) -> dict[str, Variable]:
     if question.strength is not None:
         links = {"link": stressed_names(question.robot)}
         table["stress"] = Variable(links, "Pa", "largest von Mises stress in the link")
+        table["stress_error"] = Variable(
+            links, "1", "estimated relative error of the stress, by the mesh; a beam's "
+            "formulas have 0, links with an inner edge without a fillet infinity",
+        )  # fmt: skip
         table["safety"] = Variable({}, "1", "yield strength over the largest stress")
     if question.stiffness:
         table |= _stiffness_variables(question.robot, question.stiffness)

@@ -37,5 +37,5 @@ class FilledSolids:
         chosen = [number for number, name in enumerate(self.names) if name in members]
         one, other = (np.isin(side, chosen) for side in self.sides.T)
         bound = np.asarray(one != other)
-        within = (self.sides >= 0).all(axis=1)
+        within = np.asarray((self.sides >= 0).all(axis=1))
         return self.triangles[bound], within[bound]

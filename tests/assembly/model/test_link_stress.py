@@ -82,7 +82,14 @@ def test_finite_elements_agree_with_the_beam_away_from_the_ends():
     found = peak_stresses(robot, w)[:, 0]
     assert 1.0 <= found[0] / expected[0] <= 1.05
     # of unit wrenches, bending and torsion among them
-    assert 0.001 < stressed_links(robot)[0].relative_error < 0.2
+    told = stressed_links(robot)[0].relative_error
+    assert 0.001 < told < 0.2
+    drive = Frame("drive", joint="revolute", actuated=True)
+    turned = Robot("one", "distal", (drive, replace(frame, parent="drive")))
+    targets = grid_targets(parse_grid("q.drive=0:1:0.5", turned))
+    question = Question(turned, components=targets.names, strength=2e8)
+    data = sweep_in_memory(Sweep(question, targets))
+    np.testing.assert_allclose(data["stress_error"].squeeze(), told, rtol=1e-9)
     assert found[1] == pytest.approx(expected[1], rel=0.03)
     beam = replace(frame, link=BeamLink({"radius": r}, 6e10, 0.3))
     whole = peak_stresses(Robot("one", "distal", (beam,)), w)[:, 0]
@@ -129,6 +136,7 @@ def test_sweeps_and_draws_know_the_stress_of_a_links_own_weight():
     )  # fmt: skip
     data = sweep_in_memory(Sweep(question, targets))
     np.testing.assert_allclose(data["stress"].squeeze(), expected, rtol=1e-9)
+    assert (data["stress_error"] == 0).all()  # a formula has no mesh
     assert np.abs(data["wrench"]).max() < 1e-9
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0])
     experiment = Experiment(home_posture(robot), sources, gravity=gravity)
