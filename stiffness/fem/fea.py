@@ -7,6 +7,7 @@ the asked accuracy is reached or the budget is used.
 
 import logging
 import math
+import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -39,7 +40,11 @@ from stiffness.mesh.slender_bar import slender_bar
 from stiffness.mesh.solid import Solid
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import Interface
-from stiffness.surface.patches import refuse_common_edges, triangles_on
+from stiffness.surface.patches import (
+    find_patches,
+    refuse_common_edges,
+    triangles_on,
+)
 from stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
@@ -171,7 +176,7 @@ def solve_link(
         BadInput: an interface is not proper, the two share an edge, there is no
             material, or a solid that has one does not exist.
     """
-    start = time.monotonic()
+    start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
     materials = placed_materials(surface, materials)
     if options.interface == "rigid":
@@ -182,7 +187,8 @@ def solve_link(
     ])
     first = first_mesh(surface, base, tip, options.budget, options.cache)
     first = cut_by_regions(first, regions_of(materials))
-    level, K, error, report = _refined(first, materials, centers, options, start)
+    pace = _pace_so_far(time.monotonic() - start, _processor_seconds() - busy)
+    level, K, error, report = _refined(first, materials, centers, options, start, pace)
     report |= {
         "surface_volume": surface.volume,
         "surface_area": surface.area,
@@ -218,6 +224,7 @@ def _refined(
     centers: NDArray,
     options: FemOptions,
     start: float,
+    pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
     """Solve on ever finer meshes until the error is small enough, or the budget used.
 
@@ -227,6 +234,7 @@ def _refined(
         centers: (2, 3) [m] of the base and the tip interface.
         options: how it is solved.
         start: [s] since when the budget's seconds count.
+        pace: [1] how much slower than alone this machine is now.
 
     Returns:
         The finest mesh, the (6, 6) stiffness, the size of its error, what it took.
@@ -235,7 +243,7 @@ def _refined(
     begun = time.monotonic()
 
     def affordable(unknowns: int) -> None:
-        _refuse_cost(unknowns, budget, begun - start)
+        _refuse_cost(unknowns, budget, begun - start, pace)
 
     level = solve_level(first, materials, centers, interface, affordable)
     history, sizes = [level.totals()], [len(level.solid.cells)]
@@ -326,6 +334,7 @@ def first_mesh(
     start = time.monotonic()
     if (bar := slender_bar(surface, base, tip)) is not None:
         return bar
+    patches = find_patches(surface, base, tip)  # 3 s for a part with 70 of them
 
     def mesh(share: float) -> Solid:
         left = budget.seconds - (time.monotonic() - start)
@@ -337,6 +346,7 @@ def first_mesh(
             envelope=share * envelope,
             time_limit=max(_MESHER * left, 1e-3),
             cache=cache,
+            patches=patches,
         )
 
     for share in (1.0, 0.5):
@@ -354,9 +364,25 @@ def _pace(unknowns: int, seconds: float) -> float:
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
-def _refuse_cost(unknowns: int, budget: Budget, spent: float) -> None:
+def _processor_seconds() -> float:
+    """[s] of this process and of those it has waited for."""
+    return sum(os.times()[:4])
+
+
+def _pace_so_far(elapsed: float, busy: float) -> float:
+    """How much slower than alone work was, by its processor time; at least 1."""
+    # what takes a moment only says little; Windows does not count the mesher's time
+    if elapsed < _SETUP or os.name == "nt":
+        return 1.0
+    return max(1.0, elapsed / max(busy, 0.1 * elapsed))
+
+
+def _refuse_cost(
+    unknowns: int, budget: Budget, spent: float, pace: float = 1.0
+) -> None:
     """Refuse a first mesh whose solution the budget does not allow."""
     memory, seconds = expected_cost(unknowns)
+    seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
         raise MeshFailed(
             f"the coarsest mesh that follows the part has {unknowns} unknowns, about "

@@ -28,7 +28,7 @@ from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
 from stiffness.mesh.solid import Solid
 from stiffness.surface.decimate import coarser_surface
 from stiffness.surface.interface import Interface, parse_interface
-from stiffness.surface.patches import find_patches
+from stiffness.surface.patches import Patches, find_patches
 from stiffness.surface.surface import Surface, read_surface
 
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
@@ -47,6 +47,7 @@ def mesh_solid(
     envelope: float = 5e-4,
     time_limit: float = 300.0,
     cache: Path | str | None = None,
+    patches: Patches | None = None,
 ) -> Solid:
     """Tetrahedra of a surface, from the cache if they were made before.
 
@@ -60,6 +61,7 @@ def mesh_solid(
         time_limit: [s] for the mesher.
         cache: folder; that of :func:`forcefit.inputs.cache_folder.cache_folder` if
             absent.
+        patches: of the surface and these interfaces; found if absent.
 
     Returns:
         The solid.
@@ -68,7 +70,7 @@ def mesh_solid(
         BadInput: an interface has no part of the surface.
         MeshFailed: the mesher ran out of time or gave nothing.
     """
-    patches = find_patches(surface, base, tip)
+    patches = patches or find_patches(surface, base, tip)
     edge = surface.diagonal / 20 if edge is None else edge
     key = f"{_FORMAT} {surface.digest()} {edge / surface.diagonal:.4e} {envelope:.4e}"
     name = hashlib.sha256(key.encode()).hexdigest()[:32]

@@ -21,9 +21,11 @@ from stiffness.fem.fea import (
 from stiffness.fem.mass_properties import PointMass
 from stiffness.fem.material import Material
 from stiffness.link import scaled
+from stiffness.mesh.cut_face import CutFace
 from stiffness.mesh.fit_to_patches import MeshFailed
 from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
+from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Plane
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
@@ -81,8 +83,8 @@ def test_the_papers_bar_from_its_surface(cache):
 @pytest.mark.slow
 def test_a_bar_of_two_materials_end_to_end(cache):
     """Stretched: two springs in series, but for the end effect both have."""
-    middle = Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0]))
-    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, planes=(middle,))
+    middle = CutFace(Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0])))
+    half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, faces=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
     one, two = (
         solve_link(bar_surface(), *PLANES, m, options=options).link
@@ -200,7 +202,7 @@ def test_a_first_mesh_follows_the_surface_as_closely_as_its_walls_are_thin(
     triangles = [[s[i] for i in turn] for s in sides for turn in ([0, 1, 2], [0, 2, 3])]
     plate, asked = check_surface(points, np.array(triangles), "plate"), {}
     monkeypatch.setattr(fea, "mesh_solid", lambda *_, **given: asked.update(given))
-    fea.first_mesh(plate, *PLANES, Budget())
+    fea.first_mesh(plate, *map(parse_interface, ("z=0", "z=0.1")), Budget())
     V, A = a * b * thickness, 2 * (a * b + (a + b) * thickness)
     diagonal = np.sqrt(a**2 + b**2 + thickness**2)
     expected = min(2e-3, 2 * V / A / 8 / diagonal)
@@ -241,6 +243,34 @@ def test_a_first_mesh_that_costs_more_than_the_budget_is_refused():
     for unknowns, spent in ((400_000, 290.0), (1_200_000, 0.0)):
         with pytest.raises(MeshFailed, match=f"{unknowns} unknowns, about .* s and"):
             fea._refuse_cost(unknowns, Budget(seconds=300.0), spent)
+
+
+def test_a_first_mesh_on_a_busy_machine_is_refused_before_the_budget_is_used_up():
+    """20 s alone are 120 s where a sixth of a processor is left: after 200 of 300 s."""
+    pace = fea._pace_so_far(elapsed=180.0, busy=30.0)
+    fea._refuse_cost(400_000, Budget(seconds=300.0), 200.0)
+    with pytest.raises(MeshFailed, match="400000 unknowns, about 1.. s and"):
+        fea._refuse_cost(400_000, Budget(seconds=300.0), 200.0, pace)
+    assert fea._pace_so_far(elapsed=30.0, busy=60.0) == 1.0  # two threads
+
+
+def test_patches_are_found_once_for_all_tries_of_the_mesher(monkeypatch):
+    """They take seconds for a part with many; each try had found them again."""
+    found = []
+
+    def find(*arguments):
+        found.append(arguments)
+        return find_patches(*arguments)
+
+    def fail(*_, **__):
+        raise MeshFailed("no mesh")
+
+    monkeypatch.setattr(fea, "find_patches", find)
+    monkeypatch.setattr("stiffness.mesh.mesh.find_patches", find)
+    monkeypatch.setattr("stiffness.mesh.mesh._tetrahedralize", fail)
+    with pytest.raises(MeshFailed):
+        fea.first_mesh(bar_surface(), *PLANES, Budget(), cache="absent")
+    assert len(found) == 1
 
 
 def test_a_mesher_that_fails_is_asked_for_finer_meshes_while_there_is_time(monkeypatch):
