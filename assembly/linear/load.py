@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Content, Posture, content_of
 from assembly.model.largest import LARGEST_LENGTH
-from assembly.model.robot import BeamLink, Robot, beam_axis
-from forcefit.inputs.table import BadInput
+from assembly.model.robot import BeamLink, MeshLink, Robot, beam_axis
+from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.sections import declared_section
 
 _LARGEST_LOAD = (
@@ -188,7 +188,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
 
 
 def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
-    """A remark on gravity that acts on nothing.
+    """A remark on gravity that acts on nothing, or not on a link given by a mesh.
 
     Args:
         robot: any.
@@ -197,7 +197,19 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
     Returns:
         One sentence, or none.
     """
-    if gravity is None or not np.any(gravity) or _masses(robot)[:, [0, 4]].any():
+    if gravity is None or not np.any(gravity):
+        return []
+    without = [
+        frame.name for frame in robot.frames
+        if not frame.mass and isinstance(frame.link, MeshLink) and frame.link.density
+    ]  # fmt: skip
+    if without:
+        return [
+            f"the weight of {', '.join(map(quoted, without))}, given by a mesh, is "
+            'left out, and so is its stress: expected "mass" and "centre_of_mass" of '
+            "the frame; forcefit stiffness stress --gravity finds that stress"
+        ]
+    if _masses(robot)[:, [0, 4]].any():
         return []
     return [
         'nothing has a mass: gravity changes nothing; expected "density" of links or '

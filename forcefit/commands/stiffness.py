@@ -351,10 +351,17 @@ def stress(
     surface: Surface,
     base: Base,
     tip: Tip,
-    wrench: Annotated[list[str], typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")],
+    wrench: Annotated[
+        list[str] | None, typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")
+    ] = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,
+    density: Density = 0.0,
     part: Parts = None,
+    gravity: Annotated[
+        list[str] | None,
+        typer.Option(help="In the file's axes: z=-9.81 [m/s^2], for its own weight."),
+    ] = None,
     away: Annotated[
         float | None,
         typer.Option(help="From the interfaces [m]; one interface radius if absent."),
@@ -378,18 +385,25 @@ def stress(
     import numpy as np
 
     from forcefit.commands.beam_options import BeamOptions
-    from forcefit.commands.options import parse_load
+    from forcefit.commands.options import parse_gravity, parse_load
     from forcefit.inputs.errors import checked
     from stiffness.fem.fea import FemOptions, solve_link
     from stiffness.fem.stress import peak_stress, stress_influence
     from stiffness.report.results import stress_results, stress_text
     from stiffness.surface.surface import read_surface
 
-    materials, roll = _materials(young, poisson, 0.0, part), _up(up)
+    materials, roll = _materials(young, poisson, density, part), _up(up)
     options = BeamOptions(
         materials[0].E, materials[0].nu, radius, inner_radius, width, height, section
     )
-    load = np.array(parse_load(wrench, "--wrench"))
+    if not wrench and not gravity:
+        raise BadInput("--wrench: missing; expected one, or --gravity")
+    if part and options.has_section():
+        raise BadInput("--part: found with a section, whose beam has one material")
+    if gravity and figure is not None:
+        raise BadInput("--figure: found with --gravity, expected one of the two")
+    load = np.array(parse_load(wrench or ["fx=0"], "--wrench"))
+    g = parse_gravity(gravity)
     declared = options.declared() if options.has_section() else None
     held, moved = _interfaces(base, tip)
     accuracy = _accuracy(accuracy)
@@ -402,7 +416,7 @@ def stress(
         read_surface(surface, unit), held, moved, materials,
         options=FemOptions(accuracy, interface),
     )  # fmt: skip
-    peak = peak_stress(solved, load, section=declared, up=roll, away=away)
+    peak = peak_stress(solved, load, section=declared, up=roll, away=away, gravity=g)
     if figure is not None:
         from stiffness.report.plot import plot_stress
 

@@ -21,6 +21,7 @@ from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.adaptive_step import Level
 from stiffness.fem.elements import Elements, triangle_areas
 from stiffness.fem.fea import MeshedLink
+from stiffness.fem.own_weight import with_own_weight
 from stiffness.fem.stress_error import (
     ZONE,
     element_stresses,
@@ -63,7 +64,10 @@ class StressInfluence:
     Attributes:
         places: (p, 3) [m] nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy of each component
-            of the tip's wrench.
+            of the tip's wrench; (p, 9, 6) with those [Pa per m/s^2] of gravity, where
+            the link was solved under its own weight
+            (:func:`stiffness.fem.own_weight.with_own_weight`): a wrench then has
+            gravity's three components behind its six.
         away: [m] nothing nearer than this to an interface is here.
         reentrant_edges: whether some of the nodes lie on re-entrant edges without a
             fillet, where the elastic stress is singular too.
@@ -141,12 +145,13 @@ class StressInfluence:
         zone = np.zeros(len(far), dtype=bool)
         zone[far] = values >= ZONE * values[worst]
         level = self.source.level
-        motion = inverted(level.solution.stiffness) @ np.asarray(wrench)
+        motion = _motions(level) @ np.asarray(wrench)
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
         """Largest estimated error of the six unit wrenches' peaks, relative to them."""
-        return max(self.peak_error(w) / self.peak(w)[0] for w in np.eye(6))
+        unit = np.eye(6, self.influence.shape[1])
+        return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +187,7 @@ def peak_stress(
     section: Mapping[str, float] | None = None,
     up: ArrayLike | None = None,
     away: float | None = None,
+    gravity: ArrayLike | None = None,
 ) -> PeakStress:
     """Largest von Mises stress of a tip wrench, with the beam formula beside it.
 
@@ -192,20 +198,25 @@ def peak_stress(
             :func:`stiffness.beam.beam_stress.peak_beam_stress`.
         up: (3,) the section's z, in the link's axes.
         away: [m] from the interfaces; one interface radius if absent.
+        gravity: (3,) [m/s^2] in the link's axes, for its own weight.
 
     Returns:
         The peak, its place and region.
 
     Raises:
-        BadInput: nothing of the link is so far away, or the section has no formula.
+        BadInput: nothing of the link is so far away, the section has no formula, or
+            gravity acts on a link without a density.
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
         peak_beam_stress(section, 0.0, np.zeros(6))  # refused before the work
-    field = stress_influence(solved, away)
-    value, place = field.peak(w)
-    error, region = field.peak_error(w), field.region
-    if _peaks_on_facets(field, w):
+    field, acting = stress_influence(solved, away), w
+    if gravity is not None:
+        field = stress_influence(with_own_weight(solved), away)
+        acting = np.r_[w, np.asarray(gravity, dtype=float)]
+    value, place = field.peak(acting)
+    error, region = field.peak_error(acting), field.region
+    if _peaks_on_facets(field, acting):
         region += "; the peak lies on facets of no recognised shape, taken as smooth"
     if section is None:
         return PeakStress(w, value, error, place, region, field.away)
@@ -213,10 +224,17 @@ def peak_stress(
     R = section_axes(tip - base, up)
     length = float(np.linalg.norm(tip - base))
     in_beam = np.r_[w[:3] @ R, w[3:] @ R]
-    whole, _ = peak_beam_stress(section, length, in_beam)
+    weight = np.zeros(3)
+    if gravity is not None:
+        weight = solved.link.mass * np.asarray(gravity, dtype=float) @ R
+    whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    stress, where = peak_beam_stress(section, length - 2 * field.away, near_tip)
+    beyond = weight * field.away / length  # of the piece that is not looked at
+    near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
+    near_tip[3:] += beyond
+    rest = length - 2 * field.away
+    stress, where = peak_beam_stress(section, rest, near_tip, weight * rest / length)
     where = base + R @ (where + [field.away, 0, 0])
     beam = (float(stress), where)
     return PeakStress(
@@ -263,9 +281,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     left_out = far & off if (far & ~off).any() else np.zeros_like(far)
     far &= ~left_out
     per_screw = _nodal_stresses(level)[far]
-    # the fields' own: they balance the wrench exactly
-    C_h = inverted(level.solution.stiffness)
-    influence = np.einsum("pks,kw->pws", per_screw, C_h)
+    influence = np.einsum("pks,kw->pws", per_screw, _motions(level))
     singular, faceted = on_inner_edges(level)[node], on_facets(level)[node]
     source = StressSource(level, far, singular, faceted, left_out)
     reentrant = bool(source.singular[far].any())
@@ -282,6 +298,14 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
     return bool(field.source.faceted[field.source.far][worst])
 
 
+def _motions(level: Level) -> NDArray:
+    """(k, k) of the tip's unit wrenches and, where there are its fields, of gravity."""
+    # the fields' own: they balance the wrench exactly
+    motions = np.eye(level.solution.fields.shape[2])
+    motions[:6, :6] = inverted(level.solution.stiffness)
+    return motions
+
+
 def _interface_radius(mesh: Elements, patch: int) -> float:
     """[m] largest distance of an interface's nodes from its centroid."""
     faces = mesh.faces[mesh.patch == patch]
@@ -292,12 +316,13 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 
 def _nodal_stresses(level: Level) -> NDArray:
-    """(n, 6, 6) stress of each unit screw at each node, averaged over elements."""
+    """(n, k, 6) stress of each unit screw at each node, averaged over elements."""
     cells, nodes = nodes_by_material(level)
-    total = np.zeros((len(nodes), 6, 6))
+    screws = np.eye(level.solution.fields.shape[2])
+    total = np.zeros((len(nodes), len(screws), 6))
     count = np.bincount(cells.ravel(), minlength=len(nodes))
     for first in range(0, len(cells), _CHUNK):
         some = np.arange(first, min(first + _CHUNK, len(cells)))
-        stress = element_stresses(level, some, np.eye(6))
+        stress = element_stresses(level, some, screws)
         np.add.at(total, cells[some], stress)
     return total / np.maximum(count, 1)[:, None, None]

@@ -56,13 +56,14 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
     Args:
         level: a solved mesh.
         members: (c,) indices of elements.
-        motion: (6,) or (6, k) [rad, m] screws of the tip.
+        motion: (6,) or (6, k) [rad, m] screws of the tip; (9, ...) with gravity
+            [m/s^2] where the solution has the fields of the link's own weight.
 
     Returns:
         (c, nodes, k, 6) [Pa] xx yy zz yz xz xy, k = 1 for one screw.
     """
     mesh = level.mesh
-    fields = level.solution.fields @ np.reshape(motion, (6, -1))
+    fields = level.solution.fields @ np.reshape(motion, (len(motion), -1))
     parts = [np.empty((0, mesh.cells.shape[1], fields.shape[2], 6))]
     for part, G in node_gradients(mesh, members):
         slope = np.einsum(

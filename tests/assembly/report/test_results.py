@@ -1,12 +1,14 @@
 """What solve prints: certified sizes, rounding left out, equal numbers in order."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.load import massless
-from assembly.model.robot import Clearance, Frame, Robot
+from assembly.model.robot import Clearance, Frame, MeshLink, Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of, solution_text
 from assembly.robots import load_robot
@@ -44,6 +46,12 @@ def test_gravity_on_a_robot_without_mass_is_said_to_change_nothing():
     (remark,) = massless(robot, [0, 0, -9.81])
     assert remark.startswith("nothing has a mass: gravity changes nothing")
     assert massless(robot, None) == massless(robot, [0, 0, 0]) == []
+    solid = MeshLink(Path("arm.stl"), "z=0", "z=1", 2e11, 0.3, 7850.0)
+    heavy = Robot("one", "arm", (Frame("arm", translation=[0, 0, 1], link=solid),))
+    (left_out,) = massless(heavy, [0, 0, -9.81])
+    assert 'the weight of "arm", given by a mesh, is left out' in left_out
+    weighed = Frame("arm", translation=[0, 0, 1], link=solid, mass=3.0)
+    assert massless(Robot("one", "arm", (weighed,)), [0, 0, -9.81]) == []
     assert massless(load_robot("hexapod"), [0, 0, -9.81]) == []
     results = solution_of(home_posture(robot), gravity=[0, 0, -9.81])
     assert remark in results["remarks"]

@@ -1,0 +1,63 @@
+"""A meshed link under its own weight: body forces in the finite elements."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from forcefit.inputs.table import BadInput
+from stiffness.fem.elements import Elements, assemble, integration
+from stiffness.fem.fea import MeshedLink
+from stiffness.fem.sparse_solver import solve
+from stiffness.link import inverted
+
+
+def with_own_weight(solved: MeshedLink) -> MeshedLink:
+    """Add the fields of the link's own weight to those of its tip's motions.
+
+    Args:
+        solved: on its finest mesh, with a density.
+
+    Returns:
+        The same link whose solution has nine fields (n, 3, 9): for unit screws of the
+        tip [m], and [m per m/s^2] for unit gravity along x, y and z, the base held and
+        the tip free.
+
+    Raises:
+        BadInput: the link has no density, or both interfaces are distributing.
+    """
+    level = solved.level
+    mesh, held = level.mesh, level.solution
+    lam, mu, density = level.material.T
+    if not density.any():
+        raise BadInput("gravity: the link has no density, expected one [kg/m^3]")
+    if held.kind == "distributing-both":
+        raise BadInput(
+            "gravity: found distributing-both interfaces, expected rigid or "
+            "distributing: a base that holds"
+        )
+    masses = _nodal_masses(mesh, density)
+    loads = masses[:, None, None] * np.eye(3)
+    fixed = mesh.patch <= 1 if held.kind == "rigid" else mesh.patch == 0
+    free = np.ones(len(mesh.nodes), dtype=bool)
+    free[np.unique(mesh.faces[fixed])] = False
+    free = np.repeat(free, 3)
+    flat = np.zeros((3 * len(mesh.nodes), 3))
+    upper = assemble(mesh, lam, mu)
+    flat[free] = solve(upper[free][:, free], loads.reshape(-1, 3)[free])
+    fields = flat.reshape(-1, 3, 3)
+    if held.kind == "rigid":  # the tip is let go: what held it does work on its motions
+        at_tip = np.einsum("nxk,nxg->kg", held.fields, loads)
+        fields = fields + held.fields @ (inverted(held.stiffness) @ at_tip)
+    both = np.concatenate([held.fields, fields], axis=2)
+    solution = replace(held, fields=both)
+    return replace(solved, level=replace(level, solution=solution))
+
+
+def _nodal_masses(mesh: Elements, density: NDArray) -> NDArray:
+    """(n,) [kg] the integral of density times each shape function."""
+    masses = np.zeros(len(mesh.nodes))
+    for part, _, _, N, _, w in integration(mesh, density > 0):
+        share = (w * density[part, None]) @ N
+        np.add.at(masses, mesh.cells[part], share)
+    return masses

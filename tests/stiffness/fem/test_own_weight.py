@@ -1,0 +1,69 @@
+"""Stress of a meshed link's own weight, against the beam of 1 m."""
+
+import numpy as np
+import pytest
+
+from forcefit.inputs.table import BadInput
+from stiffness.fem.fea import FemOptions, solve_bar
+from stiffness.fem.material import Material
+from stiffness.fem.own_weight import with_own_weight
+from stiffness.fem.stress import peak_stress, stress_influence
+
+SIDE, DENSITY, G = 0.02, 7850.0, 9.81
+SECTION = {"width": SIDE, "height": SIDE}
+
+
+@pytest.fixture(scope="module", params=["rigid", "distributing"])
+def bar(request):
+    """A square bar of 20 mm, 1 m long along z."""
+    options = FemOptions(0.02, request.param)
+    return solve_bar(SECTION, Material(2e11, 0.3, DENSITY), options)
+
+
+def test_a_heavy_cantilever_is_bent_by_what_hangs_beyond_each_section(bar):
+    """rho g A (L - z)^2 / 2, linear over the section; shear bends it by 1e-3 more."""
+    field = stress_influence(with_own_weight(bar), 0.1)
+    stress = field.stresses(np.r_[np.zeros(6), 0.0, -G, 0.0])[:, 2]
+    x, y, z = field.places.T
+    moment = DENSITY * G * SIDE**2 * (1 - z) ** 2 / 2
+    expected = 12 * moment * y / SIDE**4
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(stress, expected, atol=5e-3 * largest)
+
+
+def test_the_peak_of_the_weight_is_that_of_the_beam(bar):
+    """From 50 mm off the wall on; over the whole length 6 rho g A L^2 / 2 / h^3."""
+    peak = peak_stress(bar, np.zeros(6), section=SECTION, up=[0, 1, 0], away=0.05,
+                       gravity=[0, -G, 0])  # fmt: skip
+    whole = 3 * DENSITY * G / SIDE
+    assert peak.beam_whole == pytest.approx(whole, rel=1e-9)
+    assert peak.beam[0] == pytest.approx(whole * 0.95**2, rel=1e-9)
+    assert 0.05 <= peak.place[2] < 0.06  # the nearest node beyond it
+    there = whole * (1 - peak.place[2]) ** 2
+    assert peak.von_mises == pytest.approx(there, rel=3e-3)
+    assert peak.error < 1e-2 * there
+
+
+def test_weight_along_the_bar_stretches_it(bar):
+    """rho g (L - z) hangs below each section."""
+    field = stress_influence(with_own_weight(bar), 0.1)
+    stress = field.stresses(np.r_[np.zeros(6), 0.0, 0.0, G])[:, 2]
+    expected = DENSITY * G * (1 - field.places[:, 2])
+    np.testing.assert_allclose(stress, expected, atol=2e-3 * DENSITY * G)
+
+
+def test_a_wrench_and_the_weight_superpose(bar):
+    """Half the weight lifted at the tip: the wall carries no moment."""
+    lift = DENSITY * G * SIDE**2 / 2
+    field = stress_influence(with_own_weight(bar), 0.1)
+    stress = field.stresses([0, 0, 0, 0, lift, 0, 0, -G, 0])[:, 2]
+    x, y, z = field.places.T
+    moment = DENSITY * G * SIDE**2 * ((1 - z) ** 2 - (1 - z)) / 2
+    largest = 12 * DENSITY * G * SIDE**2 / 8 * SIDE / 2 / SIDE**4
+    np.testing.assert_allclose(stress, 12 * moment * y / SIDE**4, atol=1e-2 * largest)
+
+
+def test_gravity_on_a_link_without_a_density_is_refused():
+    light = solve_bar({"radius": 0.2}, Material(2e11, 0.3), FemOptions(0.3))
+    with pytest.raises(BadInput, match="gravity: the link has no density"):
+        with_own_weight(light)
