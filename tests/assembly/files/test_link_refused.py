@@ -121,6 +121,16 @@ REFUSED_LINKS = {
         mesh(tip="{ bore = { point = [0,0,0], axis = [0,1,0], radius = 1, h = 2 } }"),
         'frame "coupler".link.mesh.tip.bore: unknown key "h"; valid: axis, point, '
         "radius"),
+    "a part of a mesh without a modulus": (
+        BEAM, mesh() + ', parts = ["solid=end/poisson=0.3"]',
+        "frame \"coupler\".link.parts: found 'solid=end/poisson=0.3', expected "),
+    "parts of a mesh that are no list": (
+        BEAM, mesh() + ', parts = "solid=end/young=1e9,poisson=0.3"',
+        "frame \"coupler\".link.parts: found 'solid=end/young=1e9,poisson=0.3', "
+        "expected a list such as "),
+    "parts of a beam": (
+        BEAM, BEAM + ', parts = ["solid=end/young=1e9,poisson=0.3"]',
+        'frame "coupler".link: unknown key "parts"'),
     "a mesh with an unknown key": (
         BEAM, mesh(more=", units = 1"),
         'frame "coupler".link.mesh: unknown key "units"; did you mean "unit"?'),

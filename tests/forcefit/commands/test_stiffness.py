@@ -119,6 +119,11 @@ def test_beam_refuses_with_the_options_name(options, message):
         (["--part", "q=0..1/young=1e9,poisson=0.3"], "--part: found 'q=0..1/"),
         (["--part", "z=0..1/young=1e9,poison=0.3"], "--part: found 'z=0..1/"),
         (["--part", "z=0..1/young=1e9,poisson=0.7"], "--part: material: nu = 0.7"),
+        (["--part", "solid=/young=1e9,poisson=0.3"], "--part: found 'solid=/young"),
+        (
+            ["--part", "solid=end/young=1e9,poisson=0.3"],
+            'found a material of solid "end", expected a STEP file of several solids',
+        ),
         (["--mass", "1.5"], "--mass: found '1.5', expected"),
         (["--mass", "-1/0,0,0"], "--mass: found -1"),
         (["--mass", "1/0,0,nan"], "--mass: found '1/0,0,nan'"),
@@ -128,6 +133,45 @@ def test_beam_refuses_with_the_options_name(options, message):
 def test_fea_refuses_before_it_works(change, message):
     with pytest.raises(BadInput) as caught:
         run("fea", *PLAIN, *MATERIAL, *change)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ([], "--young: missing; expected a modulus [Pa], or --part"),
+        (["--young", "1e9"], "--young, --poisson: found one of them, expected both"),
+        (["--part", "z=0..1/young=1e9,poisson=0.3"], "--young: missing"),
+    ],
+)
+def test_fea_without_a_material_for_all_of_the_link_refuses(change, message):
+    with pytest.raises(BadInput) as caught:
+        run("fea", *PLAIN, *change)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ([], "--wrench: missing; expected one, or --gravity"),
+        (["--gravity", "w=1"], "--gravity"),
+        (["--gravity", "z=-9.81", "--figure", "x.png"], "--figure: found with --gravi"),
+        (
+            [
+                "--wrench",
+                "fx=1",
+                "--radius",
+                "0.04",
+                "--part",
+                "z=0..1/young=1,poisson=0",
+            ],
+            "--part: found with a section",
+        ),
+    ],
+)
+def test_stress_refuses_before_it_works(change, message):
+    with pytest.raises(BadInput) as caught:
+        run("stress", *PLAIN, *MATERIAL, *change)
     assert message in str(caught.value)
 
 

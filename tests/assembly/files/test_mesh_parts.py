@@ -1,0 +1,33 @@
+"""Parts of another material of a mesh link, in robot files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from assembly.effects.modulus_scale import MODULUS_SCALE
+from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.posture import home_posture
+from assembly.measurement.conditions import as_declared
+from assembly.model.robot import Frame, MeshLink, Robot
+from stiffness.fem.part_text import parse_part
+
+PARTS = ("solid=end a+end_b/young=2.1e11,poisson=0.3", "z=0..0.1/young=1e9,poisson=0.3")
+
+
+def arm(parts=PARTS):
+    link = MeshLink(Path("/arm.step#*"), "z=0", "z=1", 7e10, 0.3, parts=parts)
+    return Robot("one", "arm", (Frame("arm", translation=[0, 0, 1], link=link),))
+
+
+def test_parts_of_a_mesh_are_written_and_read_again(tmp_path):
+    path = tmp_path / "arm.toml"
+    write_robot(arm(), path)
+    assert read_robot(path).frame("arm").link.parts == PARTS
+
+
+def test_a_modulus_twice_as_large_is_so_in_every_part():
+    conditions = as_declared(home_posture(arm()))
+    link = MODULUS_SCALE.apply(conditions, {"arm": 2.0}).robot.frame("arm").link
+    assert link.young == 1.4e11
+    found = [parse_part("parts", text) for text in link.parts]
+    assert [part.E for part in found] == [4.2e11, 2e9]
+    assert replace(found[0], E=2.1e11).solid == "end a+end_b"
