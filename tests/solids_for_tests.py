@@ -37,10 +37,12 @@ def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
     return points, triangles
 
 
-def shouldered_shaft(large, small, fillet, around, rows, step=(0.05, 0.12)):
+def shouldered_shaft(
+    large, small, fillet, around, rows, step=(0.05, 0.12), apart=0.004
+):
     """Points and triangles of a shaft along z whose radius steps down at a fillet.
 
-    Rings about 4 mm apart, each turned by half a facet against the one before.
+    Rings about ``apart`` [m] from each other, each turned by half a facet.
     """
     shoulder, end = step
     turn = np.linspace(0, np.pi / 2, rows + 1)
@@ -49,7 +51,7 @@ def shouldered_shaft(large, small, fillet, around, rows, step=(0.05, 0.12)):
     outline = np.array([[large, 0], [large, shoulder], *arc, [small, end]])
     rings = [outline[:1]]
     for a, b in zip(outline, outline[1:], strict=False):
-        count = max(1, round(float(np.linalg.norm(b - a)) / 0.004))
+        count = max(1, round(float(np.linalg.norm(b - a)) / apart))
         rings.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
     profile = np.concatenate(rings)
     number = np.arange(around)

@@ -23,6 +23,7 @@ from stiffness.surface.primitives import (
 from stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 _MISSES = (60, 20)  # seeds of a part without a shape of strips, of any
+_CONGRUENT = 1e-6  # relative difference of facets' areas, and of their evenness
 _CONE = 10  # points that tell a cone; fewer lie on one that is not there
 _CYLINDER = 1e-4  # slope below which a cone is a cylinder, which seven points tell
 _FEW = 12  # flat faces; a part of fewer is no faceted curve
@@ -165,21 +166,39 @@ def _pieces(
     area = np.bincount(flat, weights=np.where(inside, graph.areas, 0.0))[flat]
     order = area if strips else _evenness(graph, inside, flat, area)
     found: list[tuple[NDArray, Shape]] = []
-    misses = 0
+    misses, missed = 0, list[int]()
     while waiting.any() and misses < most and graph.tries > 0:
         graph.tries -= 1
-        seed = int(np.argmax(np.where(waiting, order, -1.0)))
+        seed = int(np.argmax(np.where(waiting, order, -np.inf)))
         waiting[inside & (flat == flat[seed])] = False
         shapes = _shapes_around(graph, inside, flat, seed, strips)
         for piece, _ in shapes:
             waiting[piece] = False
         shapes = [s for s in shapes if _is_proper(graph, lifts, *s)]
         misses += not shapes
+        if not shapes and not strips:
+            missed.append(seed)
+            if misses == most and (kinds := _kinds(missed, order, area)) is not None:
+                # congruent ones, as around a shaft, come after all others
+                order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
             found.append(best)
             inside[best[0]] = False
     return found
+
+
+def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
+    """(m,) facets congruent with those that told no shape; None if these are many."""
+    kinds = np.zeros(len(order), dtype=bool)
+    count = 0
+    for seed in missed:
+        if not kinds[seed]:
+            same = np.abs(order - order[seed]) < _CONGRUENT * np.abs(order[seed])
+            kinds |= same & (np.abs(area - area[seed]) < _CONGRUENT * area[seed])
+            kinds[seed] = True
+            count += 1
+    return kinds if 4 * count <= len(missed) else None
 
 
 def _evenness(

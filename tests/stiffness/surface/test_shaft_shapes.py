@@ -33,3 +33,15 @@ def test_a_shoulder_and_the_first_row_of_its_fillet_are_no_torus(around, rows):
         else:
             assert isinstance(shape, Plane)
             assert high - low < 1e-9
+
+
+def test_a_fillet_is_found_where_many_congruent_facets_are_not():
+    """Of 20 seeds none told a shape: all were on one ring of the shaft, 48 the same."""
+    step = (0.0322355, 0.0772355)
+    points, triangles = shouldered_shaft(0.0134315, 0.01, 0.002402, 48, 8, step, 0.005)
+    surface = check_surface(points, triangles, "shaft")
+    patches = find_patches(surface, *map(parse_interface, ("z=0", f"z={step[1]}")))
+    kinds = sorted(type(shape).__name__ for shape in patches.shapes)
+    assert kinds == ["Cone", "Cone", "Plane", "Plane", "Plane", "Torus"]
+    (torus,) = (shape for shape in patches.shapes if isinstance(shape, Torus))
+    assert (torus.radius, torus.tube) == pytest.approx((0.012402, 0.002402), rel=1e-6)
