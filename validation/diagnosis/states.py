@@ -25,14 +25,13 @@ from validation.diagnosis.gaussian import (
     marginalise,
 )
 from validation.diagnosis.noise import FREEDOM, scale
-from validation.diagnosis.prior_sizes import Eigen, Sizes, best_sizes
+from validation.diagnosis.prior_sizes import Sizes, best_sizes
+from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
 Mode = tuple[bool, bool]  # geometric errors in use, springs in use
 MORE = math.log(2.0)  # prior odds of one element fewer
 IN_USE = math.log(10.0), math.log(10.0)  # prior odds against geometry, springs
 _GROUPS = 4  # of nuisance parameters
-_NARROW = 50  # most columns of an element that are kept beside those of all cells
-_RANK = 1e-9  # relative singular value of a dependent column
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,101 +136,23 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
     return max(by_mean, by_ranks) if by_mean > 0 else by_mean
 
 
-class Fitting:
+class Fitting(WeightedReadings):
     """Weighted readings of the fitted cells, and models of them."""
 
     def __init__(
         self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
         common: tuple[float, float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
-        """Apply the weights and project out the measuring frame.
-
-        Args:
-            columns: of all N cells.
-            z: (n,) whitened residual of the fitted cells.
-            cells: (N,) mask of the fitted cells.
-            weights: (n,) relative precision, 1 for a good reading.
-            common: [rad, m] standard deviations of the platform's rotation and
-                translation that all cells of a measurement share, over tau.
-        """
-        self.columns, self.cells, self.weights = columns, cells, weights
-        self.given, self.common = z, common
-        self.sampled = columns.sampled[cells]
-        self.root = np.sqrt(weights)
-        self.whiten = columns.whitening(cells, self.root, common)
-        flat = self.whiten(columns.flat[cells])
-        norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-        left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
-        self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        # of the noise's covariance, and of the likelihood without the measuring frame
-        seen = np.append(norm, size[: self.flat.shape[1]])
-        self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
-        self.z = self._without_flat(self.whiten(z))
-        self.count = len(z) - self.flat.shape[1]
-        self.small = self._without_flat(self.whiten(columns.nuisance.columns[cells]))
-        self._gram = self.small.T @ self.small
-        self._own: dict[Element, NDArray] = {}
-        self._inner: dict[tuple[Element, Element | None], NDArray] = {}
-        self._turned: dict[Element, Eigen] = {}
-        self._offset: dict[Element, NDArray] = {}
+        """Start with an empty cache of models; arguments as of the readings."""
+        super().__init__(columns, z, cells, weights, common)
         self._states: dict[object, State] = {}
-
-    def _without_flat(self, columns: NDArray) -> NDArray:
-        return columns - self.flat @ (self.flat.T @ columns)
-
-    def own(self, e: Element) -> NDArray:
-        """Return an element's (n, m) columns in the fitted cells."""
-        if e in self._own:
-            return self._own[e]
-        B = self._without_flat(self.whiten(e.columns[self.cells]))
-        if B.shape[1] <= _NARROW:
-            self._own[e] = B
-        return B
-
-    def _products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return the inner products of the elements' m columns.
-
-        Returns:
-            (k, m) with the nuisance parameters, (m, m) with one another.
-        """
-        for i, e in enumerate(elements):
-            missing = [o for o in (None, *elements[: i + 1])
-                       if (e, o) not in self._inner]  # fmt: skip
-            B = self.own(e) if missing else self.small
-            for o in missing:
-                beside = self.small if o is None else B if o is e else self.own(o)
-                self._inner[e, o] = beside.T @ B
-                if o is not None:
-                    self._inner[o, e] = self._inner[e, o].T
-        empty = np.zeros((len(self._gram), 0))
-        with_small = [empty, *(self._inner[e, None] for e in elements)]
-        blocks = [[self._inner[e, o] for e in elements] for o in elements]
-        return np.hstack(with_small), np.block(blocks or [[np.zeros((0, 0))]])
-
-    def _eigen(self, e: Element) -> Eigen:
-        """Return eigenvalues and eigenvectors of an element's inner products."""
-        if e not in self._turned:
-            self._turned[e] = np.linalg.eigh(self._inner[e, e])
-        return self._turned[e]
-
-    def readings(self, elements: Sequence[Element]) -> NDArray:
-        """Return the (n,) readings minus the offsets of the elements."""
-        z = self.z
-        for e in elements:
-            if e.offset is not None:
-                if e not in self._offset:
-                    o = self.whiten(e.offset[self.cells])
-                    self._offset[e] = self._without_flat(o)
-                z = z - self._offset[e]
-        return z
 
     def forget(self) -> None:
         """Drop what can be computed again: models seen and products of columns."""
         for state in self._states.values():
-            state.__dict__.pop("marginal", None)
-        kept = self._states, self._own, self._inner, self._turned, self._offset
-        for one in kept:
-            one.clear()
+            state.forget()
+        self._states.clear()
+        super().forget()
 
     def modes(self) -> list[Mode]:
         """Return the combinations of nuisance parameters in use."""
@@ -284,21 +205,21 @@ class Fitting:
             begin = {g: s for g, s in begin.items() if np.isfinite(s)}
         z = self.readings(elements)
         counts = [e.columns.shape[1] for e in elements]
-        with_small, inner = self._products(elements)
+        with_small, inner = self.products(elements)
         with_z = np.concatenate([np.zeros(0), *(self.own(e).T @ z for e in elements)])
         small_z = self.small.T @ z
         element = np.repeat(np.arange(len(elements)), counts)
         given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
         most = np.repeat([e.most for e in elements], counts)
         eigen = {
-            _GROUPS + k: self._eigen(e)
+            _GROUPS + k: self.eigen(e)
             for k, e in enumerate(elements)
-            if e.columns.shape[1] > _NARROW and np.isnan(e.given).all()
+            if e.columns.shape[1] > NARROW and np.isnan(e.given).all()
         }
         while True:
             beside = with_small[used]
             gram = np.block([
-                [self._gram[np.ix_(used, used)], beside],
+                [self.gram[np.ix_(used, used)], beside],
                 [beside.T, inner],
             ])
             sizes = best_sizes(

@@ -1,0 +1,106 @@
+"""Readings and columns of the fitted cells, weighted, with cached inner products."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.diagnosis.columns import Columns
+from validation.diagnosis.elements import Element
+from validation.diagnosis.prior_sizes import Eigen
+
+NARROW = 50  # most columns of an element that are kept beside those of all cells
+_RANK = 1e-9  # relative singular value of a dependent column
+
+
+class WeightedReadings:
+    """Readings of the fitted cells, weighted; the device's frame is projected out."""
+
+    def __init__(
+        self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
+        common: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
+        """Apply the weights and project out the measuring frame.
+
+        Args:
+            columns: of all N cells.
+            z: (n,) whitened residual of the fitted cells.
+            cells: (N,) mask of the fitted cells.
+            weights: (n,) relative precision, 1 for a good reading.
+            common: [rad, m] standard deviations of the platform's rotation and
+                translation that all cells of a measurement share, over tau.
+        """
+        self.columns, self.cells, self.weights = columns, cells, weights
+        self.given, self.common = z, common
+        self.sampled = columns.sampled[cells]
+        self.root = np.sqrt(weights)
+        self.whiten = columns.whitening(cells, self.root, common)
+        flat = self.whiten(columns.flat[cells])
+        norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
+        self.flat = left[:, size > _RANK * size.max(initial=0.0)]
+        # of the noise's covariance, and of the likelihood without the measuring frame
+        seen = np.append(norm, size[: self.flat.shape[1]])
+        self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
+        self.z = self._without_flat(self.whiten(z))
+        self.count = len(z) - self.flat.shape[1]
+        self.small = self._without_flat(self.whiten(columns.nuisance.columns[cells]))
+        self.gram = self.small.T @ self.small
+        self._own: dict[Element, NDArray] = {}
+        self._inner: dict[tuple[Element, Element | None], NDArray] = {}
+        self._turned: dict[Element, Eigen] = {}
+        self._offset: dict[Element, NDArray] = {}
+
+    def _without_flat(self, columns: NDArray) -> NDArray:
+        return columns - self.flat @ (self.flat.T @ columns)
+
+    def own(self, e: Element) -> NDArray:
+        """Return an element's (n, m) columns in the fitted cells."""
+        if e in self._own:
+            return self._own[e]
+        B = self._without_flat(self.whiten(e.columns[self.cells]))
+        if B.shape[1] <= NARROW:
+            self._own[e] = B
+        return B
+
+    def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
+        """Return the inner products of the elements' m columns.
+
+        Returns:
+            (k, m) with the nuisance parameters, (m, m) with one another.
+        """
+        for i, e in enumerate(elements):
+            missing = [o for o in (None, *elements[: i + 1])
+                       if (e, o) not in self._inner]  # fmt: skip
+            B = self.own(e) if missing else self.small
+            for o in missing:
+                beside = self.small if o is None else B if o is e else self.own(o)
+                self._inner[e, o] = beside.T @ B
+                if o is not None:
+                    self._inner[o, e] = self._inner[e, o].T
+        empty = np.zeros((len(self.gram), 0))
+        with_small = [empty, *(self._inner[e, None] for e in elements)]
+        blocks = [[self._inner[e, o] for e in elements] for o in elements]
+        return np.hstack(with_small), np.block(blocks or [[np.zeros((0, 0))]])
+
+    def eigen(self, e: Element) -> Eigen:
+        """Return eigenvalues and eigenvectors of an element's inner products."""
+        if e not in self._turned:
+            self._turned[e] = np.linalg.eigh(self._inner[e, e])
+        return self._turned[e]
+
+    def readings(self, elements: Sequence[Element]) -> NDArray:
+        """Return the (n,) readings minus the offsets of the elements."""
+        z = self.z
+        for e in elements:
+            if e.offset is not None:
+                if e not in self._offset:
+                    o = self.whiten(e.offset[self.cells])
+                    self._offset[e] = self._without_flat(o)
+                z = z - self._offset[e]
+        return z
+
+    def forget(self) -> None:
+        """Drop columns and inner products, which can be computed again."""
+        for one in (self._own, self._inner, self._turned, self._offset):
+            one.clear()
