@@ -51,7 +51,9 @@ NEAR = 1.2  # of the noise: what the machine's error is to come to
 # weight and stiffening set the noise; clearance is left where the load pushes it
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
-    if acts_on_machine(name) and name not in {"joint_clearance", "geometric_stiffening"}
+    if acts_on_machine(name)
+    and name not in {"joint_clearance", "geometric_stiffening", "body_mass"}
+    and name not in {"delayed_expansion", "_tilting"}  # they follow what is no command
 ]  # fmt: skip
 
 

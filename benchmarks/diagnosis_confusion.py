@@ -38,8 +38,8 @@ from validation.diagnosis.results import table
 from validation.diagnosis.saving import save
 from validation.diagnosis.sequence import errors_of
 from validation.multibody.simulation import SimulationFailed
-from validation.synthetic.design import CampaignDesign
-from validation.synthetic.draws import NotApplicable, draw_effect
+from validation.synthetic.design import CampaignDesign, varied_for
+from validation.synthetic.draws import SLIDING, NotApplicable, draw_effect
 from validation.synthetic.effects import LIBRARY, Parameters
 from validation.synthetic.equivalents import SAME, Alternative, alternatives
 from validation.synthetic.generator import (
@@ -91,7 +91,9 @@ def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
 def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     """A campaign of a kind."""
     names = _effects(kind, rng)
-    drawn = draw_robot(rng, "arm" if "joint_clearance" in names else None)
+    kinds = dict.fromkeys(SLIDING, "gantry")
+    kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
+    drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
     robot, load = drawn.robot, drawn.load
     # robots of many legs take long: half as many rows
     many = len(robot.frames) > 20
@@ -101,9 +103,9 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
         reach=drawn.reach,
         load=load,
         reference_point=tuple(drawn.point),
-        humidity="_humidity" in names or rng.random() < 0.3,
-        temperature="around" if "_quadratic_temperature" in names else "swing",
+        humidity=rng.random() < 0.3,
     )
+    design = varied_for(design, names)
     wanted = {name: float(rng.choice(STRENGTHS)) for name in names}
     if "geometric_stiffening" in names:  # first of all it needs large errors
         robot = robot.with_errors(30 * robot.errors)

@@ -125,11 +125,14 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
     """Whether some function learned is where, and of what, the hidden effect is."""
     (effect,) = truth["effects"]
     name, keys = effect["name"], [p["name"] for p in effect["parameters"]]
-    frames = {key.removesuffix(".amplitude").removesuffix(".phase") for key in keys}
+    frames = {key.rpartition(".")[0] or key for key in keys}
     at_reading = name in ("_stand", "_sag")
-    wanted = {"reading"} if at_reading else frames
+    wanted = {"reading"} if at_reading else {"base"} if name == "_tilting" else frames
     known = OUTSIDE_COVARIATES.get(name, ())
     of = {v if v in ("time", "approach") else f"cov.{v}" for v in known}
+    if name in ("_two_steps", "_torque_backlash"):
+        kinds = ("mz", "fz")
+        of = {f"wrench.{frame}.{kind}" for frame in frames for kind in kinds}
     of = of or {f"q.{frame}" for frame in frames}
     places = {one["where"] for one in diagnosis["learned"]}
     for one in diagnosis["learned"]:

@@ -53,7 +53,7 @@ def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
 
     Args:
         rng: of the draws.
-        kind: one of :data:`KINDS`; drawn if absent.
+        kind: one of :data:`KINDS`, or ``"gantry"``; drawn if absent.
 
     Returns:
         The robot.
@@ -116,6 +116,33 @@ def _arm(rng: np.random.Generator) -> tuple[Robot, float]:
     return Robot("arm", "tool", tuple(frames)), 0.8
 
 
+def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
+    """Three slides across one another, and a turning head."""
+    elastic = rng.random() < 0.6
+    frames: list[Frame] = []
+    parent, radius = "base", rng.uniform(0.035, 0.055)
+    for k, joint in enumerate(("prismatic",) * 3 + ("revolute",)):
+        place = rng.uniform(0.15, 0.4) * _direction(rng)
+        turn = np.array([np.pi / 2, 0, 0]) if k % 2 else np.array([0, np.pi / 2, 0])
+        K = (
+            drive_stiffness(2e5)
+            if joint == "revolute"
+            else np.diag([np.inf] * 5 + [3e6])
+        )
+        along = {"length": 0.3, "axis": (1.0, 0.0, 0.0)}  # of a body on a slide
+        frames.append(
+            Frame(
+                f"{'wxyz'[(k + 1) % 4]}", parent, place.round(4), turn, joint=joint,
+                actuated=True, joint_stiffness=K if elastic else None,
+                link=replace(_tube(radius), **along) if k else None,
+            )
+        )  # fmt: skip
+        parent, radius = frames[-1].name, 0.87 * radius
+    end = rng.uniform(0.08, 0.2) * _direction(rng)
+    frames.append(Frame("tool", parent, end.round(4), link=_tube(radius)))
+    return Robot("gantry", "tool", tuple(frames)), 0.8
+
+
 def _direction(rng: np.random.Generator) -> NDArray:
     """(3,) unit vector, rather across the joint's axis than along it."""
     vector = rng.normal(size=3) * [1, 1, 0.5]
@@ -167,6 +194,7 @@ def _delta(rng: np.random.Generator) -> tuple[Robot, float]:
 
 _BUILDERS = {
     "arm": _arm,
+    "gantry": _gantry,
     "3rrr": _three_rrr,
     "five_bar": _five_bar,
     "hexapod": _hexapod,

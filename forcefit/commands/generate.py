@@ -102,7 +102,7 @@ def generate(
 
     from assembly.exchange.robot_files import load_robot
     from validation.multibody.simulation import SimulationFailed, without_clearance
-    from validation.synthetic.design import CampaignDesign
+    from validation.synthetic.design import CampaignDesign, varied_for
     from validation.synthetic.draws import NotApplicable
     from validation.synthetic.generator import (
         Noise,
@@ -130,6 +130,7 @@ def generate(
         humidity=humidity,
         reference_point=(x, y, z),
     )
+    design = varied_for(design, wanted)
     checked("--error-size", error_size, "rad", least=0)
     noise = Noise(rotation, position, outliers, missing, hidden_frame)
     check_new_folder(folder)

@@ -1,6 +1,8 @@
 """Which configurations, loads and conditions a synthetic campaign measures."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +37,8 @@ class CampaignDesign:
             ``"constant"``: 6 K.
         command: ``"joints"`` or ``"pose"``, what is written as commanded.
         humidity: whether a covariate of that name is recorded [%].
+        tilt: [rad] size of a covariate of that name, 0 if it is not recorded.
+        gravity: [m/s^2] recorded, straight down.
         reference_point: [m] the point measured, where loads act, platform axes.
         corners: whether half of the configurations have every drive at an end of its
             reach.
@@ -49,6 +53,8 @@ class CampaignDesign:
     temperature: str = "swing"
     command: str = "joints"
     humidity: bool = False
+    tilt: float = 0.0
+    gravity: float = 0.0
     reference_point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     corners: bool = False
 
@@ -74,6 +80,29 @@ class CampaignDesign:
                 f"design: found {self.configurations} configurations in {self.rows} "
                 "rows; expected at least one, and no more than rows"
             )
+
+
+def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
+    """A design that varies what effects depend on.
+
+    Args:
+        design: any.
+        names: of the effects.
+
+    Returns:
+        The design with more conditions, if the effects need them.
+    """
+    given: dict[str, Any] = {}
+    for name in names:
+        if name == "_humidity":
+            given["humidity"] = True
+        elif name == "_quadratic_temperature":
+            given["temperature"] = "around"
+        elif name == "_tilting":
+            given["tilt"] = 1e-4
+        elif name == "body_mass":
+            given["gravity"] = 9.81
+    return replace(design, **given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +153,11 @@ def plan_campaign(
         phase = rng.uniform(0, 2 * np.pi)
         humidity = 40 + 8 * np.sin(2 * np.pi * time / 4100 + phase)
         conditions["humidity"] = (humidity + rng.normal(0, 0.5, count)).round(1)
+    if design.tilt:
+        slow = np.cumsum(rng.normal(size=count))
+        conditions["tilt"] = design.tilt * (slow - slow[0]) / np.ptp(slow)
+    if design.gravity:
+        conditions["gravity.z"] = np.full(count, -design.gravity)
     names = [frame.name for frame in robot.frames]
     rows = tuple(
         Row(

@@ -11,6 +11,11 @@ from validation.synthetic.effects import LIBRARY, SCREW, Parameters, own_complia
 from validation.synthetic.machine import Hidden
 from validation.synthetic.outside import OUTSIDE
 
+_SHAPES = (
+    "phase", "exponent", "time_constant", "order", "at", "period", "knee",
+)  # fmt: skip
+SLIDING = ("_lead", "_lead_backlash")  # effects of slides alone
+
 
 class NotApplicable(ValueError):
     """A robot has nothing on which an effect acts."""
@@ -54,7 +59,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
         last = key.rpartition(".")[2]
-        if last in ("phase", "exponent", "time_constant", "order", "at"):
+        if last in _SHAPES:
             continue
         if name in ("drive_compliance", "base_compliance", "_pose_stiffness"):
             given[key] = value / factor
@@ -63,7 +68,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
             given[key] = value / factor**exponent
         elif name == "modulus_scale":  # its compliance grows in proportion
             given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
-        elif name == "load_gain" and key == "factor":
+        elif key == "factor":
             given[key] = 1.0 + factor * (value - 1.0)
         else:
             given[key] = value * factor
@@ -81,6 +86,11 @@ def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
 
 def _beams(robot: Robot) -> list[Frame]:
     return [f for f in robot.frames if isinstance(f.link, BeamLink)]
+
+
+def _bodies(robot: Robot) -> list[Frame]:
+    """Beams, or all bodies of some length of a robot that has none."""
+    return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 
 def _drives(robot: Robot) -> list[Frame]:
@@ -104,7 +114,13 @@ def _weight(robot: Robot, duration: float, rng: np.random.Generator) -> Paramete
 
 
 def _expansion(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return dict.fromkeys(_some(_beams(robot), rng), 2e-5)
+    return dict.fromkeys(_some(_bodies(robot), rng), 2e-5)
+
+
+def _delayed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    names = _some(_bodies(robot), rng)
+    late = [f"{name}.time_constant" for name in names]
+    return dict.fromkeys(names, 2e-5) | dict.fromkeys(late, rng.uniform(500, 2000))
 
 
 def _drive_springs(
@@ -123,7 +139,7 @@ def _offsets(robot: Robot, duration: float, rng: np.random.Generator) -> Paramet
 
 
 def _lengths(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
-    return _errors(_some(_beams(robot), rng), rng)
+    return _errors(_some(_bodies(robot), rng), rng)
 
 
 def _errors(names: list[str], rng: np.random.Generator) -> Parameters:
@@ -186,6 +202,22 @@ def _gain(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters
     return {"factor": factor, **dict(zip(names, offset.tolist(), strict=True))}
 
 
+def _heavier(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    heavy = [f for f in robot.frames if f.mass]
+    if not heavy:
+        raise NotApplicable("no body has a declared mass")
+    name = heavy[rng.integers(len(heavy))].name
+    given = {f"{name}.mass": rng.uniform(0.2, 0.6)}
+    if rng.random() < 0.5:
+        moment = rng.uniform(-0.03, 0.03, 3).tolist()
+        given |= {f"{name}.moment.{k}": v for k, v in zip("xyz", moment, strict=True)}
+    return given
+
+
+def _measuring(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {"factor": 1.0 + rng.choice([-1e-4, 1e-4])}
+
+
 def _stiffening(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
     return {}
 
@@ -232,6 +264,31 @@ def _slipping(robot: Robot, duration: float, rng: np.random.Generator) -> Parame
     return {f"{name}.jump": 1e-4, f"{name}.at": duration * rng.uniform(0.3, 0.7)}
 
 
+def _screws(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    given = {}
+    for name in _some([f for f in _drives(robot) if f.joint == "prismatic"], rng):
+        given[f"{name}.amplitude"] = 1e-5 * rng.uniform(0.5, 1.0)
+        given[f"{name}.phase"] = rng.uniform(-math.pi, math.pi)
+        given[f"{name}.period"] = rng.choice([0.004, 0.005, 0.01, 0.016, 0.02])
+    return given
+
+
+def _stepped(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    drives = _drives(robot)
+    name = drives[rng.integers(len(drives))].name
+    soft, hard = rng.permutation([1e-5, 3e-6]).tolist()
+    return {f"{name}.below": soft, f"{name}.above": hard, f"{name}.knee": 4.0}
+
+
+def _pushed(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    drives = _drives(robot)
+    return {drives[rng.integers(len(drives))].name: 5e-5}
+
+
+def _turned(robot: Robot, duration: float, rng: np.random.Generator) -> Parameters:
+    return {"gain": rng.uniform(0.7, 1.3)}
+
+
 def _nothing() -> Parameters:
     raise NotApplicable("no turning drive")
 
@@ -248,6 +305,7 @@ def _sagging(robot: Robot, duration: float, rng: np.random.Generator) -> Paramet
 _DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
     "self_weight": _weight,
     "thermal_expansion": _expansion,
+    "delayed_expansion": _delayed,
     "drive_compliance": _drive_springs,
     "base_compliance": _foundation,
     "encoder_offset": _offsets,
@@ -259,6 +317,8 @@ _DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
     "friction_hysteresis": _friction,
     "contact_stiffening": _contacts,
     "load_gain": _gain,
+    "body_mass": _heavier,
+    "device_scale": _measuring,
     "geometric_stiffening": _stiffening,
     "drift": _drifting,
     "_pose_stiffness": _mesh,
@@ -271,6 +331,11 @@ _DRAWS: dict[str, Callable[[Robot, float, np.random.Generator], Parameters]] = {
     "_load_friction": _pressed,
     "_cable": _pulling,
     "_slipped": _slipping,
+    "_lead": _screws,
+    "_lead_backlash": _screws,
+    "_two_steps": _stepped,
+    "_torque_backlash": _pushed,
+    "_tilting": _turned,
     "_stand": _stand,
     "_sag": _sagging,
 }

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from assembly.model.robot import BASE, BeamLink, Clearance, Frame, Robot
 from validation.multibody.beams import beam_span
 from validation.multibody.motion import placement, turned
+from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
 
 SCREW = ("rx", "ry", "rz", "tx", "ty", "tz")
 WRENCH = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -36,41 +37,13 @@ class Row:
     Attributes:
         coordinates: [rad or m] of every joint in the nominal configuration, by frame.
         load: (6,) [N m, N] recorded, at the reference point, base axes.
-        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and any others.
+        covariates: ``temperature`` [K], ``time`` [s], ``approach`` and any others;
+            ``gravity.x`` .. ``gravity.z`` [m/s^2] act.
     """
 
     coordinates: Mapping[str, float]
     load: NDArray
     covariates: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class PowerLawSpring:
-    """A joint spring with load = coefficient x abs(deflection)^exponent.
-
-    Attributes:
-        coefficient: [N m/rad^n or N/m^n].
-        exponent: [-] n, at least 1.
-    """
-
-    coefficient: float
-    exponent: float
-
-    def secant(self, deflection: float) -> float:
-        """[N m/rad or N/m] at a deflection, of a nanometre at least."""
-        bent = max(abs(deflection), 1e-9)
-        return float(self.coefficient * bent ** (self.exponent - 1.0))
-
-
-@dataclass(frozen=True)
-class ClearanceLaw:
-    """Clearance of a joint on an open chain, where the load determines its position.
-
-    Attributes:
-        clearance: its bounds.
-    """
-
-    clearance: Clearance
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +64,9 @@ class Machine:
     coordinates: Mapping[str, float]
     load: NDArray
     gravity: NDArray = field(default_factory=lambda: np.zeros(3))
-    laws: Mapping[str, "PowerLawSpring | ClearanceLaw"] = field(default_factory=dict)
+    laws: Mapping[str, PowerLawSpring | TwoStepSpring | ClearanceLaw] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,16 +108,19 @@ def sprung(frame: Frame, stiffness: float) -> NDArray:
 
 
 def beam_length(robot: Robot, name: str) -> float:
-    """[m] declared length of a frame's beam."""
+    """[m] declared length of a frame's beam, or between its body's joints."""
     frame = robot.frame(name)
-    assert isinstance(frame.link, BeamLink)
+    if not isinstance(frame.link, BeamLink):
+        return float(np.linalg.norm(frame.translation))
     return beam_span(frame, frame.link)[0]
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """A robot one of whose beams is built longer [m], along its own actual axis."""
+    """A robot one of whose bodies is built longer [m], along its own actual axis."""
     frame = robot.frame(name)
-    assert isinstance(frame.link, BeamLink)
+    if not isinstance(frame.link, BeamLink):  # along the line between its joints
+        longer = 1.0 + change / float(np.linalg.norm(frame.translation))
+        return with_frame(robot, replace(frame, translation=longer * frame.translation))
     length, x = beam_span(frame, frame.link)
     axis = x / np.linalg.norm(x)
     error = frame.geometric_error.copy()
@@ -183,6 +161,15 @@ def _thermal_expansion(machine: Machine, row: Row, given: Parameters) -> Machine
     kelvin, robot = row.covariates["temperature"], machine.robot
     for name, strain in given.items():
         robot = lengthened(robot, name, strain * kelvin * beam_length(robot, name))
+    return replace(machine, robot=robot)
+
+
+def _delayed_expansion(machine: Machine, row: Row, given: Parameters) -> Machine:
+    robot = machine.robot
+    for name in named(given, "time_constant"):
+        kelvin = row.covariates[f"behind {given[f'{name}.time_constant']!r}"]
+        change = given[name] * kelvin * beam_length(robot, name)
+        robot = lengthened(robot, name, change)
     return replace(machine, robot=robot)
 
 
@@ -275,6 +262,20 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
     return replace(machine, load=given.get("factor", 1.0) * machine.load + offset)
 
 
+def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A body is heavier [kg]; its centre moves by moment [kg m] over its mass."""
+    robot = machine.robot
+    keys = ("mass", "moment.x", "moment.y", "moment.z")
+    for name in dict.fromkeys(n for key in keys for n in named(given, key)):
+        frame = robot.frame(name)
+        more = given.get(f"{name}.mass", 0.0)
+        moment = np.array([given.get(f"{name}.moment.{k}", 0.0) for k in "xyz"])
+        mass = frame.mass + more
+        centre = frame.centre_of_mass + moment / mass
+        robot = with_frame(robot, replace(frame, mass=mass, centre_of_mass=centre))
+    return replace(machine, robot=robot)
+
+
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
     return machine  # the simulation has it anyway; a linear model lacks it
 
@@ -286,6 +287,13 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
     measured = pose.copy()
     measured[:3, 3] += pose[:3, :3] @ tool
     return placement(screw[:3], screw[3:]) @ measured
+
+
+def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
+    """All lengths that the device measures from its origin are too long."""
+    measured = pose.copy()
+    measured[:3, 3] *= given["factor"]
+    return measured
 
 
 def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
@@ -308,15 +316,20 @@ CHANGES: dict[str, Change] = {
     "base_compliance": _base_compliance,
     "encoder_offset": _encoder_offset,
     "encoder_eccentricity": _encoder_eccentricity,
+    "delayed_expansion": _delayed_expansion,
     "link_length": _link_length,
     "modulus_scale": _modulus_scale,
     "joint_clearance": _joint_clearance,
     "friction_hysteresis": _friction_hysteresis,
     "contact_stiffening": _contact_stiffening,
     "load_gain": _load_gain,
+    "body_mass": _body_mass,
     "geometric_stiffening": _geometric_stiffening,
 }
-POSES: dict[str, Moved] = {"registration": _registration}  # of the pose (4, 4)
+POSES: dict[str, Moved] = {  # of the pose (4, 4)
+    "registration": _registration,
+    "device_scale": _device_scale,
+}
 READINGS: dict[str, Moved] = {"drift": _drift}  # of the reading (6,)
 COVARIATES: dict[str, tuple[str, ...]] = {  # that change the machine
     "thermal_expansion": ("temperature",),

@@ -25,6 +25,8 @@ from validation.synthetic.machine import Hidden, simulate_readings
 SAME = 10.0  # left of a chi square below which noise hides the difference
 _DRIFTS = (0.1, 0.3, 1.0)  # time constants tried, in durations
 _STEP = 1e-5  # [rad, m] of a finite difference
+_GRAM = 1e-3  # [kg, kg m] likewise
+MOMENTS = ("moment.x", "moment.y", "moment.z")
 _SOFT = 1e9  # [N m/rad, N/m] of a spring put in for a finite difference
 
 
@@ -120,7 +122,8 @@ def _of_drives_and_lengths(
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
     offsets = {n: differences.unloaded("encoder_offset", n, _STEP) for n in drives}
-    lengths = [differences.unloaded("link_length", f.name, _STEP) for f in beams]
+    bodies = beams or [f for f in robot.frames if f.translation.any()]
+    lengths = [differences.unloaded("link_length", f.name, _STEP) for f in bodies]
     softer = {
         n: differences.loaded("drive_compliance", n, _SOFT, 1 / _SOFT) for n in drives
     }
@@ -158,6 +161,12 @@ def _of_loads(
     recorded = [k for k in range(6) if loads[:, k].any()]
     gain = sum(loads[:, [k]] * unit_loads[k] for k in range(6))
     yield "load_gain", _columns([np.asarray(gain), *(unit_loads[k] for k in recorded)])
+    heavy = [f.name for f in campaign.robot.frames if f.mass]
+    if "gravity.z" not in campaign.plan.rows[0].covariates:
+        heavy = []
+    keys = [f"{n}.{k}" for n in heavy for k in ("mass", *MOMENTS)]
+    masses = [differences.unloaded("body_mass", key, _GRAM) for key in keys]
+    yield "body_mass", _columns(masses)
 
 
 def _of_the_device(
@@ -167,6 +176,8 @@ def _of_the_device(
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
+    one = differences.unloaded("device_scale", "factor", 1.0 + _STEP) * (1 / _STEP + 1)
+    yield "device_scale", _columns([one])
     for share in _DRIFTS:
         rise = -np.expm1(-time / (share * time.max()))
         yield f"drift({share:g})", _columns([rise * axis for axis in np.eye(6)])

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from assembly.model.robot import BASE, Frame, Robot
 from validation.multibody.motion import placement, shifted, turn_of
+from validation.synthetic.delays import behind, with_delays
 from validation.synthetic.effects import (
     CHANGES,
     COVARIATES,
@@ -73,6 +74,11 @@ def simulate_readings(
     pointed = with_point(robot, reference_point)
     changing = [effect for effect in effects if effect.name in _ALL_CHANGES]
     used = sorted({c for e in changing for c in _ALL_COVARIATES.get(e.name, ())})
+    late = {
+        value for e in changing for key, value in e.parameters.items()
+        if key.endswith(".time_constant")
+    }  # fmt: skip
+    rows, used = with_delays(rows, late), [*used, *map(behind, late)]
     machines: dict[tuple, Machine] = {}
     nominal: dict[tuple, NDArray] = {}
     keys: list[tuple] = []
@@ -120,7 +126,8 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
 
 def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
     """The machine of a row, with the effects that change it."""
-    machine = Machine(robot, row.coordinates, row.load)
+    gravity = np.array([row.covariates.get(f"gravity.{k}", 0.0) for k in "xyz"])
+    machine = Machine(robot, row.coordinates, row.load, gravity)
     for effect in changing:
         change = _ALL_CHANGES[effect.name]
         machine = change(machine, row, effect.parameters)

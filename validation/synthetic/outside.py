@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.robot import BASE, Clearance, Frame
 from validation.synthetic.effects import (
     SCREW,
+    SENSOR,
     Change,
     Machine,
     Moved,
@@ -21,8 +23,10 @@ from validation.synthetic.effects import (
     insert_after,
     lengthened,
     misread,
+    named,
     sprung,
 )
+from validation.synthetic.laws import ClearanceLaw, TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -107,6 +111,62 @@ def _slipped(machine: Machine, row: Row, given: Parameters) -> Machine:
     return machine
 
 
+def _lead(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A slide's position has waves of its screw: one each so many metres."""
+    for name in named(given, "period"):
+        turns = row.coordinates[name] / given[f"{name}.period"]
+        wave = math.sin(2 * math.pi * turns + given[f"{name}.phase"])
+        change = given[f"{name}.amplitude"] * wave
+        machine = misread(machine, name, "lead", change)
+    return machine
+
+
+def _lead_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """Backlash of a screw that varies over its turn."""
+    for name in named(given, "period"):
+        turns = row.coordinates[name] / given[f"{name}.period"]
+        share = 1.0 + 0.8 * math.sin(2 * math.pi * turns + given[f"{name}.phase"])
+        change = given[f"{name}.amplitude"] * row.covariates["approach"] * share
+        machine = misread(machine, name, "backlash", change)
+    return machine
+
+
+def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A joint has one compliance below a load, and another for what exceeds it."""
+    robot, laws = machine.robot, dict(machine.laws)
+    for name in named(given, "knee"):
+        keys = ("below", "above", "knee")
+        law = TwoStepSpring(*(given[f"{name}.{key}"] for key in keys))
+        K = sprung(robot.frame(name), law.secant(0.0))
+        robot = insert_after(robot, name, "steps", joint_stiffness=K)
+        laws[f"{name}~steps"] = law
+    return replace(machine, robot=robot, laws=laws)
+
+
+def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """A gear's teeth touch on the side to which the drive's load pushes them."""
+    robot, laws = machine.robot, dict(machine.laws)
+    for name, play in given.items():
+        frame = robot.frame(name)
+        turns = frame.joint == "revolute"
+        K = sprung(frame, SENSOR[0 if turns else 1])
+        robot = insert_after(robot, name, "teeth", joint_stiffness=K)
+        bound = Clearance(**{"spin" if turns else "axial": play})
+        laws[f"{name}~teeth"] = ClearanceLaw(bound)
+    return replace(machine, robot=robot, laws=laws)
+
+
+def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
+    """The ground turns, by a factor of what a sensor on it reads."""
+    new, screw = "base~tilt", np.zeros(6)
+    screw[0] = given["gain"] * row.covariates["tilt"]
+    frames = [
+        replace(f, parent=new) if f.parent == BASE else f for f in machine.robot.frames
+    ]
+    ground = Frame(new, BASE, geometric_error=screw)
+    return replace(machine, robot=replace(machine.robot, frames=(ground, *frames)))
+
+
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
     """The device's stand yields with the square of the load: c (f/100 N)^2."""
     squared = float(row.load[3:] @ row.load[3:]) / 1e4
@@ -131,6 +191,11 @@ OUTSIDE_CHANGES: dict[str, Change] = {
     "_load_friction": _load_friction,
     "_cable": _cable,
     "_slipped": _slipped,
+    "_lead": _lead,
+    "_lead_backlash": _lead_backlash,
+    "_two_steps": _two_steps,
+    "_torque_backlash": _torque_backlash,
+    "_tilting": _tilting,
 }
 OUTSIDE_READINGS: dict[str, Moved] = {"_stand": _stand, "_sag": _sag}
 OUTSIDE_COVARIATES: dict[str, tuple[str, ...]] = {
@@ -140,6 +205,8 @@ OUTSIDE_COVARIATES: dict[str, tuple[str, ...]] = {
     "_uneven_backlash": ("approach",),
     "_load_friction": ("approach",),
     "_slipped": ("time",),
+    "_lead_backlash": ("approach",),
+    "_tilting": ("tilt",),
 }
 OUTSIDE = {
     "_pose_stiffness": "a drive is softer in some poses than in others",
@@ -152,6 +219,11 @@ OUTSIDE = {
     "_load_friction": "friction that grows with the size of the load",
     "_cable": "a cable pulls by what grows with a coordinate",
     "_slipped": "a drive's zero jumps at a time",
+    "_lead": "a slide's position has waves of its screw",
+    "_lead_backlash": "backlash that varies over a turn of a screw",
+    "_two_steps": "a joint's compliance changes above some load",
+    "_torque_backlash": "backlash on the side to which a drive's load pushes",
+    "_tilting": "the ground turns by a factor of what a sensor reads",
     "_stand": "the measuring device's stand yields with the square of the load",
     "_sag": "the measured target sags with the size of the load",
 }

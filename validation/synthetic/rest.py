@@ -24,13 +24,12 @@ from validation.multibody.simulation import (
     simulate_assembly,
 )
 from validation.synthetic.effects import (
-    ClearanceLaw,
     Machine,
-    PowerLawSpring,
     Rest,
     sprung,
     with_frame,
 )
+from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
 from validation.synthetic.springs import rest_on_springs
 
 _ELEMENTS = 2  # of a beam; corrected ones need no more at deflections this small
@@ -85,6 +84,12 @@ def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
             deflection = (abs(wrench[axis]) / law.coefficient) ** (1.0 / law.exponent)
             largest = max(largest, abs(deflection - abs(screw[axis])) / _SETTLED)
             K = sprung(robot.frame(frame.parent), law.secant(deflection))
+            new = replace(frame, joint_stiffness=K)
+        elif isinstance(law, TwoStepSpring):
+            stiffness = law.secant(wrench[axis])
+            change = abs(wrench[axis]) / stiffness - abs(screw[axis])
+            largest = max(largest, abs(change) / _SETTLED)
+            K = sprung(robot.frame(frame.parent), stiffness)
             new = replace(frame, joint_stiffness=K)
         else:
             position = _clearance_position(law, wrench)

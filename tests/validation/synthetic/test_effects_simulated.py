@@ -25,12 +25,16 @@ SPRING = np.diag([np.inf, np.inf, 2e4, np.inf, np.inf, np.inf])
 EFFECTS = {
     "self_weight": {"g.x": 1.0, "g.z": -9.81},
     "thermal_expansion": {"leg1.elbow": 2e-5},
+    # two rows at one time: the body is as warm as the sensor
+    "delayed_expansion": {"leg1.elbow": 2e-5, "leg1.elbow.time_constant": 60.0},
     "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
     "base_compliance": {"stiffness.rx": 1e6, "stiffness.tz": 1e7},
     "encoder_offset": {"leg3.drive": 1e-4},
     "encoder_eccentricity": {"leg1.drive.amplitude": 2e-4, "leg1.drive.phase": 0.7},
     "link_length": {"leg2.elbow": 4e-5},
     "registration": {"base.rz": 1e-4, "base.tx": 2e-4, "tool.ty": -1e-4},
+    "device_scale": {"factor": 1.0005},
+    "body_mass": {"leg2.elbow.mass": 0.5, "leg2.elbow.moment.x": 0.02},
     "modulus_scale": {"leg2.elbow": 0.8, "leg1.elbow": 1.3},
     "friction_hysteresis": {"leg1.drive": 0.5},
     "contact_stiffening": {"leg2.drive.coefficient": 1e6, "leg2.drive.exponent": 1.5},
@@ -105,9 +109,13 @@ def test_an_effect_adds_what_the_machine_that_has_it_shows(
     """
     conditions, rows = machine
     conditions = replace(conditions, exact=True)
-    if name in {"link_length", "thermal_expansion"}:
+    if name in {"link_length", "thermal_expansion", "delayed_expansion"}:
         conditions = replace(conditions, load=0 * conditions.load)
         rows = [replace(row, load=np.zeros(6)) for row in rows]
+    if name == "body_mass":
+        conditions = replace(conditions, gravity=np.array([[0, 0, -9.81]] * 2))
+        weight = {"gravity.z": -9.81}
+        rows = [replace(r, covariates={**r.covariates, **weight}) for r in rows]
     there = apply_effects(conditions, {name: EFFECTS[name]})
     added = predict(there).deviation - predict(conditions).deviation
     with_it, without = (

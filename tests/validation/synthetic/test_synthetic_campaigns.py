@@ -21,8 +21,8 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
 from validation.campaign.campaign_file import read_campaign
 from validation.multibody.simulation import without_clearance
-from validation.synthetic.design import CampaignDesign, plan_campaign
-from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
+from validation.synthetic.design import CampaignDesign, plan_campaign, varied_for
+from validation.synthetic.draws import SLIDING, NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import LIBRARY, Row
 from validation.synthetic.equivalents import alternatives
 from validation.synthetic.generator import Noise, generate_campaign, write_campaign
@@ -50,6 +50,14 @@ def two_axes(spring=SPRING):
     return Robot("two_axes", "tool", frames).with_errors(errors)
 
 
+def sliding():
+    """A turning arm on a slide."""
+    slide = Frame("slide", joint="prismatic", actuated=True)
+    first, *others = two_axes().frames
+    on_it = replace(first, parent="slide", rotation=np.array([0, 1.0, 0]))
+    return Robot("sliding", "tool", (slide, on_it, *others))
+
+
 def quick(wanted, robot=None, **given):
     design = given.pop("design", SMALL)
     robot = robot or two_axes()
@@ -72,8 +80,9 @@ def test_a_plan_is_interleaved_with_repeats_and_rests():
 
 @pytest.mark.parametrize("name", [*LIBRARY, *OUTSIDE])
 def test_every_effect_reaches_its_strength(name):
-    design = replace(SMALL, humidity=True, temperature="around")
-    campaign = quick({name: 5.0}, design=design, seed=4)
+    design = varied_for(SMALL, [name])
+    robot = sliding() if name in SLIDING else two_axes()
+    campaign = quick({name: 5.0}, robot, design=design, seed=4)
     assert campaign.strength[name] == pytest.approx(5.0, rel=0.05)
 
 
@@ -272,7 +281,8 @@ QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
      for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
 )  # fmt: skip
 def test_an_effect_is_its_own_best_explanation(name):
-    readings = alternatives(quick({name: 5.0}, seed=6))
+    design = varied_for(SMALL, [name])
+    readings = alternatives(quick({name: 5.0}, design=design, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
     bound = 60.0 if name in ("drift", "contact_stiffening") else 1.0
     assert own < bound  # a time constant and contacts beside springs are not linear

@@ -1,0 +1,55 @@
+"""Laws of a simulated joint that are not linear."""
+
+from dataclasses import dataclass
+
+from assembly.model.robot import Clearance
+
+
+@dataclass(frozen=True)
+class PowerLawSpring:
+    """A joint spring with load = coefficient x abs(deflection)^exponent.
+
+    Attributes:
+        coefficient: [N m/rad^n or N/m^n].
+        exponent: [-] n, at least 1.
+    """
+
+    coefficient: float
+    exponent: float
+
+    def secant(self, deflection: float) -> float:
+        """[N m/rad or N/m] at a deflection, of a nanometre at least."""
+        bent = max(abs(deflection), 1e-9)
+        return float(self.coefficient * bent ** (self.exponent - 1.0))
+
+
+@dataclass(frozen=True)
+class TwoStepSpring:
+    """A joint spring that is softer, or stiffer, above some load.
+
+    Attributes:
+        below: [rad/(N m) or m/N] compliance up to the knee.
+        above: the same of what exceeds it.
+        knee: [N m or N] > 0.
+    """
+
+    below: float
+    above: float
+    knee: float
+
+    def secant(self, load: float) -> float:
+        """[N m/rad or N/m] under a load, of a millionth of the knee at least."""
+        size = max(abs(load), 1e-6 * self.knee)
+        more = max(size - self.knee, 0.0)
+        return size / (self.below * (size - more) + self.above * more)
+
+
+@dataclass(frozen=True)
+class ClearanceLaw:
+    """Clearance of a joint on an open chain, where the load determines its position.
+
+    Attributes:
+        clearance: its bounds.
+    """
+
+    clearance: Clearance
