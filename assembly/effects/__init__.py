@@ -8,7 +8,10 @@ it; the foundation adds a frame, so it comes last.
 from collections.abc import Mapping
 
 from assembly.effects.base_compliance import BASE_COMPLIANCE
+from assembly.effects.body_mass import BODY_MASS
 from assembly.effects.contact_stiffening import CONTACT_STIFFENING
+from assembly.effects.delayed_expansion import DELAYED_EXPANSION
+from assembly.effects.device_scale import DEVICE_SCALE
 from assembly.effects.drift import DRIFT
 from assembly.effects.drive_compliance import DRIVE_COMPLIANCE
 from assembly.effects.effect import Effect, Values
@@ -32,12 +35,15 @@ LIBRARY: dict[str, Effect] = {
     for effect in (
         SELF_WEIGHT,
         THERMAL_EXPANSION,
+        DELAYED_EXPANSION,
         DRIVE_COMPLIANCE,
         ENCODER_OFFSET,
         ENCODER_ECCENTRICITY,
         LINK_LENGTH,
         REGISTRATION,
+        DEVICE_SCALE,
         MODULUS_SCALE,
+        BODY_MASS,
         JOINT_CLEARANCE,
         FRICTION_HYSTERESIS,
         CONTACT_STIFFENING,

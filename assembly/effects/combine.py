@@ -106,13 +106,26 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
     return {**declared, **found}
 
 
+def _delayed(declared: Values, found: Values) -> dict[str, float]:
+    """Expansions of different bodies, or of one time constant."""
+    both = _sum(declared, found)
+    for key in set(declared) & set(found):
+        if key.endswith(".time_constant"):
+            if not math.isclose(found[key], declared[key], rel_tol=1e-9):
+                raise ValueError("two delays of one body are no single delay")
+            both[key] = declared[key]
+    return both
+
+
 _COMBINE: dict[str, Callable[[Values, Values], dict[str, float]]] = {
     "drive_compliance": _in_series,
     "base_compliance": _in_series,
     "modulus_scale": _product,
     "load_gain": _load,
+    "device_scale": _product,
     "encoder_eccentricity": _eccentricity,
     "registration": _registration,
     "drift": _drift,
+    "delayed_expansion": _delayed,
     "contact_stiffening": _contact,
 }

@@ -49,6 +49,10 @@ class Effect:
             (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
         unit: of a parameter, from the robot and the parameter's public name.
         frames: frames of a robot at which it can act; None if it acts at none.
+        device_alone: whether it is an error of the measuring device; a function that
+            does the same is the machine's, and likelier.
+        refines: the effect that it becomes in a limit, ``""`` for none.
+        tried: frames at which it is looked for; all of those if absent.
         components: public parameters below a frame's name (``""``: the name itself), or
             in all.
         unknowns: of the fit: at each frame, or in all.
@@ -65,6 +69,7 @@ class Effect:
         splits: whether each of its unknowns may act alone.
         follows_load: whether its unknowns ``offset.<c>`` belong to components of the
             load that a campaign records.
+        weighs: whether it acts by gravity alone.
     """
 
     name: str
@@ -82,6 +87,10 @@ class Effect:
     device: tuple[str, ...] = ()
     splits: bool = False
     follows_load: bool = False
+    weighs: bool = False
+    refines: str = ""
+    device_alone: bool = False
+    tried: Callable[[Robot], tuple[str, ...]] | None = None
 
 
 def at(frame: str, kind: str) -> str:

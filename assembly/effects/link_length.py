@@ -1,7 +1,7 @@
-"""A body is longer than declared, along its beam's axis."""
+"""A body is longer than declared, along its beam or the line between its joints."""
 
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import beams, lengthening, with_screws
+from assembly.effects.places import bodies, growing, lengthening, with_screws
 from assembly.measurement.conditions import Conditions
 
 
@@ -17,7 +17,8 @@ LINK_LENGTH = Effect(
     name="link_length",
     apply=_apply,
     unit=lambda robot, name: "m",
-    frames=beams,
+    frames=bodies,
+    tried=growing,
     components=("",),
     unknowns=lambda robot: (Unknown("", 1e-4),),
     by_row=True,

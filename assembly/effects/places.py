@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
+from stiffness.screws import rotation_matrix
+
+_LEAST = 1e-6  # [m] length of a body between two places
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
@@ -23,6 +26,37 @@ def turning_drives(robot: Robot) -> tuple[str, ...]:
 def beams(robot: Robot) -> tuple[str, ...]:
     """Frames whose body is a beam, which has an axis along which it lengthens."""
     return tuple(f.name for f in robot.frames if isinstance(f.link, BeamLink))
+
+
+def bodies(robot: Robot) -> tuple[str, ...]:
+    """Frames whose body has a length: beams, and others between two places."""
+    return tuple(
+        f.name
+        for f in robot.frames
+        if isinstance(f.link, BeamLink) or np.linalg.norm(f.translation) > _LEAST
+    )
+
+
+def growing(robot: Robot) -> tuple[str, ...]:
+    """Frames whose bodies may be longer: beams, or all of a robot without beams."""
+    return beams(robot) or bodies(robot)
+
+
+def body_axis(frame: Frame) -> tuple[float, NDArray]:
+    """Length and direction of a body.
+
+    Args:
+        frame: whose.
+
+    Returns:
+        [m] length, and (3,) unit vector in the frame's axes: of its beam; without one,
+        of the line from its parent's origin to its own.
+    """
+    if isinstance(frame.link, BeamLink):
+        return beam_axis(frame)
+    along = rotation_matrix(frame.rotation).T @ frame.translation
+    length = float(np.linalg.norm(along))
+    return length, along / length
 
 
 def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
@@ -52,8 +86,8 @@ def with_frame(
 
 
 def lengthening(frame: Frame) -> NDArray:
-    """(6,) screw of a beam that is longer by 1 m, in the frame's axes."""
-    return np.concatenate([np.zeros(3), beam_axis(frame)[1]])
+    """(6,) screw of a body that is longer by 1 m, in the frame's axes."""
+    return np.concatenate([np.zeros(3), body_axis(frame)[1]])
 
 
 def own_unit(robot: Robot, parameter: str) -> str:

@@ -1,15 +1,23 @@
-"""A body lengthens along its beam's axis by coefficient x length x temperature."""
+"""A body lengthens by coefficient x length x temperature.
+
+Along its beam, or the line between its joints.
+"""
 
 from assembly.effects.effect import Effect, Unknown, Values
-from assembly.effects.places import beams, lengthening, with_screws
+from assembly.effects.places import (
+    bodies,
+    body_axis,
+    growing,
+    lengthening,
+    with_screws,
+)
 from assembly.measurement.conditions import Conditions
-from assembly.model.robot import beam_axis
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     for name, coefficient in values.items():
         frame = conditions.robot.frame(name)
-        longer = coefficient * beam_axis(frame)[0] * conditions.temperature
+        longer = coefficient * body_axis(frame)[0] * conditions.temperature
         conditions = with_screws(conditions, name, longer[:, None] * lengthening(frame))
     return conditions
 
@@ -18,7 +26,8 @@ THERMAL_EXPANSION = Effect(
     name="thermal_expansion",
     apply=_apply,
     unit=lambda robot, name: "1/K",
-    frames=beams,
+    frames=bodies,
+    tried=growing,
     components=("",),
     unknowns=lambda robot: (Unknown("", 1e-5, -5e-4, 5e-4),),
     needs=("temperature",),

@@ -104,6 +104,8 @@ def _of(
         values = getattr(conditions, covariate)
         if not np.isfinite(values).all() or not np.any(values):
             return
+    if effect.weighs and not conditions.gravity.any():
+        return
     unknowns = effect.unknowns(conditions.robot)
     if effect.frames is None:
         for chosen in _choices(effect, unknowns, loads):
@@ -111,7 +113,7 @@ def _of(
                 effect, (), [((u.name,), u) for u in chosen], conditions
             )
         return
-    places = effect.frames(conditions.robot)
+    places = (effect.tried or effect.frames)(conditions.robot)
     for groups in _groupings(places, len(unknowns)):
         slots = [
             (tuple(at(f, u.name) for f in group), u)
@@ -193,17 +195,18 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
         robot: with the effects of its file.
 
     Returns:
-        The same, but for contact laws in joints that have one; a drift has the time
-        constant that the file declares, and springs may be stiffer than declared.
+        The same, but for contact laws and delays where there is one; a drift has the
+        time constant that the file declares, and springs may be stiffer than declared.
     """
-    contacts = {
-        key.removesuffix(".coefficient")
-        for key in robot.effects.get("contact_stiffening", {})
+    curved = {
+        (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
+        for name in _CURVED
+        for key in robot.effects.get(name, {})
     }
     constant = robot.effects.get("drift", {}).get("time_constant")
     kept: dict[Hypothesis, None] = {}
     for h in listed:
-        if h.effect == "contact_stiffening" and contacts & set(h.where):
+        if any((h.effect, frame) in curved for frame in h.where):
             continue
         if h.effect == "drift" and constant is not None:
             h = replace(h, slots=tuple(_held(s, constant) for s in h.slots))
@@ -214,6 +217,7 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
+_CURVED = ("contact_stiffening", "delayed_expansion")  # no two make one
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 

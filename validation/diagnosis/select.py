@@ -17,7 +17,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.common_noise import NONE, common_sizes, stable
-from validation.diagnosis.elements import label
+from validation.diagnosis.elements import Element, label
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
@@ -191,7 +191,8 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 def _merged(states: Sequence[State]) -> list[State]:
     """Merge models of equal predictions; the one with fewer functions is kept.
 
-    A function with the same columns as an effect of the library is that effect.
+    A function with the same columns as an effect of the library is that effect; but for
+    errors of the measuring device, which the machine may have as well.
 
     Returns:
         Models, best first.
@@ -209,15 +210,45 @@ def _merged(states: Sequence[State]) -> list[State]:
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
         if twin is None:
             kept.append(state)
-        elif _functions(state) < _functions(kept[twin]):
+        elif _rank(state) < _rank(kept[twin]):
             both = np.logaddexp(state.score, kept[twin].score)
             kept[twin] = replace(state, score=float(both))
-        elif _functions(state) > _functions(kept[twin]):
+        elif _rank(state) > _rank(kept[twin]):
             both = np.logaddexp(state.score, kept[twin].score)
             kept[twin] = replace(kept[twin], score=float(both))
         elif names_of(state) != names_of(kept[twin]):
             kept.append(state)
+    return _without_refinements(sorted(kept, key=lambda s: -s.score))
+
+
+def _without_refinements(states: Sequence[State]) -> list[State]:
+    """Merge models with an effect's refinement that is not clearly better than it."""
+    kept: list[State] = []
+    for state in sorted(states, key=lambda s: any(map(_refined, s.elements))):
+        plain = [_refined(e) or e.name for e in state.elements]
+        alike = [
+            k for k, other in enumerate(kept)
+            if any(map(_refined, state.elements))
+            and sorted(plain) == sorted(e.name for e in other.elements)
+            and other.score > state.score - _EQUAL
+        ]  # fmt: skip
+        if alike:
+            both = float(np.logaddexp(kept[alike[0]].score, state.score))
+            kept[alike[0]] = replace(kept[alike[0]], score=both)
+        else:
+            kept.append(state)
     return sorted(kept, key=lambda s: -s.score)
+
+
+def _refined(e: Element) -> str:
+    """Return the effect that an element's is a refinement of, or nothing."""
+    return LIBRARY[e.name].refines if e.name else ""
+
+
+def _rank(state: State) -> int:
+    """Return the order in which models of equal predictions are preferred."""
+    own = [e.name for e in state.elements if e.name]
+    return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
 
 def _functions(state: State) -> int:

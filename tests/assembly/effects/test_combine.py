@@ -17,6 +17,11 @@ FRAME_2 = {"base.rx": -0.1, "base.rz": 0.4, "base.ty": -0.5, "tool.tz": 1e-3}
 IN_TURN = {
     "self_weight": ({"g.z": -5.0}, {"g.x": 1.0, "g.z": -4.81}),
     "thermal_expansion": ({"j2": 2.34e-5}, {"j2": -1.14e-5, "tool": 1e-5}),
+    "delayed_expansion": (
+        {"j2": 2e-5, "j2.time_constant": 300.0},
+        {"j2": -1e-5, "j2.time_constant": 300.0, "tool": 1e-5,
+         "tool.time_constant": 90.0},
+    ),
     "drive_compliance": ({"j1": 4e4}, {"j1": 9e4, "j2": 1e5}),
     "encoder_offset": ({"j1": 2e-4}, {"j1": -3e-4, "j3": 1e-4}),
     "encoder_eccentricity": (
@@ -25,6 +30,10 @@ IN_TURN = {
     ),
     "link_length": ({"tool": 1e-4}, {"tool": 5e-5, "j2": -1e-4}),
     "registration": (FRAME_1, FRAME_2),
+    "device_scale": ({"factor": 1.001}, {"factor": 0.9995}),
+    "body_mass": (
+        {"tool.mass": 0.3, "tool.moment.x": 0.02}, {"tool.mass": -0.1, "j2.mass": 0.4}
+    ),
     "modulus_scale": ({"j2": 0.8}, {"j2": 0.9, "tool": 1.2}),
     "friction_hysteresis": ({"j1": 2.0}, {"j1": 1.0, "j2": -0.5}),
     "load_gain": ({"factor": 1.2, "offset.fx": 3.0}, {"factor": 0.9, "offset.fy": 1.0}),
@@ -52,7 +61,7 @@ def standing():
     placed = place_robot(robot, joints={"j1": 0.3, "j2": -0.4, "j3": 0.6})
     given = {"temperature": 6.0, "time": 900.0, "approach": 1.0}
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -10.0])
-    return as_declared(placed, load, covariates=given)
+    return as_declared(placed, load, gravity=[0, 0, -9.81], covariates=given)
 
 
 @pytest.mark.parametrize("name", IN_TURN)
@@ -107,6 +116,9 @@ def test_other_effects_stay_as_they_are():
 def test_what_is_no_single_effect_is_refused():
     """Springs in series whose laws differ in their exponents; two time constants."""
     law = {"a.coefficient": 1e7, "a.exponent": 1.5}
+    slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
+    with pytest.raises(ValueError, match="no single delay"):
+        combined({"delayed_expansion": slow}, {"delayed_expansion": slower})
     with pytest.raises(ValueError, match="no single contact law"):
         combined({"contact_stiffening": law}, {"contact_stiffening": law})
     other = {"b.coefficient": 2e7, "b.exponent": 2.0}

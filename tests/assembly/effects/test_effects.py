@@ -16,6 +16,7 @@ from assembly.kinematics.posture import place_robot
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict, read
 from assembly.measurement.settled_clearance import with_clearances_taken_up
+from assembly.measurement.variables import with_history
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 
@@ -122,6 +123,59 @@ def test_an_eccentric_encoder_errs_once_a_turn():
 def test_a_longer_link_is_longer():
     seen = change(here(arm()), "link_length", {"tip": 1e-4})
     assert seen == pytest.approx([0, 0, 0, 1e-4, 0, 0], abs=1e-18)
+
+
+@pytest.mark.parametrize("frame", ["drive", "tip"])
+def test_a_body_without_a_beam_grows_along_the_line_between_its_joints(frame):
+    """A drive 0.3 m above the base, and a bar to the tip at 0.4 rad."""
+    robot = arm(rigid=True)
+    first = replace(robot.frames[0], translation=np.array([0, 0, 0.3]))
+    robot = replace(robot, frames=(first, robot.frames[1]))
+    grown = {"drive": [0, 0, 0.3], "tip": [L * cos(0.4), L * sin(0.4), 0]}[frame]
+    there = here(robot, temperature=12.0, q=0.4)
+    warm = change(there, "thermal_expansion", {frame: 23e-6})
+    assert warm == pytest.approx([0, 0, 0, *(23e-6 * 12 * np.array(grown))], abs=1e-18)
+    longer = change(there, "link_length", {frame: 1e-4})
+    unit = np.array(grown) / np.linalg.norm(grown)
+    assert longer == pytest.approx([0, 0, 0, *(1e-4 * unit)], abs=1e-18)
+
+
+def test_a_body_lengthens_later_than_the_sensor_warms():
+    """Behind a ramp r t the body is at r (t - T + T exp(-t/T))."""
+    time, late = np.array([0.0, 50.0, 80.0, 300.0]), 100.0
+    placed = place_robot(arm(), joints={"drive": 0.0})
+    rows = replace(
+        placed,
+        coordinates=np.stack([placed.coordinates] * 4),
+        transforms=np.stack([placed.transforms] * 4),
+    )
+    covariates = {"temperature": 5.0 + 0.02 * time, "time": time}
+    there = with_history(as_declared(rows, covariates=covariates))
+    values = {"tip": 20e-6, "tip.time_constant": late}
+    warm = apply_effects(there, {"delayed_expansion": values})
+    seen = (predict(warm).deviation - predict(there).deviation)[:, 3]
+    kelvin = 5.0 + 0.02 * (time - late + late * np.exp(-time / late))
+    assert seen == pytest.approx(20e-6 * L * kelvin, rel=1e-12)
+
+
+def test_a_device_measures_all_lengths_too_long():
+    """From its own origin, which stands at (-1, 0, 0) and is turned by 90 degrees."""
+    there = here(arm(), q=0.4)
+    seen = change(there, "device_scale", {"factor": 1.001})
+    at = np.array([L * cos(0.4), L * sin(0.4), 0])
+    assert seen == pytest.approx([0, 0, 0, *(1e-3 * at)], abs=1e-15)
+    turned = replace(there, base=np.array([0, 0, pi / 2, 0, 1, 0]))
+    seen = change(turned, "device_scale", {"factor": 1.001})
+    assert seen[3:] == pytest.approx(1e-3 * np.array([-at[1], 1 + at[0], 0]), abs=1e-12)
+
+
+def test_a_heavier_body_sags_more():
+    """m g L^3/3 E I of a mass at the tip; a moment along x bends by m c g L^2/2 E I."""
+    there = replace(here(arm()), gravity=np.array([[0, 0, -G]]))
+    seen = change(there, "body_mass", {"tip.mass": 3.0})
+    assert seen[5] == pytest.approx(-3.0 * G * L**3 / (3 * E * I), rel=1e-9)
+    seen = change(there, "body_mass", {"tip.moment.x": 0.2})
+    assert seen[5] == pytest.approx(-0.2 * G * L**2 / (2 * E * I), rel=1e-6)
 
 
 def test_registration_turns_and_shifts_finitely():

@@ -126,7 +126,8 @@ def test_where_an_effect_can_act():
     drives, turning, beams = ("turn", "slide"), ("turn",), ("bar",)
     frames = {name: effect.frames for name, effect in LIBRARY.items() if effect.frames}
     assert {name: where(robot) for name, where in frames.items()} == {
-        "thermal_expansion": beams, "drive_compliance": drives,
+        "thermal_expansion": beams, "delayed_expansion": beams,
+        "body_mass": beams, "drive_compliance": drives,
         "encoder_offset": drives, "encoder_eccentricity": turning,
         "link_length": beams, "modulus_scale": beams,
         "joint_clearance": (*drives, "pin"), "friction_hysteresis": (),

@@ -26,6 +26,11 @@ ROWS = 12
 WRONG = {
     "self_weight": ({"g.z": -5.0}, {"g.x": 1.0, "g.y": 0.5, "g.z": -9.81}),
     "thermal_expansion": ({"j2": 2.34e-5}, {"j2": 1.2e-5}),
+    "delayed_expansion": (
+        {"j2": 2e-5, "j2.time_constant": 300.0},
+        {"j2": 2e-5, "j2.time_constant": 300.0, "tool": 3e-5,
+         "tool.time_constant": 200.0},
+    ),
     "drive_compliance": ({"j1": 9e4, "j2": 2e4}, {"j1": 3e4, "j2": 8e4, "j3": 5e4}),
     "encoder_offset": ({"j2": 2e-4}, {"j2": -3e-4}),
     "encoder_eccentricity": (
@@ -38,6 +43,12 @@ WRONG = {
         {"base.rx": -0.02, "base.ry": 1e-3, "base.rz": 0.01, "base.tx": 1e-3,
          "base.ty": -1e-3, "base.tz": 2e-3, "tool.tx": -1e-4, "tool.ty": 2e-4,
          "tool.tz": 1e-4},
+    ),
+    "device_scale": ({"factor": 1.002}, {"factor": 0.999}),
+    "body_mass": (
+        {"tool.mass": 0.4},
+        {"tool.mass": 0.1, "tool.moment.x": 0.03, "tool.moment.y": -0.02,
+         "tool.moment.z": 0.01},
     ),
     "modulus_scale": ({"j2": 0.8}, {"j2": 0.64}),
     # a joint declared with a clearance keeps it; another may have one
@@ -86,6 +97,8 @@ def test_what_is_fitted_beside_a_declared_effect_is_the_machine(name):
     """
     declared, true = WRONG[name]
     campaign = commanded(arm(**{name: declared}))
+    weight = {"gravity.z": np.full(ROWS, -9.81)} if name == "body_mass" else {}
+    campaign = replace(campaign, covariates={**campaign.covariates, **weight})
     seen = predicted(campaign, arm(**{name: true})).deviation
     campaign = replace(campaign, measured=seen)
     before = predicted(campaign).deviation

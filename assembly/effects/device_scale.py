@@ -1,0 +1,33 @@
+"""All lengths that the measuring device measures are a multiple of the true ones.
+
+Positions count from the device's origin: that of the registration, else the base's.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from assembly.effects.effect import Effect, Unknown, Values
+from assembly.measurement.conditions import Conditions
+from stiffness.screws import rotation_matrix
+
+
+def _apply(conditions: Conditions, values: Values) -> Conditions:
+    R = rotation_matrix(conditions.base[..., :3])
+    at = np.einsum("...ij,...j->...i", R, conditions.measured_points)
+    read = np.zeros((len(conditions), 6)) + conditions.reading
+    at = at + conditions.base[..., 3:] + read[:, 3:]
+    read[:, 3:] += (values.get("factor", 1.0) - 1.0) * at
+    return replace(conditions, reading=read)
+
+
+DEVICE_SCALE = Effect(
+    name="device_scale",
+    apply=_apply,
+    unit=lambda robot, name: "1",
+    frames=None,
+    components=("factor",),
+    unknowns=lambda robot: (Unknown("factor", 1e-4, 0.5, 2.0, 1.0),),
+    by_row=True,
+    device_alone=True,
+)
