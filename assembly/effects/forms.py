@@ -27,6 +27,8 @@ scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
 waves
 reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
 waves
+knee       ``below``, ``above``;          what of x is between -``at`` and ``at``; what
+           ``size``                       is beyond; -1 to 1, reached at ``at``
 ========== ============================== =====================================
 
 Sources:
@@ -197,6 +199,13 @@ def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
     return _stacked([inputs[0]] * len(names), inputs)
 
 
+def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
+    """The input is a load; its first part goes as far as the knee, either way."""
+    first = np.clip(inputs[0], -shapes["at"], shapes["at"])
+    parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
+    return _stacked([parts[name] for name in names], inputs)
+
+
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
     """(R, p) columns, each as long as the inputs."""
     rows = len(inputs[0])
@@ -233,10 +242,12 @@ FORMS: dict[str, Form] = {
              _reversal, remembers=True),
         Form("slip", "what slips after its variable turned", 1, {"depth": True}, None,
              ("size",), _slip, remembers=True),
-        Form("scaled_waves", "waves, times a second variable", 2, {}, (0, _MOST),
-             _WAVES, _scaled_waves, least=2),
-        Form("reversal_waves", "waves that turn with the direction", 2, {}, (0, _MOST),
-             _WAVES, _reversal_waves, remembers=True),
+        Form("scaled_waves", "waves, times a second variable", 2, {"period": False},
+             (0, _MOST), _WAVES, _scaled_waves, least=2),
+        Form("reversal_waves", "waves that turn with the direction", 2,
+             {"period": False}, (0, _MOST), _WAVES, _reversal_waves, remembers=True),
+        Form("knee", "one slope up to a load, another beyond it", 1, {"at": True}, None,
+             ("below", "above", "size"), _knee),
     )
 }  # fmt: skip
 

@@ -82,6 +82,8 @@ def _parameter_unit(
     if name in shape_names(form, len(given)):
         if name == "time_constant":
             return "s"
+        if name == "period":
+            return whole_unit(variable_unit(robot, turning_variables(function)[0]))
         return whole_unit(given[int(name[-1]) - 1 if name[-1].isdigit() else 0])
     powers = [0] * len(given)
     if form.name in {"powers", "reversal"}:
@@ -89,6 +91,8 @@ def _parameter_unit(
         given = given[-1:] if form.name == "reversal" else given
     elif form.name == "scaled_waves":
         powers = [0, 1]
+    elif form.name == "knee":
+        powers = [int(name != "size")]
     elif form.remembers and len(given) == 1:
         powers = [int(name == "gain" and function.variables[0] not in CLOCKS)]
     unit = dict(whole)
@@ -97,6 +101,15 @@ def _parameter_unit(
             unit[key] = unit.get(key, 0) - power * k
     text = unit_text(unit)
     return f"rad{text.removeprefix('1')}" if angle and text.startswith("1") else text
+
+
+def turning_variables(function: Function) -> tuple[str, ...]:
+    """Variables of a function of which a wave turns once each ``period``."""
+    if function.form == "reversal_waves":
+        return function.variables[-1:]
+    if function.form == "scaled_waves":
+        return function.variables[:1]
+    return function.variables if function.form in {"waves", "slow_wave"} else ()
 
 
 def whole_unit(unit: Unit) -> str:

@@ -15,7 +15,12 @@ from assembly.effects.functions import (
     parameters_of,
     variable_names,
 )
-from assembly.effects.units import result_unit, variable_unit, whole_unit
+from assembly.effects.units import (
+    result_unit,
+    turning_variables,
+    variable_unit,
+    whole_unit,
+)
 from assembly.measurement.variables import FORCE, LOADS
 from assembly.model.function import KINDS, PLACES, Function
 from assembly.model.robot import BASE, Robot
@@ -161,9 +166,10 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
                 raise table.bad("parameters", message)
         if form.name == "spline":
             _check_knots(table, function, component)
-    unturned = function.form == "waves" and any(
-        whole_unit(variable_unit(robot, name)) != "rad" for name in function.variables
-    )
+        if form.name == "knee" and own["at"] <= 0:
+            raise table.bad("parameters", f'"at": found {own["at"]:g}, expected > 0')
+    waving = turning_variables(function)
+    unturned = any(whole_unit(variable_unit(robot, name)) != "rad" for name in waving)
     if unturned and "period" not in function.parameters:
         message = '"period" is missing; waves of a variable that is no angle need it'
         raise table.bad("parameters", message)

@@ -41,6 +41,7 @@ class Campaign:
         repeat: (R,) number of the configuration under one load, from 0 by first use:
             rows that share it were measured twice.
         session: (R,) names of sessions; None where the file has none.
+        motion_units: ``rad`` or ``m`` of covariates that are measured motions, by name.
         points: (3,) [m] each, further points measured, platform axes, by name.
         per_session: names of further effects that may differ from session to session.
         partial: (R,) each, further covariates that some sessions lack: NaN there.
@@ -67,6 +68,7 @@ class Campaign:
     configuration: NDArray
     repeat: NDArray
     session: NDArray | None = None
+    motion_units: Mapping[str, str] = field(default_factory=dict)
     points: Mapping[str, NDArray] = field(default_factory=dict)
     point: NDArray | None = None
     partial: Mapping[str, NDArray] = field(default_factory=dict)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from assembly.exchange.robot_files import read_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
+from assembly.measurement.conditions import COVARIATES
 from assembly.model.robot import Robot
 from assembly.robots import BUILT_IN
 from forcefit.inputs.table import (
@@ -166,6 +167,11 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     table = join_tables([
         read_table(path, robot, declared.dialect, points) for path in declared.files
     ])
+    for name in declared.dialect.motions:
+        if f"cov.{name}" not in table.columns or name in COVARIATES:
+            units = declared.root.table("units")
+            message = f"found {quoted(name)}, expected a column of further covariates"
+            raise units.bad(f"cov.{name}", message)
     commanded = _commanded(table, robot)
     check_commands(table, robot)
     configuration = number_rows(_command(table, robot, commanded))
@@ -213,6 +219,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         configuration=configuration,
         repeat=number_rows(configuration, loads, *kinds),
         session=session,
+        motion_units=declared.dialect.motion_units,
         points=points,
         per_session=declared.per_session,
         point=np.array([*every], dtype=str)[which] if points else None,

@@ -5,7 +5,7 @@ All of it is declared in ``campaign.toml`` or is the default: comma, point, SI.
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from forcefit.inputs.table import Table
 
@@ -26,6 +26,8 @@ UNITS = {  # key of [units]: factor to SI of each unit it may name, SI first
     "time": {"s": 1.0, "min": 60.0, "h": 3600.0},
 }
 
+MOTIONS = _ANGLES | _LENGTHS
+
 
 @dataclass(frozen=True)
 class Dialect:
@@ -35,11 +37,13 @@ class Dialect:
         delimiter: between cells.
         decimal: the decimal mark.
         units: unit by key, those not given are SI.
+        motions: unit of each covariate that is a measured motion, by name.
     """
 
     delimiter: str
     decimal: str
     units: dict[str, str]
+    motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
         """The unit a key stands for."""
@@ -48,6 +52,11 @@ class Dialect:
     def factor(self, key: str) -> float:
         """What a number in that unit is times in SI."""
         return UNITS[key][self.unit(key)]
+
+    @property
+    def motion_units(self) -> dict[str, str]:
+        """``rad`` or ``m``: what each measured motion is, in SI."""
+        return {n: "m" if u in _LENGTHS else "rad" for n, u in self.motions.items()}
 
 
 def read_dialect(root: Table) -> Dialect:
@@ -63,6 +72,7 @@ def read_dialect(root: Table) -> Dialect:
         BadInput: a value or unit that is not known.
     """
     delimiter, decimal, units = ",", ".", {}
+    motions: dict[str, str] = {}
     if root.has("table"):
         table = root.table("table")
         delimiter = DELIMITERS[table.choice("delimiter", DELIMITERS, ",")]
@@ -74,8 +84,11 @@ def read_dialect(root: Table) -> Dialect:
     if root.has("units"):
         table = root.table("units")
         units = {k: table.choice(k, UNITS[k]) for k in UNITS if table.has(k)}
+        if table.has("cov"):
+            own = table.table("cov")
+            motions = {k: own.choice(k, MOTIONS) for k in own.content}
         table.finish()
-    return Dialect(delimiter, decimal, units)
+    return Dialect(delimiter, decimal, units, motions)
 
 
 def parse_number(cell: str, decimal: str) -> float:

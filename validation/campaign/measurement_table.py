@@ -27,7 +27,7 @@ from forcefit.inputs.errors import (
 )
 from forcefit.inputs.table import read_text
 from validation.campaign.campaign import LOAD, READING
-from validation.campaign.dialect import DELIMITERS, Dialect, parse_number
+from validation.campaign.dialect import DELIMITERS, MOTIONS, Dialect, parse_number
 
 _TEXTS = ("id", "session")  # columns that are no numbers
 
@@ -273,6 +273,9 @@ def _numbers(
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0
+    moved = table.dialect.motions.get(name.removeprefix("cov."))
+    if name.startswith("cov.") and moved is not None:
+        unit, factor = moved, MOTIONS[moved]
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         if not cell and name.startswith(("meas.", "sigma.")):

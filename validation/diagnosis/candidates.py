@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 from assembly.effects.forms import FORMS, roughness
 from assembly.effects.functions import AXES, basis
-from assembly.effects.places import beams, drives
+from assembly.effects.places import body_axis, drives, growing
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
-from assembly.model.robot import BeamLink, Robot, beam_axis
+from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.responses import Responses
@@ -37,6 +37,7 @@ TURN, SHIFT = AXES[:3], AXES[3:]
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
 _STEP = 1e-3  # of the largest load, for a derivative
+_BENT = 64  # columns of forms whose last number is being fitted that are kept
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 
 
@@ -109,6 +110,7 @@ class Sensitivities:
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
         self.basis = lru_cache(maxsize=None)(self._basis)
+        self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
         """The same of some rows.
@@ -178,13 +180,7 @@ class Sensitivities:
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
         """(R, q) columns of a form of variables, of order one, and T (p, q)."""
-        anywhere = CandidatePart("reading", ("tx",), *variables)
-        (function,) = Candidate((anywhere,), "screw", shape).functions()
-        if variables[0].startswith("wrench."):
-            raw = FORMS[shape.form].basis(shape.names, [self._wrench(*variables)], {})
-        else:
-            raw = np.nan_to_num(basis(self.conditions, function, shape.names))
-            raw[~is_known(self.conditions, *variables)] = 0.0
+        raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
@@ -202,37 +198,59 @@ class Sensitivities:
             mixed = np.eye(len(shape.names))
         return raw @ mixed, mixed
 
+    def _unmixed(
+        self, variables: tuple[str, ...], shape: CandidateShape
+    ) -> NDArray:  # fmt: skip
+        """(R, p) columns of a form of variables."""
+        if variables[0].startswith("wrench."):
+            wrench = [self._wrench(*variables)]
+            return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
+        anywhere = CandidatePart("reading", ("tx",), *variables)
+        (function,) = Candidate((anywhere,), "screw", shape).functions()
+        raw = np.nan_to_num(basis(self.conditions, function, shape.names))
+        raw[~is_known(self.conditions, *variables)] = 0.0
+        return raw
+
     def _wrench(self, name: str) -> NDArray:
         """(R,) [N m or N] what a joint carries as declared."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
 
-    def changes(self, one: Candidate) -> NDArray:
+    def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
         """What a candidate adds to the readings.
 
         Args:
             one: of m unknowns.
+            x: (m,) where it is linearised, or (m + 1,): the last is by how much the
+                number in which its form is not linear is larger.
 
         Returns:
-            (R, 6, m) [rad, m] per unknown.
+            (R, 6, m) or (R, 6, m + 1) [rad, m] per unknown.
         """
+        m = len(self.axes(one))
+        by = 0.0 if x is None or len(x) == m else float(x[-1])
         # unknown by unknown in memory, as they are made and put together
-        blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one)]
+        blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
+        if x is not None and len(x) > m:
+            step = _STEP * float(one.shape.bends[0])
+            more, less = (self.moved(one, x[:m], by + s) for s in (step, -step))
+            blocks.append((more - less)[None] / (2 * step))
         return np.moveaxis(np.concatenate(blocks), 0, 2)
 
-    def moved(self, one: Candidate, x: NDArray) -> NDArray:
+    def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
         """What a candidate with known numbers adds to the readings.
 
         Args:
             one: of m unknowns.
             x: (m,) their values.
+            by: how much larger the number is in which its form is not linear.
 
         Returns:
             (R, 6) [rad, m].
         """
         total, at = np.zeros((len(self.rows), 6)), 0
-        for sensitivity, columns in self._factors(one):
+        for sensitivity, columns in self._factors(one, by):
             own = slice(at, at + columns.shape[1])
             at = own.stop
             total += sensitivity * (columns @ x[own])[:, None]
@@ -249,10 +267,15 @@ class Sensitivities:
         ]
         return np.repeat(numbers, counts)
 
-    def _factors(self, one: Candidate) -> Iterator[tuple[NDArray, NDArray]]:
+    def _factors(
+        self, one: Candidate, by: float = 0.0
+    ) -> Iterator[tuple[NDArray, NDArray]]:
         """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
         for part in one.parts:
-            columns = self.basis(part.variables, one.shape)[0][self.rows]
+            columns, mixed = self.basis(part.variables, one.shape)
+            if by:
+                columns = self._raw(part.variables, one.shape.bent(by)) @ mixed
+            columns = columns[self.rows]
             for component in part.components:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
@@ -261,18 +284,23 @@ class Sensitivities:
 
         Args:
             one: a candidate of m unknowns.
-            x: (m,) their values.
-            std: (m,) their standard deviations, taken as independent.
+            x: (m,) their values; or (m + 1,), see :meth:`changes`.
+            std: their standard deviations, taken as independent.
 
         Returns:
             One function for each of its parts that the readings see; for each session,
             if some lack a variable of it.
         """
         functions, at = [], 0
+        m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
+        if len(x) > m:
+            ((key, _),) = one.shape.given
+            given, sure = dict(one.shape.bent(float(x[m])).given), {key: float(std[m])}
+            x = x[:m]
         least = _NOTHING * np.abs(x).max(initial=0.0)
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variables, one.shape)
-            numbers, spread = dict(one.shape.given), {}
+            numbers, spread = dict(given), dict(sure)
             shown = []  # components that the readings see
             alone = len(part.components) == 1
             for component in part.components:
@@ -368,7 +396,7 @@ def places_of(
 
     Yields:
         Kind, and where with what: components one by one and by three, drives together
-        each with its own coordinate, beams together along their axes.
+        each with its own coordinate, bodies together along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
@@ -377,7 +405,7 @@ def places_of(
     for name in (*(f.name for f in robot.frames), "base"):
         single += [(name, TURN), (name, SHIFT)]
     own = tuple((f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated)
-    along = tuple((name, _along(robot, name)) for name in beams(robot))
+    along = tuple((name, _along(robot, name)) for name in growing(robot))
     for name in variables:
         for where, components in single:
             yield "screw", (CandidatePart(where, components, name),)
@@ -392,10 +420,8 @@ def places_of(
 
 
 def _along(robot: Robot, name: str) -> tuple[str, ...]:
-    """Components of a beam's lengthening."""
-    frame = robot.frame(name)
-    assert isinstance(frame.link, BeamLink)
-    axis = np.abs(beam_axis(frame)[1])
+    """Components of a body's lengthening."""
+    axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
 
 

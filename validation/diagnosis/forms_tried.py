@@ -1,9 +1,10 @@
 """Forms in which a candidate may depend on its variable, general ones first."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
@@ -27,6 +28,17 @@ class CandidateShape:
     form: str
     names: tuple[str, ...]
     given: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def bends(self) -> NDArray:
+        """(0,) or (1,) the number in which it is not linear, if that is fitted."""
+        one = len(self.given) == 1 and self.form != "step"
+        return np.array([value for _, value in self.given] if one else [])
+
+    def bent(self, by: float) -> "CandidateShape":
+        """The form with that number larger."""
+        ((key, value),) = self.given
+        return replace(self, given=((key, value + by),))
 
 
 def waves(*orders: int) -> CandidateShape:

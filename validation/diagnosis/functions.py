@@ -36,7 +36,7 @@ from validation.diagnosis.candidates import (
     variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
-from validation.diagnosis.forms_tried import CandidateShape, is_angle
+from validation.diagnosis.forms_tried import CandidateShape
 from validation.diagnosis.gaussian import Marginal, evidence_gains
 from validation.diagnosis.places import Places, Weighted, Where
 
@@ -170,19 +170,32 @@ class Functions:
         if len(variables) > 1:
             prior -= math.log(2.0 * max(count - 1, 1))
         logs = forms.log_priors(shapes)
+        if variables[0].removeprefix("cov.") in self.campaign.motion_units:
+            # a measured motion most likely moves something in proportion
+            straight = np.array([shape == forms.STRAIGHT for shape in shapes])
+            logs = np.log((np.exp(logs) + straight) / 2)
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
         """Return the log prior of a form at one place."""
         known = self.shapes_of(variables)
-        return known.get(shape, min(known.values(), default=-math.inf))
+        if shape in known:
+            return known[shape]
+        alike = {
+            float(np.abs(np.log(s.bends / shape.bends)).sum()): prior
+            for s, prior in known.items()
+            if (s.form, s.names) == (shape.form, shape.names) and len(shape.bends)
+        }
+        return alike[min(alike)] if alike else min(known.values(), default=-math.inf)
 
     def first_look(self) -> list[Request]:
         """Return requests for general forms of every variable."""
-        return [
-            ((name,), tuple(forms.first(self.known(name), name)))
-            for name in self.variables
-        ]
+        requests: list[Request] = []
+        for name in self.variables:
+            shapes = forms.first(self.known(name), name)
+            shapes += forms.screw(self.known(name), name)
+            requests.append(((name,), tuple(shapes)))
+        return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
         """Return requests for products of given variables with all others."""
@@ -194,8 +207,9 @@ class Functions:
                     both = forms.of_two(known, name, other)
                 if both is not None and both[0] not in requests:
                     requests[both[0]] = tuple(both[1])
-            if is_angle(self.campaign.robot, name):
-                requests[(name,)] = (forms.of_direction(name),)
+            turned = forms.of_direction(self.conditions, name)
+            if turned:
+                requests[(name,)] = tuple(turned)
         return list(requests.items())
 
     def look(

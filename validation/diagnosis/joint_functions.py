@@ -1,15 +1,18 @@
 """Functions that act at several places, and cubic springs.
 
-Examples: all beams swell with humidity; all drives have backlash.  The form is the same
-at all places; each place has its own coefficients.
+Examples: all bodies swell with humidity; all drives have backlash.  The form is the
+same at all places; each place has its own coefficients.
 """
 
 import math
 from collections.abc import Iterator
 
+import numpy as np
 from numpy.typing import NDArray
 
+from assembly.effects.friction_hysteresis import elastic_joints
 from assembly.effects.functions import AXES
+from assembly.effects.places import drives
 from validation.diagnosis import shapes as forms
 from validation.diagnosis.candidates import Candidate, CandidatePart, places_of
 from validation.diagnosis.elements import Element
@@ -36,13 +39,13 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
     for kind, parts, tried in (*_by_kind(functions), *_at_drives(functions)):
         own = parts[0].variables
         listed += [(Candidate(parts, kind, s), functions.prior(own, s)) for s in tried]
-    listed += _cubic(functions)
+    listed += _of_wrench(functions)
     made = [some.element(one, prior) for one, prior in listed]
     return [e for e in made if e is not None and e.most > SIZES[0]]
 
 
-def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
-    """Return cubic springs at all joints."""
+def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
+    """Return springs at all joints that are cubic or have a knee, and backlash."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
@@ -51,11 +54,26 @@ def _cubic(functions: Functions) -> list[tuple[Candidate, float]]:
         wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
         part = CandidatePart(name, (component,), wrench)
         listed.append((Candidate((part,), kind, _CUBIC), prior))
+        knees = _knees(functions, name, component)
+        for shape in knees:
+            share = math.log(1.0 if shape.names == ("size",) else len(knees))
+            listed.append((Candidate((part,), "screw", shape), prior - share))
     return listed
 
 
+def _knees(functions: Functions, name: str, component: str) -> list[CandidateShape]:
+    """Return laws with a knee of what a drive or a spring carries along its motion."""
+    robot = functions.conditions.robot
+    frame, axis = robot.frame(name), AXES.index(component)
+    if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
+        return []
+    load = functions.sensitivities.wrenches[:, robot.index(name), axis]
+    # play of a slide along its own axis is a clearance of the library
+    return forms.knees(np.abs(load), jump=frame.joint == "revolute")
+
+
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions of all beams, and of all drives' own coordinates."""
+    """Return functions of all bodies, and of all drives' own coordinates."""
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
             known = functions.known(parts[0].variable)
@@ -88,7 +106,7 @@ def _at_drives(
             yield "screw", at(*both[0]), both[1]
     if all(is_angle(robot, f"q.{w}") for w, _ in own):
         turns = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)
-        yield "screw", turns, [forms.of_direction(turns[0].variable)]
+        yield "screw", turns, forms.of_direction(conditions, turns[0].variable)
         both = forms.of_two(conditions, turns[0].variable, "approach")
         if sided and both is not None:
             sides = tuple(CandidatePart(w, c, f"q.{w}", "approach") for w, c in own)

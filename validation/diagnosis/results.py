@@ -257,6 +257,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         parts = diagnosis.traced.selected.functions[k].range_error
         for function in functions:
             shown.append({
+                "label": function.title,
                 "where": function.where,
                 "components": list(function.components),
                 "variables": list(function.variables),

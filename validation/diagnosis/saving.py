@@ -5,6 +5,7 @@ errors carry their standard deviation as ``tolerance``, functions as ``std``.
 """
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.files.robot_file import write_robot
+from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import READING, Campaign
 from validation.diagnosis.diagnosis import Diagnosis
@@ -65,10 +67,28 @@ def functions_of(diagnosis: Diagnosis) -> list[list[Any]]:
     learned = zip(unknowns.functions, unknowns.slices[first:], strict=True)
     if unknowns.sensitivities is None:
         return []
+    units = diagnosis.campaign.motion_units
+    fitted = unknowns.sensitivities.fitted
     return [
-        unknowns.sensitivities.fitted(one.candidate, fit.x[own], std[own])
+        [_named(f, units) for f in fitted(one.candidate, fit.x[own], std[own])]
         for one, own in learned
     ]
+
+
+def _named(one: Function, units: Mapping[str, str]) -> Function:
+    """A function, labelled where a frame moves by a gain of a measured motion."""
+    name = one.variables[0].removeprefix("cov.")
+    kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
+    straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
+    first = all(k.rpartition(".")[2] == "1" for k in one.parameters)
+    if not straight or not first or one.variables[1:] or kinds != {units.get(name)}:
+        return one
+    words = ", ".join(
+        f"{k.rpartition('.')[0]} {v:.3g} +- {one.std[k]:.1g}".strip()
+        for k, v in one.parameters.items()
+    )
+    label = f"measured motion of {one.where} by {name}, gain {words}"
+    return replace(one, label=label)
 
 
 def _with_tolerances(diagnosis: Diagnosis) -> Robot:

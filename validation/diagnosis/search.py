@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.diagnosis import shapes as forms
 from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
@@ -37,6 +38,7 @@ _WIDEST = 600  # most columns of a function at several places
 _DROP = 1.0  # log posterior by which a larger model may be worse
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 _ROUNDS = 3  # of exchanges
+_HALVINGS = 6  # of the step of a number in which a form is not linear
 _MOVED = 0.3  # log posterior: least improvement
 
 
@@ -213,12 +215,15 @@ class Search:
     def _reformed(self, state: State) -> list[State]:
         """Return the model with its last function replaced by other forms."""
         last = state.elements[-1]
-        if last.name or last.candidate.parts[0].variable.startswith("wrench."):
+        if last.name:
             return []
         rest = state.elements[:-1]
         base = self.fit.state(rest, state.mode, state)
-        made = self._forms_of(last, base)
-        new = [self.fit.state((*rest, e), state.mode, base) for e in made if e]
+        made = [last]
+        if not last.candidate.parts[0].variable.startswith("wrench."):
+            made = [e for e in self._forms_of(last, base) if e]
+        made += [self._sharper(e, base) for e in made[:1]]
+        new = [self.fit.state((*rest, e), state.mode, base) for e in made]
         return [s for s in new if s.elements != state.elements]
 
     def _forms_of(self, last: Element, base: State) -> list[Element | None]:
@@ -233,7 +238,7 @@ class Search:
         tried = [
             Candidate(one.parts, one.kind, shape)
             for shape in priors
-            if len(shape.names) * count <= _WIDEST
+            if len(shape.names) * count <= _WIDEST and not forms.is_screw(shape)
         ]
         best: list[tuple[float, Element]] = []
         for candidate in tried:  # one by one: each may have hundreds of columns
@@ -249,6 +254,25 @@ class Search:
         base.forget()
         self._made |= {e.candidate: e for _, e in best}
         return [e for _, e in best]
+
+    def _sharper(self, e: Element, base: State) -> Element:
+        """Return a function with the number in which its form is not linear refined."""
+        one = e.candidate
+        if not len(one.shape.bends):
+            return e
+
+        def gain(e: Element) -> float:
+            dense = Dense([e], self.fit.cells, self.fit.whiten)
+            return float(dense.gains(base.marginal, FREEDOM)[0])
+
+        best = gain(e)
+        variables, conditions = one.parts[0].variables, self.functions.conditions
+        for k in range(_HALVINGS):
+            for shape in forms.near(conditions, variables, e.candidate.shape, 0.5**k):
+                near = self.functions.element(replace(one, shape=shape), e.log_prior)
+                if near is not None and gain(near) > best:
+                    best, e = gain(near), near
+        return e
 
     def _with_one_removed(self, state: State) -> list[State]:
         """Return the models that result from removing one element."""
@@ -287,6 +311,8 @@ class Search:
             }
             near.pop(out, None)
             tried = [(*base.elements, e) for e in [*near.values()][:_BEAM]]
+            if not out.name and out.candidate.shape.given:
+                tried.append((*base.elements, self._sharper(out, base)))
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:

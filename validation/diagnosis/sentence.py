@@ -109,7 +109,7 @@ def formula(function: Function) -> str:
     for component in function.components:
         numbers = parameters_of(function, component)
         terms = [
-            f"{numbers[key]:.4g} {_column_text(function.form, key, names)}".rstrip()
+            f"{numbers[key]:.4g} {_column_text(function, key, names)}".rstrip()
             for key in columns_of(function, component)
         ]
         words.append(f"{component} = {' + '.join(terms)}")
@@ -117,14 +117,21 @@ def formula(function: Function) -> str:
     return "; ".join(words) + times
 
 
-def _column_text(form: str, key: str, names: Sequence[str]) -> str:
-    """What a column of a form is, in words."""
+def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
+    """What a column of a function's form is, in words."""
+    form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
+    if form == "knee":
+        until = {"below": " up to ", "above": " beyond ", "size": "'s sign from "}
+        return f"{names[0]}{until[word]}{given['at']:.4g}"
     if form == "powers":
         orders = zip(names, key.split("."), strict=False)
         return " ".join(n if o == "1" else f"{n}^{o}" for n, o in orders if o != "0")
     if form == "waves" and head == "0":
         return ""
+    if form == "waves" and len(names) == 1 and "period" in given:
+        turns = f"2 pi {head} {names[0]}/{given['period']:.4g}"
+        return f"{'sin' if word == 'sine' else 'cos'}({turns})"
     if form == "waves" and len(names) == 1:
         return f"{'sin' if word == 'sine' else 'cos'}({head} {names[0]})"
     return f"{form}.{key}({', '.join(names)})"

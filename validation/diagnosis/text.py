@@ -78,8 +78,7 @@ def _learned_text(diagnosis: Diagnosis) -> list[str]:
     """Functions learned, each in two lines or three."""
     lines = []
     for one in learned(diagnosis):
-        where = f"{one['where']} {', '.join(one['components'])}"
-        lines.append(f"learned: {where} of {', '.join(one['variables'])}")
+        lines.append(f"learned: {one['label']}")
         formula = one["formula"]
         lines.append(f"  {formula if len(formula) < 160 else formula[:157] + '...'}")
         parts = one["parts_of_range"]

@@ -35,6 +35,7 @@ from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_error
 
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
+_BEND = 0.5  # of a number in which a function is not linear, likewise; and its bound
 _HELD = 1e-12  # plausible sizes, of an unknown whose value the file declares
 _STEP = 1e-4  # of an unknown's size, for its derivative
 
@@ -85,14 +86,20 @@ class LearnedFunction:
 
     Attributes:
         candidate: where it acts, of what, in which form.
-        std: (m,) of the prior of its coefficients.
+        coefficients: (m,) standard deviations of their prior.
     """
 
     candidate: Candidate
-    std: NDArray
+    coefficients: NDArray
 
     def __len__(self) -> int:
         return len(self.std)
+
+    @property
+    def std(self) -> NDArray:
+        """(m,) or (m + 1,): last that of the number in which it is not linear."""
+        bends = _BEND * self.candidate.shape.bends
+        return np.concatenate([self.coefficients, bends])
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +161,10 @@ class Unknowns:
                 lower[own], upper[own] = part.hypothesis.bounds
             elif isinstance(part, Small) and part.name != GEOMETRY:
                 lower[own] = 0.0
+            elif isinstance(part, LearnedFunction):
+                bends = part.candidate.shape.bends
+                upper[own.stop - len(bends) : own.stop] = _BEND * bends
+                lower[own.stop - len(bends) : own.stop] = -_BEND * bends
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
@@ -225,7 +236,7 @@ class Unknowns:
             elif isinstance(part, LearnedFunction):
                 assert self.sensitivities is not None
                 there = self.sensitivities.about(conditions, response)
-                J[:, :, own] = there.changes(part.candidate)
+                J[:, :, own] = there.changes(part.candidate, x[own])
             else:
                 for k in range(own.start, own.stop):
                     if lower[k] == upper[k]:

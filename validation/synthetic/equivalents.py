@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import BeamLink
+from validation.synthetic.delays import behind, with_delays
 from validation.synthetic.effects import SCREW, WRENCH, Row, own_compliance
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden, simulate_readings
@@ -134,10 +135,15 @@ def _of_drives_and_lengths(
     yield "link_length", _columns(lengths)
     warm = covariate["temperature"]
     yield "thermal_expansion", _columns([warm * length for length in lengths])
+    for share in _DRIFTS:
+        late = share * float(covariate["time"].max())
+        kelvin = [r.covariates[behind(late)] for r in with_delays(rows, [late])]
+        slow = np.array(kelvin)[:, None]
+        yield f"delayed_expansion({share:g})", _columns([slow * x for x in lengths])
     yield "drive_compliance", _columns(list(softer.values()))
     elastic = [n for n in drives if own_compliance(robot.frame(n)) > 0]
-    behind = [covariate["approach"] * offsets[n] for n in elastic]
-    yield "friction_hysteresis", _columns(behind)
+    friction = [covariate["approach"] * offsets[n] for n in elastic]
+    yield "friction_hysteresis", _columns(friction)
     stiffening = [_stiffening(softer[n], offsets[n]) for n in drives]
     yield "contact_stiffening", _columns(stiffening)
 

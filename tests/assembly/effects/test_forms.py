@@ -102,8 +102,23 @@ def test_variables_that_forms_may_have():
     assert {name: form.most for name, form in FORMS.items()} == {
         "powers": 2, "waves": 2, "spline": 2, "lag": 1, "creep": 1, "step": 1,
         "slow_wave": 1, "reversal": 2, "slip": 1, "scaled_waves": 2,
-        "reversal_waves": 2,
+        "reversal_waves": 2, "knee": 1,
     }  # fmt: skip
+
+
+def test_a_knee_has_one_slope_up_to_a_load_and_another_beyond_it():
+    """A spring of 2 rad/(N m) up to 3 N m, of 0.5 beyond; and a jump of 0.1."""
+    load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])
+    found = FORMS["knee"].basis(["below", "above"], [load], {"at": 3.0})
+    assert found @ [2.0, 0.5] == pytest.approx([-7, -6, -2, 0, 4, 8])
+    jump = FORMS["knee"].basis(["size"], [load], {"at": 0.5})
+    assert 0.1 * jump[:, 0] == pytest.approx([-0.1, -0.1, -0.1, 0, 0.1, 0.1])
+
+
+def test_waves_of_a_screw_come_again_each_lead():
+    side, x = np.array([1.0, -1.0, 1.0]), np.array([0.0, 0.0025, 0.0125])
+    found = FORMS["reversal_waves"].basis(["1.sine"], [side, x], {"period": 0.01})
+    assert found[:, 0] == pytest.approx([0, -1, 1])
 
 
 def test_scaled_waves_are_waves_times_the_second_variable():

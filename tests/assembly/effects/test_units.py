@@ -58,6 +58,19 @@ def test_waves_that_are_scaled_divide_by_their_second_variable_alone():
     assert units("drive", ("tx",), turned, "reversal_waves", ["1.sine"]) == ["m"]
 
 
+def test_a_period_has_the_unit_of_what_turns():
+    variables = ("approach", "position.x")
+    assert units("tip", ("rz",), variables, "reversal_waves", ["period"]) == ["m"]
+    variables = ("position.x", "load.fz")
+    assert units("tip", ("rz",), variables, "scaled_waves", ["period"]) == ["m"]
+
+
+def test_a_knee_is_a_slope_up_to_a_load_and_beyond_it():
+    names = ["below", "above", "size", "at"]
+    found = units("tip", ("tx",), ("load.fz",), "knee", names)
+    assert found == ["m/N", "m/N", "m", "N"]
+
+
 def test_a_depth_has_the_unit_of_what_slips():
     found = units("drive", ("tx",), ("load.fz",), "slip", ["size", "depth"])
     assert found == ["m", "N"]

@@ -65,6 +65,11 @@ REFUSED = {
     "a compliance of a reading": (('where = "drive"', 'where = "reading"\n'
         'kind = "compliance"'), 'kind: found "compliance" in the reading'),
     "an unknown key": (('session =', 'sesion ='), 'unknown key "sesion"'),
+    "a knee at no load": (('"waves"\nparameters = { "1.sine" = 1.2e-4, "1.cosine" = '
+        '-3e-5 }', '"knee"\nparameters = { size = 1e-4, at = 0.0 }'),
+        'parameters: "at": found 0, expected > 0'),
+    "waves of a load": (('["q.drive"]\nform = "waves"',
+        '["approach", "load.fz"]\nform = "reversal_waves"'), '"period" is missing'),
     "a spread of no number": (('session =', 'std = { "2.sine" = 1.0 }\nsession ='),
         'std: found "2.sine", which is no parameter'),
 }  # fmt: skip

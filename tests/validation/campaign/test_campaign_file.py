@@ -115,6 +115,19 @@ def test_declared_semicolons_decimal_commas_and_units_are_understood(tmp_path):
     np.testing.assert_array_equal(other.sigma, plain.sigma)  # [noise] is always SI
 
 
+def test_a_measured_motion_is_converted_to_si(tmp_path):
+    """An inclinometer in urad, a distance in mm; other covariates are as they are."""
+    head, extra = f"{HEAD},cov.tilt,cov.gap,cov.bed", "[units]\ncov.tilt = 'urad'\n"
+    rows = [f"{row},3,{k},5" for k, row in enumerate(ROWS)]
+    folder = write_campaign(tmp_path, head, rows, extra=f"{extra}cov.gap = 'mm'\n")
+    campaign = read_campaign(folder)
+    assert campaign.motion_units == {"tilt": "rad", "gap": "m"}
+    assert campaign.covariates["tilt"] == pytest.approx([3e-6] * 4)
+    assert campaign.covariates["gap"] == pytest.approx([0, 1e-3, 2e-3, 3e-3])
+    assert campaign.covariates["bed"] == pytest.approx([5.0] * 4)
+    assert campaign.take([0]).motion_units == campaign.motion_units
+
+
 def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
     folder = write_campaign(tmp_path)
     table = folder / "measurements.csv"
@@ -259,6 +272,11 @@ BAD_TOML = {
     "no noise": ({}, "", r"sigma.tx: no sigma; expected a cell here or \[noise\] "),
     "noise of 0": ({}, "[noise]\nposition = 0\n", r"noise.position: found 0, expected"),
     "unit": ({}, '[units]\nposition = "miles"\n', "found 'miles', expected .m. . .mm"),
+    "unit of a covariate": ({}, "[units]\ncov.time = 'rad'\n",
+        r"units.cov.time: found .time., expected a column of further covariates"),
+    "no such covariate": ({}, "[units]\ncov.tilt = 'rad'\n",
+        r"units.cov.tilt: found .tilt., expected a column of further covariates"),
+    "no motion": ({}, "[units]\ncov.tilt = 'K'\n", r"cov.tilt: found 'K', expected"),
     "unknown unit": ({}, '[units]\npostion = "m"\n', r'did you mean "position"\?'),
     "comma twice": ({}, '[table]\ndecimal = ","\n', r"decimal commas need delimiter"),
     "delimiter": ({}, '[table]\ndelimiter = "/"\n', r"delimiter: found '/', expected"),

@@ -35,6 +35,11 @@ def test_a_product_of_two_variables_names_both():
          "rz = 2e-05 sin(1 drive) + 3e-05 cos(2 drive)"),
         ("waves", {"0.cosine": 1e-3, "2.sine": 3e-5},
          "rz = 0.001 + 3e-05 sin(2 drive)"),
+        ("waves", {"1.sine": 2e-5, "period": 0.01},
+         "rz = 2e-05 sin(2 pi 1 drive/0.01)"),
+        ("knee", {"below": 2e-5, "above": 1e-6, "at": 4.0},
+         "rz = 2e-05 drive up to 4 + 1e-06 drive beyond 4"),
+        ("knee", {"size": 8e-5, "at": 0.01}, "rz = 8e-05 drive's sign from 0.01"),
         ("step", {"size": 2.0, "at": 0.5}, "rz = 2 step.size(drive)"),
     ],
 )  # fmt: skip

@@ -6,7 +6,7 @@ import pytest
 from assembly.model.robot import BeamLink, Frame, Robot
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis.diagnose import diagnose
-from validation.synthetic.design import CampaignDesign
+from validation.synthetic.design import CampaignDesign, varied_for
 from validation.synthetic.effects import LIBRARY
 from validation.synthetic.equivalents import SAME, alternatives
 from validation.synthetic.generator import generate_campaign, write_campaign
@@ -37,7 +37,8 @@ def arm(wider=1.0):
 def understood(wanted, seed, tmp_path):
     """Diagnosis of a fresh campaign, and the sets that its truth allows."""
     robot = arm(max(WIDE.get(name, 1.0) for name in wanted))
-    made = generate_campaign(robot, wanted, DESIGN, seed=seed, program="springs")
+    design = varied_for(DESIGN, wanted)
+    made = generate_campaign(robot, wanted, design, seed=seed, program="springs")
     write_campaign(made, tmp_path / "campaign")
     same = [one for one in alternatives(made, len(wanted)) if one.residual < SAME]
     allowed = {tuple(sorted(n.partition("(")[0] for n in one.names)) for one in same}

@@ -154,7 +154,7 @@ def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdic
     number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
     effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
     function = {
-        "where": "tool", "components": ["tx", "ty"], "variables": ["q.one"],
+        "label": "tool tx, ty of q.one",
         "formula": "x" * 200, "equivalent_places": [[], []],
         "parts_of_range": {"variable": "q.j1", "without": 5.0, "after": 1.25},
     }  # fmt: skip

@@ -1,0 +1,209 @@
+"""What people's machines have, hidden in simulated ones: found, named, and predicted.
+
+The simulation shares nothing with what is found.  Fresh rows are of the same machine at
+other configurations; no part of the diagnosis saw them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.files.robot_file import read_robot
+from assembly.model.robot import BeamLink, Frame, Robot
+from validation.campaign.campaign_file import read_campaign
+from validation.correction.prediction import foretell
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.results import table
+from validation.diagnosis.saving import save
+from validation.synthetic.design import CampaignDesign, plan_campaign
+from validation.synthetic.generator import generate_campaign, write_campaign
+from validation.synthetic.machine import Hidden, simulate_readings
+
+pytestmark = pytest.mark.slow
+
+SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
+SLIDE = np.diag([np.inf] * 5 + [3e6])
+TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
+POINT = (0.02, 0.05, 0.03)
+DESIGN = CampaignDesign(24, 116, load=40.0, reach=0.8, reference_point=POINT)
+LONG = replace(DESIGN, reach=1.0, size=0.1)  # slides of 0.2 m
+NEAR = 3.0  # standard deviations, within which a number is the true one
+
+
+def with_errors(name, *frames):
+    errors = np.random.default_rng(1).uniform(-1, 1, (len(frames), 6))
+    robot = Robot(name, "tool", frames)
+    return robot.with_errors(errors * np.repeat([1e-4, 5e-5], 3))
+
+
+def arm(link=TUBE):
+    """Elastic drives, none parallel to the next."""
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    return with_errors(
+        "arm",
+        Frame("j1", **turning),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], link=link, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], link=link, **turning),
+        Frame("tool", "j3", [0.3, 0.05, 0.1], link=link, mass=0.8),
+    )
+
+
+def longer_arm():
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    heavy = {"link": TUBE, "mass": 0.8}
+    return with_errors(
+        "arm",
+        Frame("j1", **turning),
+        Frame("j2", "j1", [0.1, 0, 0.3], [np.pi / 2, 0, 0.3], **heavy, **turning),
+        Frame("j3", "j2", [0.35, 0.1, 0], [0, np.pi / 3, 0], **heavy, **turning),
+        Frame("j4", "j3", [0.25, 0.1, 0.1], [np.pi / 3, 0, 0], **heavy, **turning),
+        Frame("tool", "j4", [0.2, 0.05, 0.1], **heavy),
+    )
+
+
+def gantry():
+    """Three slides and a turning head."""
+    sliding = {"joint": "prismatic", "actuated": True, "joint_stiffness": SLIDE}
+    turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
+    return with_errors(
+        "gantry",
+        Frame("x", "base", [0, 0, 0.5], [0, np.pi / 2, 0], **sliding),
+        Frame("y", "x", [0.1, 0, 0.2], [np.pi / 2, 0, 0], **sliding),
+        Frame("z", "y", [0.2, 0.1, 0], [0, np.pi / 2, 0], **sliding),
+        Frame("head", "z", [0.1, 0.1, 0.2], [0, np.pi / 3, 0], **turning),
+        Frame("tool", "head", [0.15, 0.05, 0.1], link=TUBE, mass=0.8),
+    )
+
+
+@pytest.fixture
+def hidden(tmp_path):
+    """Diagnosis of a machine with an effect five times the noise, and its truth."""
+
+    def find(robot, name, parameters, design=DESIGN, units=""):
+        effect = Hidden(name, parameters)
+        made = generate_campaign(
+            robot, [(effect, 5.0)], design, seed=7, program="springs"
+        )
+        other = np.random.default_rng(11)
+        plan = plan_campaign(robot, design, other)
+        exact = simulate_readings(
+            robot, made.reference_point, plan.rows, made.effects, "springs"
+        )
+        noise = made.sigma * other.normal(size=exact.shape)
+        fresh = replace(made, plan=plan, readings=exact + noise)
+        campaigns = []
+        for folder, one in (("learned", made), ("fresh", fresh)):
+            write_campaign(one, tmp_path / folder)
+            with open(tmp_path / folder / "campaign.toml", "a") as file:
+                file.write(units)
+            campaigns.append(read_campaign(tmp_path / folder))
+        found = diagnose(campaigns[0])
+        save(found, tmp_path / "robot.toml")
+        saved = read_robot(tmp_path / "robot.toml")
+        assert foretell(replace(campaigns[1], robot=saved)).error[2] < 1.1
+        return table(found), made.effects[0].parameters
+
+    return find
+
+
+def only(learned, *, where, form, of):
+    """The single function that was learned, or at a place that does as well."""
+    (one,) = learned["learned"]
+    others = [same[0]["where"] for same in one["equivalent_places"]]
+    assert where in [one["where"], *others]
+    assert (one["form"], one["variables"]) == (form, of)
+    assert learned["verdict"] == "learned"
+    return one["parameters"], one["std"]
+
+
+def assert_near(found, std, truth):
+    for key, value in truth.items():
+        assert abs(found[key] - value) < NEAR * std[key], key
+
+
+LEAD = {"y.amplitude": 1e-5, "y.phase": 0.7, "y.period": 0.012}
+
+
+def test_the_lead_of_a_screw_is_found(hidden):
+    """The period within 1 %, a sin(2 pi y/p + f) as its sine and its cosine."""
+    found, true = hidden(gantry(), "_lead", LEAD, LONG)
+    values, std = only(found, where="y", form="waves", of=["q.y"])
+    assert values["period"] == pytest.approx(0.012, rel=0.01)
+    a = true["y.amplitude"]
+    parts = {"1.sine": a * np.cos(0.7), "1.cosine": a * np.sin(0.7)}
+    assert_near(values, std, {"period": 0.012} | parts)
+
+
+def test_backlash_that_varies_over_a_turn_of_a_screw_is_found(hidden):
+    found, true = hidden(gantry(), "_lead_backlash", LEAD, LONG)
+    values, std = only(found, where="y", form="reversal_waves", of=["approach", "q.y"])
+    assert values["period"] == pytest.approx(0.012, rel=0.01)
+    a = true["y.amplitude"]
+    parts = {"1.sine": 0.8 * a * np.cos(0.7), "1.cosine": 0.8 * a * np.sin(0.7)}
+    assert_near(values, std, {"0.cosine": a} | parts)
+
+
+@pytest.mark.parametrize(("below", "above"), [(1e-5, 2e-6), (2e-6, 1e-5)])
+def test_a_joint_of_two_compliances_is_found(hidden, below, above):
+    given = {"j2.below": below, "j2.above": above, "j2.knee": 4.0}
+    found, true = hidden(arm(), "_two_steps", given)
+    values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
+    truth = {"at": "knee", "below": "below", "above": "above"}
+    assert_near(values, std, {k: true[f"j2.{v}"] for k, v in truth.items()})
+
+
+def test_backlash_on_the_side_of_the_load_is_found(hidden):
+    found, true = hidden(arm(), "_torque_backlash", {"j2": 5e-5})
+    values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
+    assert_near(values, std, {"size": true["j2"]})
+
+
+def claimed(found, name, where):
+    """Parameters and standard deviations of the only effect claimed."""
+    (one,) = found["effects"]
+    assert (found["verdict"], one["name"], one["where"]) == ("explained", name, where)
+    rows = one["parameters"]
+    return ({p["name"]: p[key] for p in rows} for key in ("value", "std"))
+
+
+def test_a_heavier_body_is_found(hidden):
+    """With its first moments, of which the centre of mass follows."""
+    given = {"j4.mass": 0.5, "j4.moment.x": 0.05, "j4.moment.y": 0.03}
+    weighed = replace(DESIGN, gravity=9.81)
+    found, true = hidden(longer_arm(), "body_mass", given, weighed)
+    assert_near(*claimed(found, "body_mass", ["j4"]), true)
+
+
+def test_a_device_that_measures_too_long_is_found(hidden):
+    """Not as links that are all longer by some length."""
+    found, true = hidden(arm(), "device_scale", {"factor": 1.0001})
+    assert_near(*claimed(found, "device_scale", []), true)
+
+
+@pytest.mark.parametrize(("name", "where"), [
+    ("thermal_expansion", ["j2", "j3", "tool"]), ("link_length", ["j3"])
+])  # fmt: skip
+def test_bodies_without_beams_that_grow_are_found(hidden, name, where):
+    found, true = hidden(arm(link=None), name, dict.fromkeys(where, 2e-5))
+    assert_near(*claimed(found, name, where), true)
+
+
+def test_bodies_warmer_later_than_the_sensor_are_found(hidden):
+    bodies = ["j2", "j3", "tool"]
+    given = dict.fromkeys(bodies, 2e-5)
+    given |= dict.fromkeys([f"{body}.time_constant" for body in bodies], 1000.0)
+    found, true = hidden(arm(), "delayed_expansion", given)
+    assert_near(*claimed(found, "delayed_expansion", bodies), true)
+
+
+def test_a_measured_motion_is_named(hidden):
+    found, true = hidden(
+        arm(), "_tilting", {"gain": 0.93}, replace(DESIGN, tilt=1e-4),
+        '[units]\ncov.tilt = "rad"\n',
+    )  # fmt: skip
+    values, std = only(found, where="j1", form="powers", of=["cov.tilt"])
+    assert_near(values, std, {"1": true["gain"]})
+    gain = f"{values['1']:.3g} +- {std['1']:.1g}"
+    named = f"measured motion of j1 by tilt, gain {gain}"
+    assert found["learned"][0]["label"] == named
