@@ -68,6 +68,8 @@ def design_signatures(
         elif name not in shown:
             needs = LIBRARY[name].needs
             lacking = [f"cov.{n}" for n in needs if not _given(campaign, n)]
+            if LIBRARY[name].weighs and not conditions.gravity.any():
+                lacking.append("cov.gravity.z")
             untestable[name] = (
                 f"needs {', '.join(lacking)}, not 0 in every row"
                 if lacking

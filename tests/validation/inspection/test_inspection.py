@@ -175,9 +175,16 @@ def test_a_correlation_is_that_of_numpy(rng):
 
 
 def test_at_one_temperature_heat_and_length_are_one(tmp_path, rng):
-    """Both lengthen the same beams; while it varies they are told apart."""
+    """Both lengthen the same beams; while it varies they are told apart.
+
+    A body that follows one temperature has it.
+    """
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
-    assert ("thermal_expansion", "link_length") in constant.separability.classes()
+    assert (
+        "thermal_expansion",
+        "delayed_expansion",
+        "link_length",
+    ) in constant.separability.classes()
     varied = inspect_campaign(elastic_campaign(tmp_path / "b", rng))
     assert not any("thermal_expansion" in c for c in varied.separability.classes())
     at_calibration = inspect_campaign(
@@ -259,12 +266,15 @@ def test_the_command_writes_everything(tmp_path, rng, run):
     }  # fmt: skip
     low, high = found["noise"]["interval"]
     assert low < found["noise"]["ratio"] < high
-    assert ["thermal_expansion", "link_length"] in found["inseparable"]
+    assert ["thermal_expansion", "delayed_expansion", "link_length"] in found[
+        "inseparable"
+    ]
     assert found["effects"]["geometric_stiffening"]["testable"] is False
     assert len(found["cosines"]["shared"]) == len(found["cosines"]["effects"])
     status, out, _ = run("validation", "inspect", tmp_path / "arm")
     assert status == 0
-    assert "cannot be told apart: thermal_expansion, link_length" in out
+    alike = "thermal_expansion, delayed_expansion, link_length"
+    assert f"cannot be told apart: {alike}" in out
     assert "What this campaign cannot tell:" in out
 
 
