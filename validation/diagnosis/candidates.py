@@ -36,6 +36,7 @@ from validation.diagnosis.responses import Responses
 TURN, SHIFT = AXES[:3], AXES[3:]
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
 _RANK = 1e-8
+_ROUNDING = 1e-12  # of the largest component of a vector
 _STEP = 1e-3  # of the largest load, for a derivative
 _BENT = 64  # columns of forms whose last number is being fitted that are kept
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
@@ -358,12 +359,22 @@ def variables_of(conditions: Conditions) -> list[str]:
     names += ["load.force", *(f"position.{axis}" for axis in "xyz")]
     names += ["cov.temperature", "time", "approach"]
     names += [f"cov.{name}" for name in conditions.covariates]
-    varied = []
-    for name in names:
-        known = is_known(conditions, name)
-        if known.any() and np.ptp(variable(conditions, name)[known]) > 0:
-            varied.append(name)
-    return varied
+    values = {
+        name: variable(conditions, name)[known]
+        for name in names
+        if (known := is_known(conditions, name)).any()
+    }
+    largest: dict[str, float] = {}
+    for name, x in values.items():
+        kind = _kind(name)
+        largest[kind] = max(largest.get(kind, 0.0), float(np.abs(x).max()))
+    return [n for n, x in values.items() if np.ptp(x) > _ROUNDING * largest[_kind(n)]]
+
+
+def _kind(name: str) -> str:
+    """Components of one vector; of a slide along x, z varies by rounding alone."""
+    vectors = "position.", "load.m", "load.f"
+    return next((v for v in vectors if name.startswith(v)), name)
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:

@@ -221,3 +221,35 @@ def test_what_was_varied_and_is_known_in_every_row_may_count():
         "q.drive", "load.fy", "load.force", "position.x", "position.y",
         "cov.temperature", "time",
     ]  # fmt: skip
+
+
+SLIDE = """
+name = "axis"
+platform = "carriage"
+[[frame]]
+name = "x"
+parent = "base"
+rotation = [0.0, 1.5707963267948966, 0.0]
+joint = "prismatic"
+actuated = true
+[[frame]]
+name = "carriage"
+parent = "x"
+rotation = [0.0, -1.5707963267948966, 0.0]
+"""
+
+
+def test_positions_and_loads_that_vary_by_rounding_are_no_variables(tmp_path):
+    """A slide turned by pi/2 as files write it: cos(pi/2) is 6e-17, not zero."""
+    (tmp_path / "slide.toml").write_text(SLIDE)
+    x = np.linspace(0.0, 0.5, 9).round(3)
+    lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]
+    table = tmp_path / "commands.csv"
+    table.write_text("\n".join(["id,q.x,load.fx,load.fy", *lines]) + "\n")
+    campaign = read_commands(table, read_robot(tmp_path / "slide.toml"))
+    conditions = conditions_of(campaign)
+    assert np.ptp(conditions.postures.platform[:, 2, 3]) > 0.0
+    found = variables_of(conditions)
+    assert {n for n in found if n[:4] in {"q.x", "posi", "load"}} == {
+        "q.x", "position.x", "load.fx", "load.force",
+    }  # fmt: skip
