@@ -304,12 +304,17 @@ def _widened(
     grid = _WIDENED.tolist() if len(machine) else [1.0]
     squares, taus = zip(*map(predicted, grid), strict=True)
     least = min(squares, key=np.sum)
-    for k, own, tau in zip(grid, squares, taus, strict=True):
-        more = own - least
-        error = float(more.std(ddof=min(1, len(more) - 1))) * np.sqrt(len(more))
-        if more.sum() <= max(_SURE * error, _MATTERS * len(z)):
-            break
-    return max(1.0, k * tau**2), tau
+    chosen = next(
+        i for i, own in enumerate(squares) if not _matters(own - least, len(z))
+    )
+    tau = taus[chosen]
+    return max(1.0, grid[chosen] * tau**2), tau
+
+
+def _matters(more: NDArray, count: int) -> bool:
+    """Whether blocks are predicted worse, beyond chance and a part of the noise."""
+    error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
+    return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
