@@ -42,8 +42,8 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
         if any(word in line for word in _WEIGHTY)
     ]
     remarks = tuple(f"{path.name}: {line}" for line in said)
-    robot = conversion.robot if close is None else close(conversion.robot)
-    return replace(robot, remarks=(*robot.remarks, *remarks))
+    robot = replace(conversion.robot, remarks=(*conversion.robot.remarks, *remarks))
+    return robot if close is None else close(robot)
 
 
 def read_robot(path: str | Path) -> Robot:

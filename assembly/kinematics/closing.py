@@ -6,7 +6,7 @@ robot's nominal geometry closes afterwards; its geometric errors make it the rob
 was given.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,42 @@ from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _OPEN = 1e-9  # [rad, m] what is left open where closures hold
 _SMALL = 0.1  # [rad, m] a geometric error is a small motion
+
+
+def closing_of(
+    rest: str | None = None,
+    mismatch: str | None = None,
+    joints: Mapping[str, float] | None = None,
+    own_errors: bool = True,
+) -> Callable[[Robot], Robot] | None:
+    """What makes a robot's closures hold, as ``--rest`` and ``--mismatch`` ask.
+
+    Args:
+        rest: name of a frame, see :func:`rest_in`.
+        mismatch: ``"spring"``, see :func:`preloaded`.
+        joints: coordinates of drives for the latter.
+        own_errors: whether the robot keeps its errors; else it has those alone that its
+            closures make, as where drawn errors replace its own.
+
+    Returns:
+        A function of the robot as declared; None where nothing is asked.
+
+    Raises:
+        BadInput: another mismatch than spring.
+    """
+    if mismatch not in {None, "spring"}:
+        raise BadInput(f'--mismatch: found "{str(mismatch)[:60]}", expected spring')
+    if rest is None and mismatch is None:
+        return None
+
+    def close(robot: Robot) -> Robot:
+        if not own_errors:
+            robot = robot.with_errors(np.zeros((len(robot.frames), 6)))
+        if rest is not None:
+            robot = rest_in(robot, rest)
+        return robot if mismatch is None else preloaded(robot, joints)
+
+    return close
 
 
 def rest_in(robot: Robot, name: str) -> Robot:

@@ -53,6 +53,8 @@ class ErrorSources:
         least: (m,) smallest size of s, uniform sources only; below 1.
         limit: (m,) largest size of s, truncated sources only.
         signed: (m,) bool: s takes both signs.
+        fixed: (n, 6) [rad, m] errors of the frames that every draw has, such as what
+            closures leave open; zero if None.
     """
 
     robot: Robot
@@ -64,6 +66,7 @@ class ErrorSources:
     least: NDArray
     limit: NDArray
     signed: NDArray
+    fixed: NDArray | None = None
     labels: tuple[str, ...] = field(init=False)
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -120,7 +123,7 @@ class ErrorSources:
         """(..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
         full = np.zeros((*values.shape[:-1], len(self.robot.frames), 6))
         full[..., self.frame, self.component] = values
-        return full
+        return full if self.fixed is None else full + self.fixed
 
     @property
     def mean(self) -> NDArray:
@@ -205,12 +208,15 @@ def tolerance_sources(
     )
 
 
-def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
+def read_sources(
+    path: Path | str, robot: Robot, fixed: NDArray | None = None
+) -> ErrorSources:
     """Error sources of a file; see ``docs/statistics.md``.
 
     Args:
         path: TOML file with ``[[errors]]`` tables.
         robot: whose frames they name.
+        fixed: (n, 6) [rad, m] errors that every draw has.
 
     Returns:
         The sources, in the order of the file, frames in the robot's order.
@@ -234,7 +240,7 @@ def read_sources(path: Path | str, robot: Robot) -> ErrorSources:
         seen[i, c] = table.place
     columns = zip(*(row for row, _ in rows), strict=True)
     return ErrorSources(
-        robot, **dict(zip(_COLUMNS, map(np.array, columns), strict=True))
+        robot, **dict(zip(_COLUMNS, map(np.array, columns), strict=True)), fixed=fixed
     )
 
 

@@ -165,6 +165,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
     numbers = [
         sources.frame, sources.component, sources.kind, sources.centre, sources.scale,
         sources.least, sources.limit, sources.signed, posture.transforms,
+        *([] if sources.fixed is None else [sources.fixed]),
     ]  # fmt: skip
     digest = sha256(b"".join(np.ascontiguousarray(n).tobytes() for n in numbers))
     return {

@@ -3,7 +3,6 @@
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.effects.robot_effects import check_covariates
 from assembly.exchange.robot_files import load_robot
-from assembly.kinematics.closing import rest_in
+from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import home_posture
 from assembly.linear.reach import READINGS
 from assembly.model.link_stress import stressed_names
@@ -26,6 +25,7 @@ from assembly.sweeps.quantities import Question
 from assembly.sweeps.targets import (
     Targets,
     grid_targets,
+    of_joints,
     parse_grid,
     parse_values,
     read_targets,
@@ -68,6 +68,8 @@ class SweepOptions:
         frequencies: how many natural frequencies.
         rest: a frame that takes what a closure leaves open, as
             :func:`assembly.kinematics.closing.rest_in`.
+        mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded,
+            as :func:`assembly.kinematics.closing.preloaded`.
     """
 
     grid: str | None = None
@@ -89,6 +91,7 @@ class SweepOptions:
     tangent: str | None = None
     frequencies: int | None = None
     rest: str | None = None
+    mismatch: str | None = None
 
 
 def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
@@ -104,19 +107,25 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
     """
-    rest = options.rest
-    if rest is not None and (options.vary or options.errors):
+    close = closing_of(options.rest, options.mismatch, own_errors=not options.errors)
+    if close is not None and options.vary:
+        option = "--rest" if options.rest is not None else "--mismatch"
         raise BadInput(
-            "--rest: found --vary or --errors, which replace the errors that it makes; "
-            "expected neither"
+            f"{option}: found --vary, which replaces the errors that it makes; "
+            "expected one of them"
         )
-    machine = load_robot(robot, None if rest is None else partial(rest_in, name=rest))
+    machine = load_robot(robot, close)
     check_covariates(machine, options.under)
     _check(options, machine)
     design = load_design(robot) if options.vary else None
     varied = _vary(design, options.vary) if design is not None else {}
     sources = _sources(options, machine, varied)
     targets = _targets(machine, options.grid, options.poses)
+    if options.mismatch is not None and of_joints(targets.names):
+        raise BadInput(
+            "--mismatch: found points given by drives, which would be preloaded "
+            "otherwise at each; expected poses, or assembly solve --joint for one"
+        )
     question = Question(
         machine,
         design=design,
@@ -185,7 +194,9 @@ def _sources(
         return None
     from assembly.model.error_distributions import read_sources
 
-    sources = read_sources(options.errors, machine)
+    closing = options.rest is not None or options.mismatch is not None
+    fixed = machine.errors if closing else None
+    sources = read_sources(options.errors, machine, fixed)
     drawn = [path for path in varied if ".geometric_error." in path]
     if drawn:
         raise BadInput(f"--vary {drawn[0]}: found beside --errors, which draws it")

@@ -204,6 +204,8 @@ def show(
     ] = None,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     load: LoadOption = None,
     exaggeration: Annotated[
         float | None, typer.Option(help="Factor on displacements.")
@@ -249,7 +251,7 @@ def show(
             "reading; expected frozen or free"
         )
     reading = reading or ("frozen" if loaded else "budget")
-    posture = posture_of(robot, pose, joint)
+    posture = posture_of(robot, pose, joint, rest, mismatch)
     for line in remark_lines(posture.robot.remarks):
         print(line)
     try:

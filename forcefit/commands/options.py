@@ -83,7 +83,8 @@ MismatchOption = Annotated[
     str | None,
     typer.Option(
         "--mismatch",
-        help="spring: redundant elastic drives take up what --joint leaves open.",
+        help="spring: redundant elastic drives take up what their coordinates "
+        "(--joint, or those at home) leave open.",
     ),
 ]
 
@@ -219,7 +220,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
 
 def posture_of(
     robot: str, pose: list[str] | None, joint: list[str] | None,
-    rest: str | None = None, mismatch: str | None = None,
+    rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
 ) -> Any:  # fmt: skip
     """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
 
@@ -229,6 +230,7 @@ def posture_of(
         joint: coordinates.
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
+        own_errors: whether the robot keeps its errors beside those of the two.
 
     Returns:
         The posture, of the robot as the effects of its file make it.
@@ -238,7 +240,8 @@ def posture_of(
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    applied = apply_robot_effects(declared_posture(robot, pose, joint, rest, mismatch))
+    declared = declared_posture(robot, pose, joint, rest, mismatch, own_errors)
+    applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
             f"{robot}: its effects load it; expected assembly solve or exact, or "
@@ -249,26 +252,17 @@ def posture_of(
 
 def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None,
-    rest: str | None = None, mismatch: str | None = None,
+    rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
 ) -> Any:  # fmt: skip
     """The posture of the options, of the robot without the effects of its file."""
     from assembly.exchange.robot_files import load_robot
-    from assembly.kinematics.closing import preloaded, rest_in
+    from assembly.kinematics.closing import closing_of
     from assembly.kinematics.posture import home_posture, place_robot
     from assembly.model.largest import LARGEST_LENGTH
-    from assembly.model.robot import Robot
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
-    if mismatch is not None and (mismatch != "spring" or pose):
-        found = f'"{mismatch[:60]}"' if mismatch != "spring" else "--pose"
-        raise BadInput(f"--mismatch: found {found}, expected spring, with --joint")
-
-    def close(machine: Robot) -> Robot:
-        machine = machine if rest is None else rest_in(machine, rest)
-        return machine if mismatch is None else preloaded(machine, joints)
-
-    machine = load_robot(robot, close if rest or mismatch else None)
-    if mismatch is not None:
+    machine = load_robot(robot, closing_of(rest, mismatch, joints, own_errors))
+    if mismatch is not None and not pose:
         return home_posture(machine)
     return place_robot(
         machine, joints=joints,
@@ -319,6 +313,13 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
     from assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
+        print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
+
+
+def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
+    """Say on stderr what ``--rest`` or ``--mismatch`` made of a robot."""
+    asked = [option for option in (rest, mismatch) if option is not None]
+    for remark in robot.remarks[len(robot.remarks) - len(asked) :]:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 

@@ -13,8 +13,11 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
+    note_closing,
     note_massless,
     parse_gravity,
     parse_load,
@@ -59,6 +62,8 @@ def statistics(
     joint: JointOption = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     draws: Annotated[
         int, typer.Option(help="Draws of all errors.", min=2, max=10**9)
     ] = 10_000,
@@ -133,9 +138,12 @@ def statistics(
         check_dataset(output, "draws")
     if figure is not None:
         check_writable(figure, PICTURE)
-    posture = posture_of(robot, pose, joint)
-    sources = read_sources(errors, posture.robot)
+    closing = rest is not None or mismatch is not None
+    posture = posture_of(robot, pose, joint, rest, mismatch, own_errors=not closing)
+    fixed = posture.robot.errors if closing else None
+    sources = read_sources(errors, posture.robot, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
+    note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)
     if said := posture_status(posture, wrench, g):
         whose = {"robot": posture.robot.name, "pose": posture.pose()}
@@ -225,6 +233,8 @@ def tolerances(
     ] = "free",
     play: PlayOption = "worst",
     contact_length: ContactLengthOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     fresh: Annotated[
         int,
         typer.Option(help="Fresh draws that verify the tolerances.", min=0, max=10**9),
@@ -249,6 +259,7 @@ def tolerances(
     from dataclasses import replace
 
     from assembly.exchange.robot_files import load_robot
+    from assembly.kinematics.closing import closing_of
     from assembly.kinematics.verdict import SINGULAR
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
@@ -271,7 +282,8 @@ def tolerances(
         check_dataset(output, "tolerances")
     if figure is not None:
         check_writable(figure, PICTURE)
-    machine = load_robot(robot)
+    machine = load_robot(robot, closing_of(rest, mismatch))
+    note_closing(machine, rest, mismatch)
     asked_plan = (
         None
         if plan is None

@@ -11,9 +11,11 @@ from forcefit.commands.options import (
     GravityOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     RestOption,
     RobotArgument,
     UnderOption,
+    note_closing,
     note_massless,
     parse_covariates,
     parse_gravity,
@@ -116,6 +118,7 @@ def sweep(
     gravity: GravityOption = None,
     under: UnderOption = None,
     rest: RestOption = None,
+    mismatch: MismatchOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes on this machine.", min=1, max=1024)
     ] = None,
@@ -164,12 +167,14 @@ def sweep(
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
                 tangent=tangent, frequencies=frequencies, rest=rest,
+                mismatch=mismatch,
             ),
         )  # fmt: skip
         if figure is not None:
             check_axes(dict(zip(asked.dims, asked.shape, strict=True)))
         update("robot", 1, 1)
     note_massless(asked.question.robot, g)
+    note_closing(asked.question.robot, rest, mismatch)
     done = [0]
     solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written

@@ -17,7 +17,9 @@ from forcefit.commands.options import (
     JointOption,
     JsonOption,
     LoadOption,
+    MismatchOption,
     PoseOption,
+    RestOption,
     RobotArgument,
     UnderOption,
     declared_posture,
@@ -32,7 +34,10 @@ from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from assembly.kinematics.posture import Posture
+    from assembly.model.robot import Robot
 
 app = typer.Typer(no_args_is_help=True)
 app.command()(diagnose)
@@ -61,13 +66,15 @@ ErrorsOption = Annotated[
 SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0, max=2**63 - 1)]
 
 
-def _with_errors(posture: "Posture", errors: Path | None, seed: int) -> "Posture":
-    """The posture with one draw of errors, or with the robot's own."""
+def _with_errors(
+    posture: "Posture", errors: Path | None, seed: int, fixed: "NDArray | None"
+) -> "Posture":
+    """The posture with one draw of errors, about fixed ones, or with its own."""
     if errors is None:
         return posture
     from assembly.model.error_distributions import read_sources
 
-    sources = read_sources(errors, posture.robot)
+    sources = read_sources(errors, posture.robot, fixed)
     errors_drawn = sources.errors(sources.draw(0, 1, seed)[0])
     return replace(posture, robot=posture.robot.with_errors(errors_drawn))
 
@@ -101,6 +108,8 @@ def crosscheck(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     errors: ErrorsOption = None,
     seed: SeedOption = 1,
     load: LoadOption = None,
@@ -149,6 +158,8 @@ def crosscheck(
     nothing is then compared.
     """
     from assembly.effects.robot_effects import apply_robot_effects
+    from assembly.exchange.robot_files import load_robot
+    from assembly.kinematics.closing import closing_of
     from validation.crosscheck.crosscheck import Crosscheck, attempt
     from validation.crosscheck.crosscheck import crosscheck as compare_models
     from validation.crosscheck.stiffness_check import StiffnessCheck, check_stiffness
@@ -164,8 +175,11 @@ def crosscheck(
     if grid is not None and (pose or joint or figure):
         raise BadInput("--grid: not together with --pose, --joint or --figure")
 
+    own = errors is None or rest is mismatch is None
+
     def compare(posture: "Posture") -> Crosscheck | StiffnessCheck:
-        with_errors = _with_errors(posture, errors, seed)
+        fixed = None if own else posture.robot.errors
+        with_errors = _with_errors(posture, errors, seed, fixed)
         applied = apply_robot_effects(with_errors, wrench, g, covariates)
         if stiffness:
             return check_stiffness(
@@ -187,9 +201,10 @@ def crosscheck(
         )
 
     if grid is not None:
-        _crosscheck_grid(robot, grid, compare, json)
+        machine = load_robot(robot, closing_of(rest, mismatch, own_errors=own))
+        _crosscheck_grid(machine, grid, compare, json)
         return
-    posture = declared_posture(robot, pose, joint)
+    posture = declared_posture(robot, pose, joint, rest, mismatch, own)
     results, failure = attempt(posture.robot.name, lambda: compare(posture))
     write_json(failure if results is None else results.table(), json)
     if json != "-":
@@ -203,14 +218,13 @@ def crosscheck(
 
 
 def _crosscheck_grid(
-    robot: str, grid: str, compare: "Callable[[Posture], Any]", json: str | None
+    machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
     """Every pose of a grid, with a progress bar."""
-    from assembly.exchange.robot_files import load_robot
     from assembly.sweeps.targets import parse_grid
     from validation.crosscheck.poses import check_poses, poses_table, poses_text
 
-    machine, axes = load_robot(robot), parse_grid(grid)
+    axes = parse_grid(grid)
     with progress_bars() as update:
         rows = check_poses(machine, axes, compare, lambda d, n: update("poses", d, n))
     write_json(poses_table(rows), json)
@@ -225,6 +239,8 @@ def validity(
     robot: RobotArgument,
     pose: PoseOption = None,
     joint: JointOption = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     errors: ErrorsOption = None,
     seed: SeedOption = 1,
     load: LoadOption = None,
@@ -275,7 +291,10 @@ def validity(
             raise BadInput("--figure: expected --solids too; nothing else is drawn")
         check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)
-    posture = _with_errors(posture_of(robot, pose, joint), errors, seed)
+    own = errors is None or rest is mismatch is None
+    posture = posture_of(robot, pose, joint, rest, mismatch, own)
+    fixed = None if own else posture.robot.errors
+    posture = _with_errors(posture, errors, seed, fixed)
     if grid is None and poses is None:
         costs = costs_at(posture, wrench, g, solids)
         table, text = costs_table(costs), costs_text(costs)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exchange.robot_files import load_robot
+from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import POSE
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
@@ -84,6 +85,8 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
     root = read_toml(path)
     robot = _robot(root, path.parent)
     robot, errors = _errors(root, robot)
+    if root.has("rest") or root.has("mismatch"):
+        errors = "; ".join([errors, *robot.remarks])
     source, meshes, accuracy = _links(root, robot)
     pose = _pose(root)
     grid = root.text("grid", " ").strip()
@@ -132,22 +135,39 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path) -> Robot:
-    """The robot: built in, or a file beside the study's."""
+    """The robot: built in, or a file beside the study's; its closures made to hold."""
     name = root.text("robot", expected="a built-in robot or a robot file")
     if name in BUILT_IN:
-        return load_robot(name)
+        return _closed(root, name)
     if not os.path.isfile(folder / name):
         problem = (
             f"found {quoted(name)}, neither a built-in robot nor a file beside this"
         )
         raise root.bad("robot", f"{problem}{nearest(name, BUILT_IN)}")
-    return load_robot(folder / name)
+    return _closed(root, folder / name)
+
+
+def _closed(root: Table, name: Path | str) -> Robot:
+    """The robot, its closures made to hold as the study's keys ask."""
+    rest = root.text("rest") if root.has("rest") else None
+    mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
+    own_errors = not root.has("errors")
+    try:
+        return load_robot(name, closing_of(rest, mismatch, own_errors=own_errors))
+    except BadInput as error:
+        for key, option in (("rest", "--rest: "), ("mismatch", "--mismatch spring: ")):
+            _, found, reason = str(error).partition(option)
+            if found:
+                raise root.bad(key, reason) from None
+        raise
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     """The robot with the errors asked for, and a sentence about them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
+    closing = root.has("rest") or root.has("mismatch")
+    fixed = robot.errors if closing else np.zeros_like(robot.errors)
     table = root.table("errors")
     if table.has("explicit"):
         rows = table.table("explicit")
@@ -156,7 +176,8 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
             for frame in _known(rows, name, robot, [name]):
                 errors[robot.index(frame)] = rows.array(name, (6,), "rad, m")
         table.finish()
-        return robot.with_errors(errors), "geometric errors given in the study file"
+        given = "geometric errors given in the study file"
+        return robot.with_errors(fixed + errors), given
     draw = ErrorDraw(
         _frames(table, robot, [f.name for f in robot.frames]),
         tuple(table.array("least", (6,), "rad, m")),
@@ -171,7 +192,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
     table.finish()
     signs = "all positive" if draw.signs == "literal" else "random signs"
     sentence = f"geometric errors drawn with seed {draw.seed}, {signs}"
-    return robot.with_errors(draw_errors(robot, draw)), sentence
+    return robot.with_errors(fixed + draw_errors(robot, draw)), sentence
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
