@@ -116,10 +116,12 @@ def _tree(
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
     """What of an axis is left out, in words, empty if it is converted."""
     spring = part.child("spring_stiffness")
-    several = tag == "axis2" or joint.child("axis2") is not None
-    if several and spring is not None and spring.number("", "-") > 0:
+    # other joints of several freedoms, and second axes of others, are not read
+    crossed = joint.optional("type") in {"universal", "revolute2"}
+    taken = crossed or (tag == "axis" and joint.optional("type") != "ball")
+    if not taken and spring is not None and spring.number("", "-") > 0:
         return f"joint axis {part.tag}, not converted, though it may carry load"
-    if part.tag == "limit" and not several:
+    if part.tag == "limit" and taken:
         rest = [one.tag for one in part.children() if one.tag not in _RANGE]
         return f"joint axis limit {', '.join(rest)}" if rest else ""
     springs_alone = all(one.tag.startswith("spring_") for one in part.children())

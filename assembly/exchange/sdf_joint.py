@@ -95,34 +95,31 @@ def joint_parts(
     after = np.linalg.inv(at) @ frames.pose(child)
     if len(parts) == 1:
         ((_, one, axis),) = parts
-        limits = _limits(node) if one != "fixed" else None
-        joint = Joint(name, one, parent, carried, placement, axis, after, limits=limits)
-        return [_with_spring(joint, node)], []
-    return chain(name, parent, carried, placement, after, parts)
+        joint = Joint(name, one, parent, carried, placement, axis, after)
+        return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
+    joints, between = chain(name, parent, carried, placement, after, parts)
+    tags = {"first": "axis", "second": "axis2"}  # a ball's turns have none
+    known = [tags.get(part, "") for part, _, _ in parts]
+    return [_of_axis(j, node, t) for j, t in zip(joints, known, strict=True)], between
 
 
-def _with_spring(joint: Joint, node: Node) -> Joint:
-    """The joint with the spring of its axis."""
-    axis = node.child("axis")
-    dynamics = None if axis is None else axis.child("dynamics")
-    if dynamics is None:
+def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
+    """The joint of one freedom with the range and the spring of its axis."""
+    axis = node.child(tag)
+    if axis is None:
         return joint
-    return replace(
-        joint,
-        stiffness=_number(dynamics, "spring_stiffness", 0.0),
-        rest=_number(dynamics, "spring_reference", 0.0),
-    )
-
-
-def _limits(node: Node) -> tuple[float, float] | None:
-    """Range of a joint of one freedom."""
-    axis = node.child("axis")
-    limit = None if axis is None else axis.child("limit")
-    if limit is None:
-        return None
-    ends = [limit.child(tag) for tag in ("lower", "upper")]
-    lower, upper = (None if end is None else end.content for end in ends)
-    return limit.limits(lower, upper)
+    limit, dynamics = axis.child("limit"), axis.child("dynamics")
+    if limit is not None:
+        ends = [limit.child(end) for end in ("lower", "upper")]
+        lower, upper = (None if end is None else end.content for end in ends)
+        joint = replace(joint, limits=limit.limits(lower, upper))
+    if dynamics is not None:
+        joint = replace(
+            joint,
+            stiffness=_number(dynamics, "spring_stiffness", 0.0),
+            rest=_number(dynamics, "spring_reference", 0.0),
+        )
+    return joint
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:

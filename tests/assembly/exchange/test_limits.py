@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from assembly.exchange.convert import convert
+from assembly.exchange.robot_files import load_robot as load_robot_of_any_kind
 from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.verdict import limits_passed
 from assembly.robots import load_robot
 
 URDF = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
@@ -53,6 +55,76 @@ def test_mjcf_ranges_become_limits_in_radians(tmp_path, unit, turn, limited, exp
     found = limits(tmp_path, "arm.xml", text)
     assert found["slide"] == (-0.1, 0.3)
     assert found["turn"] == (None if expected is None else pytest.approx(expected))
+
+
+SDF = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b">
+<pose>1 0 0 0 0 0</pose></link><joint name="world_a" type="fixed"><parent>{first}
+</parent><child>{second}</child></joint><joint name="cross" type="{kind}">
+<parent>a</parent><child>b</child>
+<axis><xyz>0 0 1</xyz><limit><lower>-0.3</lower><upper>0.4</upper></limit></axis>
+<axis2><xyz>0 1 0</xyz><limit><lower>-0.5</lower><upper>0.6</upper></limit></axis2>
+</joint></model></sdf>"""
+
+
+@pytest.mark.parametrize("kind", ["universal", "revolute2"])
+@pytest.mark.parametrize("held", ["a", "b"])
+def test_sdf_ranges_of_a_universal_joint_become_limits_of_each_turn(
+    tmp_path, kind, held
+):
+    """From whichever side the joint is reached its coordinates are the same."""
+    text = SDF.format(first="world", second=held, kind=kind)
+    found = limits(tmp_path, "m.sdf", text)
+    assert found == {"cross.first": (-0.3, 0.4), "cross.second": (-0.5, 0.6)}
+
+
+def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path):
+    """Each acts about the own z of its frame, nothing else is elastic there."""
+    text = SDF.format(first="world", second="a", kind="universal")
+    for tag, k in (("axis", 5), ("axis2", 7)):
+        spring = f"<dynamics><spring_stiffness>{k}</spring_stiffness></dynamics>"
+        text = text.replace(f"</{tag}>", f"{spring}</{tag}>")
+    # a slide beyond it is the drive
+    slide = (
+        '<link name="c"/><joint name="slide" type="prismatic"><parent>b</parent>'
+        "<child>c</child><axis><xyz>1 0 0</xyz></axis></joint></model>"
+    )
+    (tmp_path / "m.sdf").write_text(text.replace("</model>", slide))
+    (tmp_path / "m.yaml").write_text("closed_loop: []\nname_mot: [slide]\n")
+    convert(tmp_path / "m.sdf", tmp_path / "m.toml", loops=tmp_path / "m.yaml")
+    robot = read_robot(tmp_path / "m.toml")
+    for name, k in (("cross.first", 5.0), ("cross.second", 7.0)):
+        stiffness = np.diag(robot.frame(name).joint_stiffness)
+        assert stiffness[2] == k
+        assert np.isinf(np.delete(stiffness, 2)).all()
+
+
+def test_posture_beyond_one_turn_of_a_universal_joint_is_told(tmp_path):
+    text = SDF.format(first="world", second="a", kind="universal")
+    (tmp_path / "m.sdf").write_text(text)
+    robot = load_robot_of_any_kind(tmp_path / "m.sdf")
+    for name, value in (("cross.first", 0.39), ("cross.second", -0.51)):
+        frames = tuple(
+            replace(f, position=value if f.name == name else 0.0)
+            if f.joint != "fixed" else f for f in robot.frames
+        )  # fmt: skip
+        turned = replace(robot, frames=frames)
+        passed = limits_passed(turned, turned.positions)
+        within = name == "cross.first"
+        assert passed == (
+            "" if within else "cross.second at -0.51 rad, limits -0.5 to 0.6"
+        )
+
+
+def test_mjcf_ranges_of_several_joints_of_a_body_become_limits(tmp_path):
+    """A cylindrical joint: a slide and a hinge along one axis."""
+    text = (
+        '<mujoco><compiler angle="radian"/><worldbody><body name="b">'
+        '<joint name="along" type="slide" range="-0.2 0.1"/>'
+        '<joint name="about" type="hinge" range="-1 2"/>'
+        '<inertial mass="1" pos="0 0 0"/></body></worldbody></mujoco>'
+    )
+    found = limits(tmp_path, "c.xml", text)
+    assert found == {"along": (-0.2, 0.1), "about": (-1.0, 2.0)}
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
