@@ -5,6 +5,7 @@ Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
 is asked for.
 """
 
+import math
 from collections.abc import Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Any, Protocol
@@ -177,7 +178,7 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
             *(data[d].values for d in further)
         )]  # fmt: skip
         ordered = variable.transpose(*rows, *further).values
-        flat = ordered.reshape(-1, len(labels))
+        flat = ordered.reshape(math.prod(sizes.values()), len(labels))
         columns |= {(name, c): flat[:, k] for k, c in enumerate(labels)}
     axes = [data[row].values for row in rows]
     index = (

@@ -57,6 +57,17 @@ def test_components_of_listed_postures_are_columns(tmp_path):
     assert list(table["ty", ""]) == [0.13, 0.14, 0.13]
 
 
+def test_table_of_a_robot_without_joints_has_its_rows(tmp_path):
+    """No joint coordinate is a variable of no columns, not of no rows."""
+    (tmp_path / "bar.toml").write_text(
+        'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
+        "translation = [1.0, 0, 0]\n"
+    )
+    options = ff.SweepOptions(grid="tx=1", reading="none")
+    data = ff.sweep_in_memory(ff.ask_sweep(tmp_path / "bar.toml", options))
+    assert list(ff.point_table(data)["energy", ""]) == [0.0]
+
+
 def test_csv_has_units_in_its_heads_and_every_digit(data, tmp_path):
     write_point_table(data, tmp_path / "t.csv")
     rows = read(tmp_path / "t.csv")
