@@ -56,8 +56,9 @@ def solve(
     from assembly.report.results import solution_of, solution_text
 
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch
-    )
+        robot, pose, joint, load, gravity, under, rest=rest, mismatch=mismatch,
+        note=False,
+    )  # fmt: skip
     with one_thread():
         results = solution_of(applied.posture, applied.load, applied.gravity)
     if results["status"] == "ok" and applied.conditions.reads_otherwise:

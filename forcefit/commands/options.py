@@ -221,6 +221,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
 def posture_of(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
+    note: bool = True,
 ) -> Any:  # fmt: skip
     """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
 
@@ -231,6 +232,7 @@ def posture_of(
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
         own_errors: whether the robot keeps its errors beside those of the two.
+        note: whether to say on stderr what is to be known of the posture.
 
     Returns:
         The posture, of the robot as the effects of its file make it.
@@ -240,7 +242,7 @@ def posture_of(
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    declared = declared_posture(robot, pose, joint, rest, mismatch, own_errors)
+    declared = declared_posture(robot, pose, joint, rest, mismatch, own_errors, note)
     applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
@@ -253,21 +255,30 @@ def posture_of(
 def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
+    note: bool = True,
 ) -> Any:  # fmt: skip
-    """The posture of the options, of the robot without the effects of its file."""
+    """The posture of the options, of the robot without the effects of its file.
+
+    What is to be known of the posture is said on stderr where ``note`` says so.
+    """
     from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import closing_of
     from assembly.kinematics.posture import home_posture, place_robot
+    from assembly.kinematics.verdict import posture_remarks
     from assembly.model.largest import LARGEST_LENGTH
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
     machine = load_robot(robot, closing_of(rest, mismatch, joints, own_errors))
     if mismatch is not None and not pose:
-        return home_posture(machine)
-    return place_robot(
-        machine, joints=joints,
-        pose=parse_assignments(pose, "--pose", LARGEST_LENGTH) if pose else None,
-    )  # fmt: skip
+        posture = home_posture(machine)
+    else:
+        posture = place_robot(
+            machine, joints=joints,
+            pose=parse_assignments(pose, "--pose", LARGEST_LENGTH) if pose else None,
+        )  # fmt: skip
+    for remark in posture_remarks(posture) if note else ():
+        print(f"forcefit: note: {machine.name}: {remark}", file=sys.stderr)
+    return posture
 
 
 def declared_under(
@@ -281,6 +292,7 @@ def declared_under(
     finite: bool = False,
     rest: str | None = None,
     mismatch: str | None = None,
+    note: bool = True,
 ) -> Any:
     """The robot under the loads and covariates asked for, its file's effects applied.
 
@@ -294,13 +306,14 @@ def declared_under(
         finite: whether the exact model is used.
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
+        note: whether to say on stderr what is to be known of the posture.
 
     Returns:
         The posture, loads and conditions with the effects applied.
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    posture = declared_posture(robot, pose, joint, rest, mismatch)
+    posture = declared_posture(robot, pose, joint, rest, mismatch, note=note)
     g = parse_gravity(gravity)
     note_massless(posture.robot, g)
     return apply_robot_effects(

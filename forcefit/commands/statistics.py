@@ -139,7 +139,9 @@ def statistics(
     if figure is not None:
         check_writable(figure, PICTURE)
     closing = rest is not None or mismatch is not None
-    posture = posture_of(robot, pose, joint, rest, mismatch, own_errors=not closing)
+    posture = posture_of(
+        robot, pose, joint, rest, mismatch, own_errors=not closing, note=False
+    )
     fixed = posture.robot.errors if closing else None
     sources = read_sources(errors, posture.robot, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)

@@ -241,14 +241,38 @@ def test_no_command_has_a_first_order_verdict_at_a_singular_posture(
     assert "first order decides nothing" in out
 
 
-def test_statistics_beyond_the_limits_of_a_joint_say_so(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def with_a_limit(path):
+    """An orthoglide whose first slide may not stand at -0.26 m."""
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
         for f in robot.frames
     )
-    write_robot(replace(robot, frames=frames), tmp_path / "r.toml")
+    write_robot(replace(robot, frames=frames), path)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("zone",), ("error", "--tolerance-translation", "1e-5"), ("exact",),
+     ("stiffness",), ("deflection", "--along", "fz=0:-10:10"),
+     ("solve", "--load", "fz=-10")],
+)  # fmt: skip
+def test_every_command_says_that_its_posture_is_beyond_the_limits(
+    run, tmp_path, monkeypatch, words
+):
+    monkeypatch.chdir(tmp_path)
+    with_a_limit(tmp_path / "r.toml")
+    command, *options = words
+    pose = ["--pose", "tx=0.05,ty=0,tz=0"]
+    status, out, err = run("assembly", command, "r.toml", *pose, *options)
+    said = "beyond the limits of its joints: x.slide at -0.26 m, limits -0.4 to -0.3"
+    assert status == 0
+    assert (out + err).count(said) == 1
+
+
+def test_statistics_beyond_the_limits_of_a_joint_say_so(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with_a_limit(tmp_path / "r.toml")
     (tmp_path / "errors.toml").write_text(SOURCES)
     words = ["--errors", "errors.toml", "--draws", "20", "--pose", "tx=0.05,ty=0,tz=0"]
     status, out, _ = run("assembly", "statistics", "r.toml", *words)
