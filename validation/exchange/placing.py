@@ -81,7 +81,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
                 measured[i, k] = readings[name].position
     frame, scatter = _frame(declared, measured, nominal, names)
     remarks = check_targets(declared.file, declared.places, measured)
-    remarks += _misfit(nominal, scatter)
+    remarks += _misfit(nominal, measured, scatter)
     base = frame.to_base(measured)
     read = np.asarray(np.isfinite(measured).all(axis=2))
     left_out = []
@@ -109,15 +109,24 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
     )
 
 
-def _misfit(nominal: NDArray, scatter: float) -> list[str]:
-    """A remark on readings that do not follow the commands."""
+def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
+    """A remark on readings that do not follow the commands, and the likely reason."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
         return []
+    reason = "are they joined to the right ones?"
+    # distances between targets do not depend on the commands
+    apart = np.linalg.norm(measured - np.roll(measured, 1, axis=1), axis=2)
+    known = apart[np.isfinite(apart).all(axis=1)]
+    if len(known) and measured.shape[1] > 1 and np.ptp(known, axis=0).max() > scatter:
+        reason = (
+            "the targets' distances differ from row to row, whatever was commanded: "
+            "are columns and targets the right ones?"
+        )
     return [
         f"the readings scatter by {scatter:.3g} m about commands {reach:.3g} m apart: "
-        "are they joined to the right ones?"
+        f"{reason}"
     ]
 
 

@@ -404,6 +404,18 @@ def test_readings_that_do_not_follow_the_commands_are_remarked(lab, run):
     assert "are they joined to the right ones?" in out
 
 
+def test_columns_that_are_no_places_of_targets_are_remarked_as_such(lab, run):
+    """No command can be to blame where the targets' own distances come and go."""
+
+    def change(k, name, p):
+        return np.random.default_rng([k, ord(name)]).normal(0, 0.8, 3)
+
+    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
+    status, out, _ = run(*lab.words())
+    assert status == 0
+    assert "distances differ from row to row, whatever was commanded" in out
+
+
 # -- orientations ---------------------------------------------------------------------
 
 MOUNT = Rotation.from_rotvec([0.3, 0.2, -0.5])  # the target's axes on the platform
