@@ -1,10 +1,11 @@
 """Gives every reader and every command's options what nobody should, and counts.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
-[--foreign | --every-option]``. Each input is a sound command of ``fuzz_seeds.py``, or
-of ``fuzz_foreign.py``, with its files or its words changed by ``fuzz_mutations.py``,
-run in a process forked from one that has imported and compiled everything, and judged
-by ``fuzz_faults.py``. Input i of a seed is always the same; ``--only I`` shows one.
+[--every-option]``. Each input is a sound command of ``fuzz_seeds.py``,
+``fuzz_foreign.py`` or ``fuzz_machines.py``, with its files or its words changed by
+``fuzz_mutations.py``, run in a process forked from one that has imported and compiled
+everything, and judged by ``fuzz_faults.py``. Input i of a seed is always the same;
+``--only I`` shows one.
 ``--every-option`` draws nothing: each option that takes a value, of each command, gets
 each of EXTREMES once.
 
@@ -41,6 +42,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 import typer  # noqa: E402
 from fuzz_faults import faults  # noqa: E402
 from fuzz_foreign import FOREIGN, MADE_FOREIGN, write_foreign  # noqa: E402
+from fuzz_machines import MACHINES, MADE_MACHINES, STEP, write_machines  # noqa: E402
 from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
 
@@ -107,8 +109,9 @@ def prepare(folder: Path, commands: list[str]) -> None:
     """Sound files of all kinds; each of the sound commands once, which compiles."""
     write_seeds(folder)
     write_foreign(folder)
+    write_machines(folder)
     os.chdir(folder)
-    for command in [*MADE, *MADE_FOREIGN]:
+    for command in [*MADE, *MADE_FOREIGN, *MADE_MACHINES]:
         status, _, err = run(shlex.split(command))
         assert status == 0, f"{command}: {status}\n{err}"
     for command in KILLED:
@@ -168,7 +171,10 @@ def run(words: list[str]) -> tuple[object, str, str]:
         sys.stdout.flush()
         sys.stderr.flush()
     finally:
+        written = sys.stdout, sys.stderr
         sys.argv, sys.stdout, sys.stderr = before
+        for stream in written:
+            stream.close()
         for number, copy in enumerate(saved, 1):
             os.dup2(copy, number)
             os.close(copy)
@@ -191,6 +197,7 @@ def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
     files = [path for path in files if path.exists()]
     files += [Path(f"{word}.journal") for word in words]
     files += [path.with_suffix(".yaml") for path in files if path.suffix == ".urdf"]
+    files += [path.with_suffix(".npz") for path in files if path.name == "saved.toml"]
     inside = [p for path in files if path.is_dir() for p in sorted(path.iterdir())]
     files = [path for path in [*files, *inside] if path.is_file()]
     if "study" in words[0] or "arm.toml" in words:
@@ -310,10 +317,9 @@ def batch(numbers: list[int], asked: Asked, seeds: Path) -> list:
 def main() -> int:
     """Run, count and print; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", nargs="?", type=int, default=5000)
+    parser.add_argument("count", nargs="?", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+")
-    parser.add_argument("--foreign", action="store_true", help="other programs' files")
     parser.add_argument("--every-option", action="store_true", help="nothing is drawn")
     given = parser.parse_args()
 
@@ -327,7 +333,7 @@ def main() -> int:
         os.environ["FORCEFIT_CACHE"] = f"{folder}.cache"
         Path(f"{folder}.inputs").mkdir()
         os.environ.pop("DISPLAY", None)
-        commands = FOREIGN if given.foreign else COMMANDS
+        commands = [*COMMANDS, *FOREIGN, *MACHINES, *STEP]
         prepare(seeds, [] if given.only else [command for _, command in commands])
         asked = Asked(given.seed, options_of(), commands, [])
         if given.every_option:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 # progress, verdicts and what meshing says
 _OURS = re.compile(
-    r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, the verdict is |mesh \d"
+    r"forcefit: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, |mesh \d"
     r"|([a-z -]+|\S+) *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
 )
 

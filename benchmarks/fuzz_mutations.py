@@ -45,7 +45,7 @@ PIECES = [
 ]  # fmt: skip
 TEXT = {
     ".toml", ".csv", ".json", ".obj", ".urdf", ".xml", ".sdf", ".yaml", ".mtx", ".pch",
-    ".txt",
+    ".txt", ".step", ".stl", ".ply", ".vtk", ".msh", ".dmig",
 }  # fmt: skip
 _TOKEN = re.compile(r"-?\d[\d.eE+_-]*|\"[^\"\n]*\"|\w+")
 
@@ -63,7 +63,7 @@ def change_file(path: Path, random: Random) -> str:
     content = path.read_bytes()
     ways = [_bytes, _bytes, _cut]
     if path.suffix in TEXT:
-        ways += [_token, _token, _lines, _rename]
+        ways += [_token, _token, _lines, _rename, _coding, _units, _nested]
     if path.suffix in {".toml", ".json"}:
         ways += [_tree] * 4
     if path.suffix == ".csv":
@@ -129,6 +129,38 @@ def _lines(content: bytes, random: Random, _: str) -> bytes:
     else:
         lines[min(i, j) : max(i, j)] = []
     return b"\n".join(lines)
+
+
+def _coding(content: bytes, random: Random, _: str) -> bytes:
+    """Other line ends, a mark at the beginning or another encoding."""
+    text = _text(content)
+    how = random.randrange(6)
+    if how < 2:
+        return content.replace(b"\n", (b"\r\n", b"\r")[how])
+    if how == 2:
+        return b"\xef\xbb\xbf" + content
+    coding = ("utf-16", "utf-16-be", "latin-1")[how - 3]
+    return text.encode(coding, errors="replace")
+
+
+def _units(content: bytes, random: Random, _: str) -> bytes:
+    """A unit exchanged wherever it stands."""
+    units = ["mm", "um", "in", "m", "deg", "rad", "mrad", "K", "furlong", ""]
+    text = _text(content)
+    found = [u for u in units if u and re.search(rf"\b{u}\b", text)]
+    if not found:
+        return content
+    new = random.choice(units)
+    return _coded(re.sub(rf"\b{random.choice(found)}\b", new, text))
+
+
+def _nested(content: bytes, random: Random, _: str) -> bytes:
+    """A bracket, a tag or a table opened many times."""
+    times = random.choice([20, 300, 3000, 200_000])
+    piece = random.choice([b"[", b"{", b"(", b"{a=", b"a.", b"<body>", b"<frame>",
+                           b"-", b"0", b" ", b"\n[[frame]]", b",", b"[{"])  # fmt: skip
+    start = random.randrange(len(content) + 1)
+    return content[:start] + piece * times + content[start:]
 
 
 def _rename(content: bytes, random: Random, _: str) -> bytes:

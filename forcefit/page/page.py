@@ -156,7 +156,7 @@ def results_in(text: str, where: str) -> dict[str, Any]:
         text = rest.partition("</script>")[0]
     try:
         results = json.loads(text, parse_int=_whole)
-    except ValueError:
+    except (ValueError, RecursionError):  # of brackets by the thousand
         expected = "a report of forcefit or the JSON file of a command"
         raise BadInput(f"{where}: found other text, expected {expected}") from None
     if not isinstance(results, dict):

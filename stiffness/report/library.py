@@ -86,7 +86,10 @@ def _entry(file: Path) -> Entry:
         float(about["relative_error_estimate"])
     except BadInput:
         raise
-    except (ValueError, OverflowError, LookupError, TypeError, AttributeError) as error:
+    except (
+        ValueError, OverflowError, LookupError, TypeError, AttributeError,
+        RecursionError,
+    ) as error:  # fmt: skip
         raise BadInput(f"{file}: damaged entry ({type(error).__name__})") from None
     K, error_matrix, tip = arrays
     if K.shape != (6, 6) or error_matrix.shape != (6, 6) or tip.shape != (3,):

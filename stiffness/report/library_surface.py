@@ -265,6 +265,6 @@ def is_current(file: Path, link: SurfaceLink) -> bool:
     request = json.loads(json.dumps(link.request()))
     try:
         stored = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(stored, dict) and stored.get("request") == request

@@ -235,7 +235,10 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
         values = [number.of(robot) for number in numbers]
     except FileNotFoundError:
         raise BadInput(f"{path}: no such file; {expected}") from None
-    except (OSError, ValueError, KeyError, IndexError, TypeError, zipfile.BadZipFile):
+    except (
+        OSError, ValueError, KeyError, IndexError, TypeError, RecursionError,
+        zipfile.BadZipFile,
+    ):  # fmt: skip
         raise BadInput(f"{path}: found other content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(f"{path}: found shape {C.shape}, expected {len(values)} squared")

@@ -145,6 +145,7 @@ def test_where_the_numbers_come_from_is_on_the_page(tmp_path):
     [
         ("<!doctype html><p>", "x: found a page without results of forcefit"),
         ("hello", "x: found other text, expected a report of forcefit or the JSON"),
+        ("[" * 100_000, "x: found other text, expected a report of forcefit"),
         ("[1]", "x: found a JSON list or value, expected results"),
     ],
 )

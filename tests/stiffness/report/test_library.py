@@ -149,6 +149,7 @@ def test_an_entry_of_other_parameters_is_named(spec):
     [
         ("rubbish", "damaged entry"),
         ("[]", "damaged entry"),
+        ("[" * 100_000, "damaged entry"),
         ("{}", 'not an entry; expected format "forcefit link 1"'),
         ('{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
     ],
