@@ -24,7 +24,10 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
     strange = [line for line in err.splitlines() if not _OURS.match(line)]
     if strange:
         faults.append(f"on stderr: {strange[0][:100]}")
-    messages = [line for line in err.splitlines() if line.startswith("forcefit: ")]
+    messages = [
+        line for line in err.splitlines()
+        if line.startswith("forcefit: ") and not line.startswith("forcefit: note: ")
+    ]  # fmt: skip
     if status == 2 and len(messages) != 1:
         faults.append(f"{len(messages)} messages")
     if any(len(line) > 1000 for line in messages):

@@ -158,7 +158,9 @@ def variables(question: Question) -> dict[str, Variable]:
     if question.frequencies:
         modes = tuple(str(k + 1) for k in range(question.frequencies))
         table["frequency"] = Variable(
-            {"mode": modes}, "Hz", "natural, lowest first, drives held"
+            {"mode": modes},
+            "Hz",
+            "natural, lowest first, drives held, without load and gravity",
         )
     if question.linearisation:
         for part, unit in (("rotation", "rad"), ("translation", "m")):

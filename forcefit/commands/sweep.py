@@ -175,6 +175,12 @@ def sweep(
         update("robot", 1, 1)
     note_massless(asked.question.robot, g)
     note_closing(asked.question.robot, rest, mismatch)
+    if frequencies is not None and (any(wrench or ()) or any(g or ())):
+        print(
+            "forcefit: note: load and gravity are left out of the frequencies; "
+            "assembly frequencies --exact counts them",
+            file=sys.stderr,
+        )
     done = [0]
     solver = _solver(workers, scheduler)
     held = ExitStack()  # keeps the journal until all is written

@@ -61,7 +61,8 @@ def _frequencies(found: dict[str, Any]) -> str:
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in parts)
         rows.append([str(k), Value(mode["frequency"], "Hz", 5), shares])
     return paragraph(
-        "Natural frequencies, the drives held, clearances at zero."
+        "Natural frequencies of the nominal robot without load and weight, the drives "
+        "held, clearances at zero."
     ) + table(["mode", "frequency", "where its spring energy is"], rows, "frequencies")
 
 

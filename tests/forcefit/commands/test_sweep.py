@@ -323,3 +323,17 @@ def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypat
         status, _, err = run("assembly", "plot", file, "-o", tmp_path / "x.svg")
         assert status in {0, 2}
         assert messages(err) == (status == 2)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--gravity", "z=-9.81"], 1), (["--load", "fx=1"], 1), ([], 0)],
+)  # fmt: skip
+def test_sweep_says_that_frequencies_leave_load_and_gravity_out(
+    run, tmp_path, words, said
+):
+    grid = ["--grid", "tx=0,ty=0.13", "--reading", "none", "--frequencies", "1"]
+    target = ["-o", tmp_path / "x.nc"]
+    status, _, err = run("assembly", "sweep", "five_bar", *grid, *words, *target)
+    assert status == 0
+    assert err.count("load and gravity are left out of the frequencies") == said
