@@ -17,6 +17,7 @@ from forcefit.inputs.table import read_bytes
 
 _MARKS = (";", "\t", ",")  # between cells, the likeliest first
 _BLANK = " "
+_LONGEST = 1000  # characters of a cell; the search for units in it is quadratic
 _SAMPLE = 2000  # lines by which the mark between cells is found
 
 
@@ -58,6 +59,12 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
         raise BadInput(f"{path}: empty; expected a table")
     mark = _mark([line for _, line in lines[:_SAMPLE]], decimal)
     rows = [(number, _cells(line, mark)) for number, line in lines]
+    for number, cells in rows:
+        if (longest := max(map(len, cells), default=0)) > _LONGEST:
+            raise BadInput(
+                f"{path}: line {number}: found a cell of {longest} characters, "
+                f"expected at most {_LONGEST}"
+            )
     if mark == _BLANK:
         rows = _with_names_of_words(lines, rows)
     return Sheet(str(path), "." if mark == "," else decimal, rows)

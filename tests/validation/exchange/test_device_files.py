@@ -416,6 +416,15 @@ def test_columns_that_are_no_places_of_targets_are_remarked_as_such(lab, run):
     assert "distances differ from row to row, whatever was commanded" in out
 
 
+@pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
+def test_endless_cell_is_refused_by_its_line(lab, run, piece):
+    """Looking for a unit in 200 000 brackets took minutes."""
+    lines = list(points(line=SPATIAL_ANALYZER))
+    lines[1] += piece * 200_000 + "x"
+    line = refused(lab, run, "\n".join(lines))
+    assert "line 2: found a cell of" in line
+
+
 # -- orientations ---------------------------------------------------------------------
 
 MOUNT = Rotation.from_rotvec([0.3, 0.2, -0.5])  # the target's axes on the platform
