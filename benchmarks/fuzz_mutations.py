@@ -155,12 +155,15 @@ def _units(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _nested(content: bytes, random: Random, _: str) -> bytes:
-    """A bracket, a tag or a table opened many times."""
+    """A bracket, a tag or a table opened many times, and closed in half of them."""
     times = random.choice([20, 300, 3000, 200_000])
-    piece = random.choice([b"[", b"{", b"(", b"{a=", b"a.", b"<body>", b"<frame>",
-                           b"-", b"0", b" ", b"\n[[frame]]", b",", b"[{"])  # fmt: skip
+    pairs = {b"[": b"]", b"{": b"}", b"(": b")", b"<body>": b"</body>",
+             b"<frame>": b"</frame>", b"<a>": b"</a>"}  # fmt: skip
+    alone = [b"{a=", b"a.", b"-", b"0", b" ", b"\n[[frame]]", b",", b"[{"]
+    piece = random.choice([*pairs, *alone])
+    closing = pairs.get(piece, b"") * random.choice([0, times])
     start = random.randrange(len(content) + 1)
-    return content[:start] + piece * times + content[start:]
+    return content[:start] + piece * times + closing + content[start:]
 
 
 def _rename(content: bytes, random: Random, _: str) -> bytes:

@@ -26,7 +26,7 @@ from assembly.exchange.overlay import lay_over
 from assembly.exchange.sdf import read_sdf
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.xml_file import counted
-from assembly.files.robot_file import robot_of, robot_table
+from assembly.files.robot_file import MOST_FRAMES, robot_of, robot_table
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Robot
 from forcefit.inputs.errors import BadInput
@@ -65,6 +65,11 @@ def robot_of_file(
             raise BadInput(f"--points: found some, but {source} has no loops file")
         beside = with_points(beside, points)
     mechanism = READERS[source.suffix.lower()](source, beside)
+    if len(mechanism.joints) > MOST_FRAMES:
+        raise BadInput(
+            f"{source}: found {len(mechanism.joints)} joints, expected at most "
+            f"{MOST_FRAMES}"
+        )
     comparison = Comparison("", source.name, "it was not asked")
     if ask or mechanism.unweighed:
         comparison = compare(mechanism, source)

@@ -35,7 +35,7 @@ from stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # characters
-_MOST_FRAMES = 2000
+MOST_FRAMES = 2000  # of a robot; its closures would take minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
@@ -100,9 +100,9 @@ def declared_robot(root: Table, name: str) -> Robot:
     ranges = _learned_range(root)
     point, diagnosis = _reference_point(root), _diagnosis(root)
     root.finish()
-    if not 0 < len(tables[0]) <= _MOST_FRAMES:
+    if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
-        raise root.bad("frame", f"{fault}; expected 1 to {_MOST_FRAMES} [[frame]]")
+        raise root.bad("frame", f"{fault}; expected 1 to {MOST_FRAMES} [[frame]]")
     frames = tuple(_frame(table) for table in tables[0])
     names = [frame.name for frame in frames]
     closures = tuple(_closure(table, names) for table in tables[1])

@@ -403,3 +403,17 @@ def test_a_platform_may_have_the_name_of_its_joint(tmp_path):
     overlay.write_text('platform = "wrist"\n')
     answer = convert(source, tmp_path / "robot.toml", overlay=overlay)
     assert answer.robot.platform == "wrist.link"
+
+
+def test_file_of_thousands_of_joints_is_refused_at_once(tmp_path):
+    """As a robot file is; such a chain used to take minutes."""
+    steps = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous">'
+        f'<parent link="l{i}"/><child link="l{i + 1}"/></joint>'
+        for i in range(2001)
+    )
+    path = tmp_path / "chain.urdf"
+    path.write_text(f'<robot name="r"><link name="l0"/>{steps}</robot>')
+    with pytest.raises(BadInput, match=r"found 2001 joints, expected at most 2000"):
+        convert(path, tmp_path / "chain.toml")
+    assert not (tmp_path / "chain.toml").exists()
