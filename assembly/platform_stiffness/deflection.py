@@ -41,6 +41,7 @@ _CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed
 # rounding alone, and change with it
 _CHANGES = 8
 _STAYS = 1e-6  # of the largest motion in a mode: rounding of a platform that stays
+_STILL = 1e-12  # [characteristic lengths] motions that are rounding
 _JUMP = 5.0  # times what the tangents on both sides explain
 _BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
 _NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
@@ -312,7 +313,9 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
         for p in (before, after)
     )
     step = abs(after.load - before.load)
-    return _apart(before, after) > _JUMP * step * farthest  # never if one is free
+    apart = _apart(before, after)
+    moved = apart > _STILL * before.tangent.length
+    return moved and apart > _JUMP * step * farthest  # never if one is free
 
 
 def _mode(point: _Point) -> str:

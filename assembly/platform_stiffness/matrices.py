@@ -228,7 +228,11 @@ class PlatformStiffness:
         """D . C d, infinite along free motions."""
         if _touches(self.free, d):
             return np.inf
-        return float(self.signs @ (self.root.T @ d) ** 2)
+        screws = self.root.T @ d
+        largest = np.linalg.norm(self._scale[:, None] * self.root)
+        if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
+            return 0.0  # rounding of a motion that nothing makes
+        return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
         """D . K d."""

@@ -81,7 +81,12 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
             entries = None
             continue
         for row, value in _terms(path, fields, packed):
-            entries[row, column] = value
+            if entries.setdefault((row, column), value) != value:
+                raise BadInput(
+                    f"{path}: {name.upper()}: row {row[0]} {row[1]}, column "
+                    f"{column[0]} {column[1]}: found {entries[row, column]:g} and "
+                    f"{value:g}, expected one value"
+                )
     return matrices[_chosen(path, matrices, forms, which)]
 
 
@@ -99,7 +104,7 @@ def _terms(
         Row and value of each term.
 
     Raises:
-        BadInput: the line ends within a term, or a number is none.
+        BadInput: the line ends within a term, a number is none, or a term is complex.
     """
     terms, waiting = [], list(fields)
     while waiting:
@@ -115,6 +120,12 @@ def _terms(
         node, direction, value = waiting[:3]
         row = whole(path, node), max(1, whole(path, direction or "0"))
         terms.append((row, real(path, value)))
+        imaginary = "" if packed else "".join(waiting[3:4])
+        if imaginary and imaginary[0] not in "+*" and real(path, imaginary):
+            raise BadInput(
+                f"{path}: row {row[0]} {row[1]}: found {describe(value)} and an "
+                f"imaginary part {describe(imaginary)}, expected a real matrix"
+            )
         del waiting[: 3 if packed else 4]
     return terms
 

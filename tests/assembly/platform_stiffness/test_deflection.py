@@ -30,6 +30,23 @@ def cantilever(link):
 
 
 @pytest.mark.parametrize("exact", [False, True])
+def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(exact):
+    """A sprung slide along x, turned by a rounded right angle: rigid along z."""
+    K = np.diag([np.inf] * 5 + [1e5])
+    frames = (
+        Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
+              joint_stiffness=K),
+        Frame("tip", "slide", rotation=[0, -np.pi / 2, 0]),
+    )  # fmt: skip
+    posture = home_posture(Robot("slide", "tip", frames))
+    curve = load_deflection(posture, FZ, np.arange(0.0, -101.0, -25.0), exact=exact)
+    assert np.isinf(curve.stiffness).all()
+    assert curve.events == ()
+    along = load_deflection(posture, FZ - 2, np.arange(0.0, 101.0, 50.0), exact=exact)
+    np.testing.assert_allclose(along.stiffness, 1e5, rtol=1e-9)
+
+
+@pytest.mark.parametrize("exact", [False, True])
 def test_free_play_then_contact_then_a_spring(exact):
     """Deflection = sign(F) c + F / k; at no load anything within the play."""
     c, k = 1e-4, 1e5

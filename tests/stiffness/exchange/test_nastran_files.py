@@ -126,3 +126,28 @@ def test_a_dmig_line_that_ends_within_a_term_is_refused(tmp_path):
     path.write_text("DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n")
     with pytest.raises(BadInput, match="'1 2' at a line's end, expected node"):
         read_matrix(path)
+
+
+DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
+    f"DMIG,KAAX,7,{k},,7,{k},1.0E+06\n" for k in range(1, 7)
+)
+
+
+def test_dmig_entry_of_two_values_is_refused_by_its_place(tmp_path):
+    """The last one won; two matrices of one name in a file are the usual way."""
+    path = tmp_path / "k.dmig"
+    path.write_text(DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"))
+    with pytest.raises(BadInput, match=r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06"):
+        read_matrix(path)
+    path.write_text(DIAGONAL + DIAGONAL)
+    assert read_matrix(path).matrix.shape == (6, 6)
+
+
+def test_complex_dmig_is_refused(tmp_path):
+    """Its imaginary part was dropped without a word."""
+    path = tmp_path / "k.dmig"
+    path.write_text(DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"))
+    with pytest.raises(BadInput, match=r"row 7 3: .* imaginary part '5.0E\+04'"):
+        read_matrix(path)
+    path.write_text(DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,0.0"))
+    assert read_matrix(path).matrix.shape == (6, 6)
