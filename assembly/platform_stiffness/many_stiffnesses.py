@@ -104,8 +104,13 @@ class Stiffnesses:
         Returns:
             1 / (d . C d); inf where nothing gives way, 0 along a free motion.
         """
+        d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
+        compliance = np.sum((self.springs @ d) ** 2, axis=1)
+        largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
+        # rounding of a motion that nothing makes
+        still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
-            K = 1.0 / np.sum((self.springs @ np.asarray(direction)) ** 2, axis=1)
+            K = 1.0 / np.where(still, 0.0, compliance)
         for row, one in self.singular.items():
             K[row] = one.along(direction)[0]
         return K

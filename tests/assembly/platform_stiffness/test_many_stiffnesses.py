@@ -104,3 +104,18 @@ def test_a_free_motion_has_no_number():
     assert many.singular[0].free_text == (
         "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
     )
+
+
+def test_stiffness_of_what_gives_way_along_x_alone_is_infinite_across_it():
+    """A sprung slide along x, turned by a rounded right angle."""
+    K = np.diag([np.inf] * 5 + [1e5])
+    frames = (
+        Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
+              joint_stiffness=K),
+        Frame("tip", "slide", rotation=[0, -np.pi / 2, 0]),
+    )  # fmt: skip
+    posture = home_posture(Robot("slide", "tip", frames))
+    many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    along = np.array([many.along(axis)[0] for axis in UNIT])
+    assert along[3] == pytest.approx(1e5, rel=1e-9)
+    assert np.isinf(np.delete(along, 3)).all()
