@@ -1,5 +1,6 @@
 """Robots read from and written to files of any kind, by the ending of their names."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +8,10 @@ from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
+from forcefit.inputs.table import BadInput, read_bytes
 
 OTHERS = (".urdf", ".xml", ".sdf")
+_BLANKS = b"\xef\xbb\xbf \r\n\t"  # and a byte order mark
 # of what is left out, words that say that it may change results
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
@@ -31,6 +34,11 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
     """
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
+        if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
+            raise BadInput(
+                f"{path}: found XML, expected a robot file, or the ending .urdf, .xml "
+                "(MJCF) or .sdf"
+            )
         return load_declared(name, close)
     from assembly.exchange.foreign import robot_of_file
 

@@ -81,3 +81,13 @@ def test_a_wrong_file_is_one_line(run, tmp_path):
     status, out, err = run("assembly", "solve", path)
     assert (status, out) == (2, "")
     assert "robot.urdf: link.name: missing" in err
+
+
+def test_xml_by_another_ending_is_told_the_endings(run, tmp_path):
+    path = tmp_path / "bar.mjcf"
+    path.write_text("\ufeff\n<mujoco><worldbody/></mujoco>", encoding="utf-8")
+    status, out, err = run("assembly", "solve", path)
+    assert (status, out) == (2, "")
+    assert (
+        "bar.mjcf: found XML, expected a robot file, or the ending .urdf, .xml" in err
+    )
