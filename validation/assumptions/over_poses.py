@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
+from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
 from assembly.sweeps.targets import Targets, goals_of, of_joints
 from forcefit.inputs.display import html_table, short_repr
@@ -85,7 +86,17 @@ def costs_over_poses(
     place = place_many_joints if of_joints(targets.names) else place_many
     postures, reasons = place(robot, goals_of(targets.names, robot, rows))
     asked = tuple(dict(zip(targets.names, map(float, r), strict=True)) for r in rows)
-    reached = [posture for posture in postures if posture is not None]
+    beyond = [
+        "" if p is None else limits_passed(robot, p.coordinates) for p in postures
+    ]
+    reasons = [
+        f"beyond the limits of its joints: {passed}" if passed else reason
+        for passed, reason in zip(beyond, reasons, strict=True)
+    ]
+    reached = [
+        posture for posture, passed in zip(postures, beyond, strict=True)
+        if posture is not None and not passed
+    ]  # fmt: skip
     platform: PlatformCosts | str = "no pose is reached"
     if reached:
         platform = stiffness_costs(reached, solids)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE, Posture, place_many
+from assembly.kinematics.verdict import BEYOND_LIMITS, limits_passed
 from assembly.model.robot import Robot
 from validation.crosscheck.crosscheck import Crosscheck, attempt
 
@@ -33,7 +34,8 @@ def check_poses(
 
     Returns:
         For each pose what was ``asked``, ``passed``, ``status`` and the check's table;
-        poses out of reach have the status ``"out of reach"`` and ``passed`` None.
+        poses out of reach have the status ``"out of reach"``, those beyond the joints'
+        limits ``"beyond_limits"``, and ``passed`` None.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -60,6 +62,8 @@ def _row(
     """The result at one pose."""
     if posture is None:
         return {"status": "out of reach", "reason": reason, "passed": None}
+    if passed := limits_passed(robot, posture.coordinates):
+        return {"status": BEYOND_LIMITS, "reason": passed, "passed": None}
     result, failure = attempt(robot.name, lambda: check(posture))
     return failure if result is None else {"status": "ok"} | result.table()
 

@@ -1,13 +1,17 @@
 """Cross-checks over a grid of poses."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from assembly.files.robot_file import write_robot
 from assembly.robots import load_robot
+from assembly.sweeps.targets import grid_targets
 from forcefit.commands import app as command
 from tests.robots_for_tests import NUMBERS, irsbot2_with
+from validation.assumptions.over_poses import costs_over_poses
 from validation.crosscheck.crosscheck import crosscheck
 from validation.crosscheck.poses import check_poses, poses_table, poses_text
 from validation.multibody.simulation import SimulationFailed
@@ -31,6 +35,29 @@ def test_every_reachable_pose_is_checked_and_the_others_say_so():
     assert poses_table(rows)["passed"]
     assert poses_text(rows).splitlines()[-1] == "2 of 2 reachable poses passed"
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_pose_beyond_the_limits_of_a_joint_is_not_checked():
+    """The slides of an orthoglide follow its platform along each axis."""
+    robot = load_robot("orthoglide")
+    frames = tuple(
+        replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
+        for f in robot.frames
+    )
+    axes = {"tx": np.array([0.0, 0.05]), "ty": np.zeros(1), "tz": np.zeros(1)}
+    seen = []
+
+    def check(posture):
+        seen.append(posture.pose()["tx"])
+        raise SimulationFailed("orthoglide", "none is run")
+
+    rows = check_poses(replace(robot, frames=frames), axes, check)
+    assert [row["status"] for row in rows] == ["simulation failed", "beyond_limits"]
+    assert rows[1]["passed"] is None
+    assert seen == [pytest.approx(0.0)]
+    costs = costs_over_poses(replace(robot, frames=frames), grid_targets(axes))
+    assert costs.unreached[0] == ""
+    assert "x.slide at -0.26 m, limits -0.4 to -0.3" in costs.unreached[1]
 
 
 def test_a_pose_that_fails_is_named_and_stops_nothing():
