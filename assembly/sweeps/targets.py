@@ -5,7 +5,6 @@ are ``tx ty tz rx ry rz`` for the platform's pose, ``q.<frame>`` for the coordin
 an actuated joint, never both; a list may also write ``pose.tx``, as campaigns do.
 """
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE
 from assembly.model.robot import Robot
-from forcefit.inputs.table import BadInput, nearest, quoted, read_text
+from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
 LARGEST_GRID = 10_000_000  # points; more is a mistaken step
 _JOINT = "q."
@@ -188,10 +187,7 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
         BadInput: not such a table; the line and the column are named.
     """
     path = Path(path)
-    lines = read_text(path).splitlines()
-    rows = [
-        row for row in enumerate(csv.reader(lines), 1) if any(map(str.strip, row[1]))
-    ]
+    rows = [row for row in enumerate(read_rows(path), 1) if any(map(str.strip, row[1]))]
     if len(rows) < 2:
         content = "only a header" if rows else "nothing"
         raise BadInput(

@@ -4,6 +4,7 @@ A message names the file, the place in it, what was found and what was expected,
 the nearest valid name where a name is wrong; see ``forcefit/inputs/errors.py``.
 """
 
+import csv
 import difflib
 import math
 import re
@@ -33,6 +34,7 @@ __all__ = [
     "nearest",
     "quoted",
     "read_bytes",
+    "read_rows",
     "read_text",
     "read_toml",
 ]
@@ -88,6 +90,25 @@ def read_text(path: Path | str) -> str:
         line = text.count("\n", 0, place) + 1
         raise BadInput(f"{path}: line {line} holds NUL; expected a text file in UTF-8")
     return text
+
+
+def read_rows(path: Path | str) -> list[list[str]]:
+    """Cells of a CSV file, a list for each of its lines.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The cells as written; none for a blank line.
+
+    Raises:
+        BadInput: the file cannot be read, or holds a cell without end.
+    """
+    rows = csv.reader(read_text(path).splitlines())
+    try:
+        return list(rows)
+    except csv.Error as error:
+        raise BadInput(f"{path}: line {rows.line_num}: not CSV: {error}") from None
 
 
 def read_toml(path: Path | str) -> "Table":

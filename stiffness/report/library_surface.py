@@ -6,7 +6,6 @@ Such an entry is kept as long as the surface file's content and everything else 
 asked for are what it was made from, and made again when one of them changed.
 """
 
-import csv
 import hashlib
 import json
 import os
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from forcefit.inputs.errors import LARGEST
-from forcefit.inputs.table import BadInput, Table, describe, quoted, read_text
+from forcefit.inputs.table import BadInput, Table, describe, quoted, read_rows
 from stiffness.link import LinkStiffness
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import UNITS
@@ -196,7 +195,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
     Raises:
         BadInput: the table, a file or an interface is not proper.
     """
-    rows = list(csv.reader(read_text(file).splitlines()))
+    rows = read_rows(file)
     head = [cell.strip() for cell in rows[0]] if rows else []
     names = [name for name in head if name != "surface"]
     if "surface" not in head or not names or len(set(head)) != len(head):

@@ -60,6 +60,7 @@ def test_a_table_is_a_list_of_postures_in_its_order(robot, tmp_path):
         ("pose.tx\n1\n2,3\n", "line 3: found 2 cells, expected 1 as in the header"),
         ("pose.tx\n1\nnan\n", 'line 3, pose.tx: found "nan", expected a finite number'),
         ("id,pose.tx\na,1\na,2\n", 'id: found "a" twice; expected unique ids'),
+        ("pose.tx\n1\n" + "0" * 200_000, "line 3: not CSV: field larger than"),
     ],
 )  # fmt: skip
 def test_a_table_with_a_mistake_is_one_message(robot, tmp_path, text, message):

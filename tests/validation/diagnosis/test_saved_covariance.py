@@ -1,0 +1,35 @@
+"""Covariances beside saved robots: a damaged file is one message."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.robots import load_robot
+from forcefit.inputs.errors import BadInput
+from validation.diagnosis.saved_covariance import (
+    SavedCovariance,
+    read_covariance,
+    write_covariance,
+)
+
+
+def cut_to(share):
+    return lambda content: content[: int(share * len(content))]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [cut_to(0.0), cut_to(0.3), cut_to(0.9), lambda content: b"[" * 100_000,
+     lambda content: content.replace(b"\x08\x00", b"\x63\x00")],
+    ids=["empty", "third", "end", "text", "compression"],
+)  # fmt: skip
+def test_damaged_covariance_is_refused_by_its_name(tmp_path, damage):
+    """An empty one ended the command as if interrupted."""
+    path = tmp_path / "saved.npz"
+    write_covariance(SavedCovariance((), np.zeros((0, 0))), path)
+    robot = replace(load_robot("arm6"), diagnosis={"covariance": str(path)})
+    assert read_covariance(robot).covariance.shape == (0, 0)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(BadInput, match=r"saved\.npz: found other content, expected"):
+        read_covariance(robot)
