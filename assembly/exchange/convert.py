@@ -29,7 +29,13 @@ from assembly.exchange.mjcf_writing import mjcf_text
 from assembly.exchange.overlay import lay_over
 from assembly.exchange.urdf import read_urdf
 from assembly.exchange.urdf_writing import XML_MARK, loops_of, urdf_text
-from assembly.files.robot_file import read_robot, robot_of, robot_table, write_robot
+from assembly.files.robot_file import (
+    Closing,
+    read_robot,
+    robot_of,
+    robot_table,
+    write_robot,
+)
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Robot
 from assembly.robots import load_robot
@@ -53,6 +59,7 @@ def convert(
     loops: Path | str | None = None,
     overlay: Path | str | None = None,
     points: Sequence[str] | None = None,
+    close: Closing | None = None,
 ) -> Conversion:
     """Convert a robot between a robot file and the files of other programs.
 
@@ -66,6 +73,8 @@ def convert(
             empty one takes the types as they stand.  Without it they are taken so too,
             unless every loop is said to be 6d and they cannot close: then all are
             points, and the answer says so.
+        close: of a robot file or built-in robot, as
+            :func:`assembly.kinematics.closing.closing_of`; none if absent.
 
     Returns:
         What was written and how well it is what was read.
@@ -77,12 +86,17 @@ def convert(
     source, target = Path(source), Path(target)
     check_target(target)
     if source.suffix.lower() in READERS:
+        if close is not None:
+            raise BadInput(
+                f"{source}: found with --rest or --mismatch, expected a robot file; a "
+                "home that closes is looked for here anyway"
+            )
         conversion, placed = robot_of_file(source, loops, overlay, points)
         return _written(conversion, placed, target)
     for option, given in (("--points", points), ("--loops", loops)):
         if given:
             raise BadInput(f"{option}: found some beside {source}, which says its own")
-    robot = load_robot(source)
+    robot = load_robot(source, close)
     if overlay is not None:
         content = robot_table(robot, Path(overlay).parent)
         robot = robot_of(lay_over(content, overlay), robot.name)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from forcefit.commands.options import JsonOption
+from forcefit.commands.options import JsonOption, MismatchOption, RestOption
 from forcefit.inputs.writing import write_json
 
 
@@ -38,6 +38,8 @@ def convert(
             "stand."
         ),
     ] = None,
+    rest: RestOption = None,
+    mismatch: MismatchOption = None,
     json: JsonOption = None,
 ) -> None:
     """Convert a robot from or to URDF, MJCF and SDF.
@@ -48,12 +50,14 @@ def convert(
     status 1 if that is another robot.
     """
     from assembly.exchange.convert import convert as convert_robot
+    from assembly.kinematics.closing import closing_of
 
     named = None
     if points is not None:
         names = [name.strip() for name in points.split(",")]
         named = [] if names == ["none"] else names
-    conversion = convert_robot(source, output, loops, overlay, named)
+    close = closing_of(rest, mismatch)
+    conversion = convert_robot(source, output, loops, overlay, named, close)
     write_json(conversion.table(), json)
     if json != "-":
         print(conversion.text())

@@ -173,3 +173,23 @@ def test_sweep_over_drives_that_do_not_fit_is_refused(run, tmp_path):
     assert status == 2
     assert "--mismatch: found points given by drives" in err
     assert not (tmp_path / "x.nc").exists()
+
+
+@robots
+def test_converted_robot_closes_and_keeps_its_energy(files, run, words, key, energy):
+    """The way for commands without the options: a file in which the loops hold."""
+    target = files / "closed.toml"
+    assert run("convert", files / "robot.toml", "-o", target)[0] == 2
+    assert not target.exists()
+    assert run("convert", files / "robot.toml", *words, "-o", target)[0] == 0
+    status, out, _ = run("assembly", "solve", target, "--json", "-")
+    assert status == 0
+    assert json.loads(out)["energy"] == pytest.approx(energy, rel=RELATIVE)
+
+
+def test_convert_refuses_a_way_out_for_files_of_other_programs(run, tmp_path):
+    (tmp_path / "r.urdf").write_text("<robot name='r'><link name='a'/></robot>")
+    words = ["--rest", "a", "-o", tmp_path / "r.toml"]
+    status, _, err = run("convert", tmp_path / "r.urdf", *words)
+    assert status == 2
+    assert "found with --rest or --mismatch, expected a robot file" in err
