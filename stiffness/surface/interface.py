@@ -12,6 +12,7 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from stiffness.beam.beam import unit_vector
 from stiffness.screws import UNIT_VECTORS
 
+_FARTHEST = 1e6  # [m] of a point or radius: the square of much more is no number
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 
 
@@ -38,6 +39,12 @@ class Interface:
         direction = unit_vector(f"{self.kind} direction", self.direction)
         if point.shape != (3,) or not np.isfinite(point).all():
             raise BadInput(f"{self.kind}: the point must be 3 finite numbers [m]")
+        sizes = [*np.abs(point), 0.0 if math.isinf(self.radius) else self.radius]
+        if max(sizes) > _FARTHEST:
+            raise BadInput(
+                f"{self.kind}: found {max(sizes):g}, expected lengths of at most "
+                f"{_FARTHEST:g} m"
+            )
         if not self.radius > 0:
             raise BadInput(f"{self.kind}: radius = {self.radius:g} must be > 0 [m]")
         for name, array in (("point", point), ("direction", direction)):

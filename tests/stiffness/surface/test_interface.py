@@ -120,6 +120,14 @@ def test_a_point_is_three_finite_numbers(point):
         Interface("disc", point, [0, 0, 1], 1.0)
 
 
+@pytest.mark.parametrize("text", ["bore=1e300,0,0/0,1,0/7", "disc=0,0,0/0,1,0/1e200",
+                                  "z=-1e170"])  # fmt: skip
+def test_interface_beyond_all_parts_is_refused(text):
+    """Distances to it overflowed, with a warning of NumPy's."""
+    with pytest.raises(BadInput, match=r"found 1e\+.*, expected lengths of at most 1e"):
+        parse_interface(text)
+
+
 @pytest.mark.parametrize("radius", [0, -1.0, np.inf, np.nan, "wide", None])
 def test_a_radius_of_a_table_is_a_finite_number_above_nothing(radius):
     bore = {"point": [0, 0, 0], "axis": [0, 1, 0], "radius": radius}
