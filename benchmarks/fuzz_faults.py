@@ -81,7 +81,8 @@ def is_whole(name: str, content: bytes) -> bool:
         ".pdf": (b"%PDF", b"%%EOF\n"), ".html": (b"<!doctype", b"</html>\n"),
         ".toml": (b"", b"\n"), ".csv": (b"", b"\n"), ".nc": (b"\x89HDF", b""),
         ".jpg": (b"\xff\xd8", b"\xff\xd9"), ".tif": (b"II", b""), ".bmp": (b"BM", b""),
-        ".urdf": (b"<", b">\n"), ".xml": (b"<", b">\n"), ".yaml": (b"", b"\n"),
+        ".npz": (b"PK", b""), ".urdf": (b"<", b">\n"),
+        ".xml": (b"<", b">\n"), ".yaml": (b"", b"\n"),
         "": (b"", b"\n"), ".pch": (b"", b"\n"), ".mtx": (b"", b"\n"),
     }  # fmt: skip
     first, last = ends.get(path.suffix.lower(), (None, b""))

@@ -8,6 +8,7 @@ from assembly.model.robot import LOCKED, Clearance
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import Table
 
+_LEAST_CLEARANCE = 1e-30  # [rad, m] less is none; its square must be a number
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
 
@@ -21,7 +22,8 @@ def read_clearance(table: Table) -> Clearance | None:
         The bounds that are given.
 
     Raises:
-        BadInput: an unknown key, or not a finite number >= 0.
+        BadInput: an unknown key, or not a finite number >= 0, nor one so small that its
+            square is 0.
     """
     if not table.has("clearance"):
         return None
@@ -31,6 +33,10 @@ def read_clearance(table: Table) -> Clearance | None:
         for key, unit in _CLEARANCE.items()
         if inner.has(key)
     }
+    for key, bound in bounds.items():
+        if 0.0 < bound < _LEAST_CLEARANCE:
+            expected = f"expected 0 or at least {_LEAST_CLEARANCE:g}"
+            raise inner.bad(key, f"found {bound:g}, {expected}")
     inner.finish()
     return Clearance(**bounds)
 

@@ -10,6 +10,7 @@ import math
 import os
 import shutil
 import stat
+import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -232,7 +233,9 @@ def save_figure(figure: Any, path: Path | str) -> None:
     """
     check_writable(path, PICTURE)
     content = io.BytesIO()
-    figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
+    with warnings.catch_warnings():  # a letter that the font lacks is drawn as a box
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(content, dpi=150, format=Path(path).suffix[1:].lower())
     write_bytes(content.getvalue(), path)
 
 

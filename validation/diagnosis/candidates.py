@@ -187,7 +187,8 @@ class Sensitivities:
         if shape.form == "powers" and len(shape.names) > 1:
             # so that a power does not stand for the one below it
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            good = np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw))
+            # of fewer rows than powers no more can be told than there are rows
+            good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
         elif shape.form == "spline":

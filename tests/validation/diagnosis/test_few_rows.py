@@ -71,3 +71,12 @@ def test_eight_rows_of_six_joints_are_too_few():
     if not folder.is_dir():
         pytest.skip(f"{folder} is not there")
     assert diagnose(read_campaign(folder)).verdict == NOT_ENOUGH
+
+
+@pytest.mark.parametrize("rows", [2, 3])
+def test_fewer_rows_than_powers_of_a_function_claim_nothing(rows):
+    """Functions of four powers were built of no more columns than there are rows."""
+    campaign = seen(rows, 1)
+    time = np.linspace(0.0, 600.0, rows)
+    found = diagnose(replace(campaign, covariates={"time": time}))
+    assert found.claimed == ()
