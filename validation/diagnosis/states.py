@@ -122,13 +122,16 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
     Returns:
         By how many standard errors the log predictive densities of blocks gain: of
-        their mean, or of their signed ranks if these say more.
+        their mean, or of their signed ranks if these say more; 0 of a single block,
+        whose gain has no known error.
     """
     densities = []
     for state in (one, other):
         densities.append(leave_block_out(state.marginal, blocks, one.tau)[1])
         state.forget()
     gains = densities[0] - densities[1]
+    if len(gains) < 2:
+        return 0.0
     error = max(float(gains.std(ddof=1)) * np.sqrt(len(gains)), 1e-300)
     ranks = rankdata(np.abs(gains))
     by_ranks = float(np.sign(gains) @ ranks) / float(np.linalg.norm(ranks))

@@ -400,9 +400,7 @@ def test_clearance_whose_square_is_no_number_is_refused(tmp_path, bound):
     """The finite solution divided 0 by 0."""
     path = tmp_path / "r.toml"
     path.write_text(FOUR_BAR.replace("radial = 29e-6", f"radial = {bound}"))
-    with pytest.raises(
-        BadInput, match=r"clearance\.radial: found .*, expected 0 or"
-    ):
+    with pytest.raises(BadInput, match=r"clearance\.radial: found .*, expected 0 or"):
         read_robot(path)
     path.write_text(FOUR_BAR.replace("radial = 29e-6", "radial = 1e-29"))
     assert read_robot(path).frame("elbow").clearance.radial == 1e-29
