@@ -54,20 +54,23 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
     allowed = parameter_names(robot, effect)
     inner = table.table("parameters") if table.has("parameters") else None
     table.finish()
-    if inner is None:
-        return {}
-    for key in inner.content:
+    given = {} if inner is None else inner.content
+    for key in given:
         if key not in allowed:
             hint = nearest(key, allowed)
             message = f"found {quoted(key)}, which is no parameter of {effect} here"
             raise table.bad("parameters", f"{message}{hint}")
-    # times must pass: nothing settles at once, nor in a negative time
-    unit = LIBRARY[effect].unit
+    # times must pass: nothing settles at once, nor in a negative time, nor in none said
+    times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
+    for key in sorted(times - set(given)):
+        owner = key.rpartition(".")[0]
+        if not owner or any(k == owner or k.startswith(f"{owner}.") for k in given):
+            raise table.bad("parameters", f"found no {quoted(key)}; expected it, in s")
+    if inner is None:
+        return {}
     return {
-        key: inner.number(
-            key, "SI", above=0.0 if unit(robot, key) == "s" else -math.inf
-        )
-        for key in inner.content
+        key: inner.number(key, "SI", above=0.0 if key in times else -math.inf)
+        for key in given
     }
 
 

@@ -63,7 +63,13 @@ REFUSED = {
     'name = "encoder_offset"\nparameters = { drive = nan }': ["drive", "nan"],
     'name = "encoder_offset"\nparameters = { drive = "0" }': ["drive"],
     'name = "encoder_offset"\nsize = 1': ["size"],
-    'name = "drift"\n[[effect]]\nname = "drift"': ["drift", "twice"],
+    'name = "self_weight"\n[[effect]]\nname = "self_weight"': ["twice"],
+    'name = "drift"': ["time_constant", "found no", "in s"],
+    'name = "drift"\nparameters = { "amplitude.tx" = 1e-5 }': ["found no", "in s"],
+    'name = "delayed_expansion"\nparameters = { tool = 1e-5 }': [
+        "tool.time_constant",
+        "found no",
+    ],
 }
 
 

@@ -272,7 +272,7 @@ def robots(draw):
         own = 5 if joint == "prismatic" else 2
         if moves and not actuated and K is not None and np.isinf(K[own, own]):
             K[own, own] = 0.0  # free: a passive joint is not locked by its stiffness
-        play = st.none() | st.floats(0, 1)
+        play = st.none() | st.just(0.0) | st.floats(1e-30, 1)
         kinds = bare if i == len(given) - 1 else {
             "clearance": draw(st.none() | st.builds(Clearance, play, play, play, play)),
             "joint_stiffness": K,
