@@ -201,11 +201,10 @@ def test_models_chosen_by_some_rows_are_fitted_to_all(tmp_path, monkeypatch):
     """The same answer, narrower than by those rows; blunders among the others too."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
-    fitted = np.ones(len(campaign), dtype=bool)
-    drawn = trace._drawn(fitted)
+    found = diagnose(campaign)
+    drawn = np.isin(np.arange(len(campaign)), found.traced.columns.row)
     assert drawn.sum() == 30
     assert not drawn[[7, 30]].all()
-    found = diagnose(campaign)
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
     value, std = numbers(found, "encoder_offset")["two"]
     assert abs(value - 6e-5) < 3 * std < 6e-5 / 3
