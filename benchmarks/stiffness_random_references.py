@@ -11,7 +11,7 @@ import netgen.meshing as netgen
 import ngsolve as ng
 import numpy as np
 from netgen.occ import Box, Cylinder, OCCGeometry, Pnt, Y
-from stiffness_part_references import corners_of, mode_stiffness, unit_screws
+from stiffness_part_references import corners_of, unit_screws
 from stiffness_references import scaled
 from stiffness_round_references import AXIS, BASE, FREE, TIP, half_section
 from stiffness_round_references import stiffness as round_stiffness
@@ -167,19 +167,42 @@ def brick_mesh(places, full, axis, mirrors):
 
 
 def by_symmetry(mesh, order, mirrors, tip, lame):
-    """K from motions that are even or odd in each mirror."""
-    motions = unit_screws(tip)
-    K = np.zeros((6, 6))
+    """K from motions that are even or odd in each mirror; one matrix serves all."""
+    (lam, mu), space = lame, ng.VectorH1(mesh, order=order)
+    u, v = space.TnT()
+    e, f = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
+    a = ng.BilinearForm(space, symmetric=True, condense=True)
+    a += (2 * mu * ng.InnerProduct(e, f) + lam * ng.Trace(e) * ng.Trace(f)) * ng.dx
+    a.Assemble()
+    motions, K = unit_screws(tip), np.zeros((6, 6))
     kinds = [tuple(EVEN[m][i] for m in mirrors) for i in range(6)]
     for kind in sorted(set(kinds)):
         group = [i for i in range(6) if kinds[i] == kind]
-        even = dict(zip(mirrors, map(bool, kind), strict=True))
-        same = tuple(even.get(axis, True) for axis in "xyz")
-        work, _ = mode_stiffness(
-            mesh, order, same, [motions[i] for i in group], "base", lame
-        )
-        K[np.ix_(group, group)] = 2 ** len(mirrors) * work
+        free = free_unknowns(mesh, order, mirrors, kind)
+        inverse = a.mat.Inverse(free, inverse="sparsecholesky")
+        fields, forces = [], []
+        for i in group:
+            field = ng.GridFunction(space)
+            field.Set(ng.CF(motions[i]), definedon=mesh.Boundaries("tip"))
+            force = (a.mat * field.vec).Evaluate()
+            field.vec.data -= inverse * force
+            fields.append(field.vec)
+            forces.append((a.mat * field.vec).Evaluate())
+        work = [[ng.InnerProduct(force, field) for field in fields] for force in forces]
+        K[np.ix_(group, group)] = 2 ** len(mirrors) * np.array(work)
     return K
+
+
+def free_unknowns(mesh, order, mirrors, kind):
+    """Those that are not held by base, tip or a mirror, of condensed matrices."""
+    held = {c: ["base", "tip"] for c in "xyz"}
+    for cut, even in zip(mirrors, kind, strict=True):
+        for c in "xyz":
+            # even: no motion across the cut; odd: none along it
+            if (c == cut) == bool(even):
+                held[c].append(f"{cut}0")
+    names = {f"dirichlet{c}": "|".join(held[c]) for c in "xyz"}
+    return ng.VectorH1(mesh, order=order, **names).FreeDofs(True)
 
 
 def eye(part, lame):
