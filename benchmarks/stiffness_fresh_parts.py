@@ -33,10 +33,10 @@ REFERENCES = Path(__file__).with_suffix(".json")
 
 def solved(path: Path, known: dict) -> tuple[np.ndarray, float, dict]:
     """K of the part in a STEP file, its estimated error [1] and the mesh's report."""
-    ends = [parse_interface(f"z={z!r}") for z in (0.0, known["length"])]
+    base, tip = (parse_interface(f"z={z!r}") for z in (0.0, known["length"]))
     materials = [Material(known["young"], known["poisson"])]
     materials += [parse_part("--part", text) for text in known["parts"]]
-    link = solve_link(read_surface(path), *ends, materials).link
+    link = solve_link(read_surface(path), base, tip, materials).link
     return link.stiffness, float(np.abs(link.relative_errors).max()), dict(link.mesh)
 
 

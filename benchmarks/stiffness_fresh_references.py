@@ -5,11 +5,12 @@
 
 Each part is written to FOLDER as a STEP file in millimetres.  K is that of a half or a
 quarter of the same shape, by its symmetry, in curved tetrahedra with layers of prisms
-along the edges of both interfaces and of the layers.  Order 5 is extrapolated by a part
-of its difference from order 4.  The uncertainty is the larger of that part and the
-difference from order 5 on a coarser mesh with fewer layers of prisms.  Walls with sharp
-edges and round tubes have the references of ``stiffness_random_references.py``, bricks
-and Fourier modes.  What the JSON file already holds is not computed again.
+along the edges of both interfaces and of the layers.  The higher of two orders (5, or 4
+of layers and thin walls) is extrapolated by a part of its difference from the lower.
+The uncertainty is the larger of that part and the difference from the higher order on a
+coarser mesh with fewer layers of prisms.  Walls with sharp edges and round tubes have
+the references of ``stiffness_random_references.py``, bricks and Fourier modes.
+What the JSON file already holds is not computed again.
 """
 
 import argparse
@@ -28,7 +29,6 @@ from stiffness_references import scaled
 
 REFERENCES = Path(__file__).with_name("stiffness_fresh_parts.json")
 FAR = 1e3  # [mm] beyond every part
-ORDERS = 4, 5
 MORE = 0.3  # of the difference of both orders that is added to the higher one
 
 
@@ -120,8 +120,8 @@ def reference(part):
     # an interface that ends tangentially in a rounding: the field is that of a crack
     rows = 3 if part.mirrors == "x" else 2
     mesh = mesh_of(part, 1.0, rows)
-    low, high = (stiffness(part, mesh, order) for order in ORDERS)
-    other = stiffness(part, mesh_of(part, 1.4, rows - 1), ORDERS[1])
+    low, high = (stiffness(part, mesh, order) for order in part.orders)
+    other = stiffness(part, mesh_of(part, 1.4, rows - 1), part.orders[1])
     K = high + MORE * (high - low)
     steps = [np.abs(scaled(d, K)).max() for d in (high - low, high - other)]
     return K, max(MORE * steps[0], steps[1])

@@ -31,6 +31,7 @@ class Part:
             is the whole part.
         simple: [m] ``planes`` and ``full`` bricks or ``profile`` of a part for
             ``stiffness_random_references.independent_stiffness``.
+        orders: of the reference's polynomials.
     """
 
     note: str
@@ -41,6 +42,7 @@ class Part:
     maxh: float
     layers: list
     simple: dict = field(default_factory=dict)
+    orders: tuple = (4, 5)
 
 
 def between(rng, low, high):
@@ -124,7 +126,7 @@ def layers(rng):
         rows.append((2, high, L, young / contrast**0.5, nu[2]))
     size = min(D / 4, W / 4, high - low if rows[1][0] == 2 else W / 2 - core)
     note = f"{form} 1:{contrast:g}"
-    return Part(note, solid, L, mirrors, size, W / 3, rows)
+    return Part(note, solid, L, mirrors, size, W / 3, rows, orders=(3, 4))
 
 
 def shaft(rng):
@@ -183,7 +185,7 @@ def thin(rng):
             planes = [[v / 1e3 for v in axis] for axis in (xs, ys, [0, L])]
             simple = {"planes": planes, "full": full}
         solid = solid - inside
-    return Part(note, solid, L, mirrors, t, max(W / 8, 2.5 * t), [], simple)
+    return Part(note, solid, L, mirrors, t, max(W / 8, 2.5 * t), [], simple, (3, 4))
 
 
 def draw_part(number):
