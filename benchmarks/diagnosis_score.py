@@ -124,10 +124,11 @@ def _claimed(diagnosis: dict) -> list[str]:
 def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
     """Whether some function learned is where, and of what, the hidden effect is."""
     (effect,) = truth["effects"]
-    name, keys = effect["name"], [p["name"] for p in effect["parameters"]]
-    frames = {key.rpartition(".")[0] or key for key in keys}
+    name, frames = effect["name"], set(effect["where"])
     at_reading = name in ("_stand", "_sag")
-    wanted = {"reading"} if at_reading else {"base"} if name == "_tilting" else frames
+    elsewhere = {"_stand": "reading", "_sag": "reading", "_tilting": "base",
+                 "_cable": "load"}  # fmt: skip
+    wanted = {elsewhere[name]} if name in elsewhere else frames
     known = OUTSIDE_COVARIATES.get(name, ())
     of = {v if v in ("time", "approach") else f"cov.{v}" for v in known}
     if name in ("_two_steps", "_torque_backlash"):
