@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
+from assembly.model.frame import between_origins
 from assembly.model.robot import BeamLink, Frame, Robot, beam_axis
-from stiffness.screws import rotation_matrix
 
 _LEAST = 1e-6  # [m] length of a body between two places
 
@@ -54,7 +54,7 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)
-    along = rotation_matrix(frame.rotation).T @ frame.translation
+    along = between_origins(frame)
     length = float(np.linalg.norm(along))
     return length, along / length
 

@@ -260,6 +260,11 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
     return array
 
 
+def between_origins(frame: Frame) -> NDArray:
+    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
+    return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
+
+
 def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     """Length and direction of a frame's beam.
 
@@ -278,7 +283,7 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
     # a revolute parent turns the beam about its start, which changes neither
-    along = rotation_matrix(frame.rotation).T @ frame.translation
+    along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:
         raise ValueError(f"frame '{frame.name}': a beam of no length")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.frame import between_origins
 from assembly.model.robot import Frame, MeshLink
 from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.beam import section_axes
@@ -40,7 +41,7 @@ def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
     span = _span(link, place)
     turn = mesh_turn(frame, span)
     if link.axis is None:
-        _check_tip(place, turn @ span, _between_origins(frame))
+        _check_tip(place, turn @ span, between_origins(frame))
     return turn_link(solved_mesh(link, place, accuracy).link, turn)
 
 
@@ -178,13 +179,8 @@ def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
         except BadInput as error:
             place = f"frame {quoted(frame.name)}.link.mesh.up"
             raise BadInput(f"{place}: {error}; expected another direction") from None
-    span = _between_origins(frame) if link.axis is None else np.array(link.axis)
+    span = between_origins(frame) if link.axis is None else np.array(link.axis)
     return mesh_rotation(mesh_span, span, link.up, link.frame_up)
-
-
-def _between_origins(frame: Frame) -> NDArray:
-    """(3,) [m] from the parent's origin to the frame's, in the frame's axes."""
-    return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
 def mesh_rotation(

@@ -56,13 +56,16 @@ class State:
     tau: float
     fit: "Fitting"
 
+    def _columns(self) -> NDArray:
+        """(n, k) of all unknowns; not kept, they may be hundreds of megabytes."""
+        f = self.fit
+        return np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
+
     @cached_property
     def marginal(self) -> Marginal:
         """Model with its unknowns marginalised, in the fitted cells."""
-        f, z = self.fit, self.fit.readings(self.elements)
-        columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
-        X = np.hstack(columns)
-        return marginalise(X, self.sizes.std, z, f.flat)
+        z = self.fit.readings(self.elements)
+        return marginalise(self._columns(), self.sizes.std, z, self.fit.flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
@@ -70,8 +73,7 @@ class State:
         f = self.fit
         if f.sampled.all():
             return self.marginal
-        columns = [f.small[:, self.used], *(f.own(e) for e in self.elements)]
-        X, z = np.hstack(columns)[f.sampled], f.readings(self.elements)[f.sampled]
+        X, z = self._columns()[f.sampled], f.readings(self.elements)[f.sampled]
         flat = np.linalg.qr(f.flat[f.sampled])[0]
         X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
         return marginalise(X, self.sizes.std, z, flat)
@@ -85,15 +87,14 @@ class State:
     def fitted(self) -> NDArray:
         """(n,) contribution of the model to the readings, whitened and weighted."""
         f = self.fit
-        X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
-        return X @ self.sizes.mean + (f.z - f.readings(self.elements))
+        return self._columns() @ self.sizes.mean + (f.z - f.readings(self.elements))
 
     @cached_property
     def left(self) -> NDArray:
         """(n,) residual of independent noise, unweighted."""
         f = self.fit
-        X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
-        return (f.readings(self.elements) - X @ self.sizes.mean) / f.root
+        fitted = self._columns() @ self.sizes.mean
+        return (f.readings(self.elements) - fitted) / f.root
 
     def own(self, k: int) -> slice:
         """Return the slice of the k-th element's unknowns."""
@@ -103,10 +104,9 @@ class State:
 
     def expected_squares(self) -> NDArray:
         """Return the (n,) expected squared residuals, unweighted."""
-        f = self.fit
-        X = np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
+        X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
-        return self.left**2 + spread * self.tau**2 / f.weights
+        return self.left**2 + spread * self.tau**2 / self.fit.weights
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
