@@ -19,7 +19,7 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
-from validation.diagnosis.holdout import SPANS, blocks_of
+from validation.diagnosis.holdout import SPANS, blocks_of, drawn
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
 from validation.diagnosis.joint_functions import joint_functions
 from validation.diagnosis.nuisance import Nuisance, nuisance
@@ -94,18 +94,12 @@ class Columns:
         terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
         self.nuisance: Nuisance = nuisance(terms, self._named())
         self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
-        self.sampled = self._sampled()
-        rows = np.unique(self.row[self.sampled])
+        rows = np.unique(self.row)
+        rows = rows[drawn(campaign.measured_at_once[rows], _SAMPLE)]
+        self.sampled = np.isin(self.row, rows)
         any_function = odds.get(FUNCTION, 1.0) > 0.0
         self.functions = Functions(campaign, self.sensitivities, any_function)
         self.explicit = joint_functions(self.functions, rows) if any_function else []
-
-    def _sampled(self) -> NDArray:
-        """(N,) mask of the cells of whole measurements, of about 500 rows."""
-        visits, rows = np.unique(self.visit), len(np.unique(self.row))
-        most = _SAMPLE * len(visits) // max(rows, 1)
-        drawn = np.random.default_rng(0).permutation(visits)[:most]
-        return np.isin(self.visit, drawn)
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Return visible hypotheses with distinct columns."""

@@ -90,6 +90,21 @@ def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
     )
 
 
+def drawn(visit: NDArray, most: int) -> NDArray:
+    """Some rows, drawn once; the points of a row of the file stay together.
+
+    Args:
+        visit: (R,) the same for rows that are measured at once.
+        most: rows that are wanted, about.
+
+    Returns:
+        (R,) bool; all where there are no more.
+    """
+    listed = np.unique(visit)
+    count = most * len(listed) // max(len(visit), 1)
+    return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
+
+
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
     """What rows that are foretold must not share with rows that are fitted.
 

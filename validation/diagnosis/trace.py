@@ -32,7 +32,7 @@ from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
 from validation.diagnosis.common_noise import NONE
 from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.holdout import hidden
+from validation.diagnosis.holdout import drawn, hidden
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.lack_of_fit import outlying
 from validation.diagnosis.noise import cell_weights
@@ -190,7 +190,7 @@ def trace(
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
-    sample = hidden(campaign, ~_drawn(campaign, fitted))
+    sample = hidden(campaign, ~_searched_rows(campaign, fitted))
     conditions = _with_its_errors(sample, declared, conditions, fitted, complete)
     columns = Columns(sample, conditions, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
@@ -218,13 +218,11 @@ def trace(
     return _without_outlying(traced, fit)
 
 
-def _drawn(campaign: Campaign, fitted: NDArray) -> NDArray:
+def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
     """(R,) bool, the rows by which models are chosen: all, or so many drawn once."""
-    visit = campaign.measured_at_once  # the points of a row of the file stay together
-    listed = np.unique(visit[fitted])
-    most = _SEARCHED * len(listed) // max(int(fitted.sum()), 1)
-    drawn = np.random.default_rng(0).permutation(listed)[:most]
-    return fitted & np.isin(visit, drawn)
+    chosen = np.zeros(len(campaign), dtype=bool)
+    chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
+    return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
