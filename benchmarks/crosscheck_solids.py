@@ -9,6 +9,7 @@ from pathlib import Path
 
 from crosscheck_robots import papers_robot
 
+from assembly.files.solved_links import solve_links
 from assembly.kinematics.posture import place_robot
 from assembly.model.robot import MeshLink
 from validation.crosscheck.crosscheck import crosscheck
@@ -24,9 +25,8 @@ def main() -> None:
           "energy against exact  seconds")  # fmt: skip
     for seed in range(3):
         robot = papers_robot(seed, signed=seed % 2 == 1)
-        posture = place_robot(
-            robot.with_links(dict.fromkeys(names, link)), {"tx": 0.1, "tz": -0.45}
-        )
+        meshed = solve_links(robot.with_links(dict.fromkeys(names, link)))
+        posture = place_robot(meshed, {"tx": 0.1, "tz": -0.45})
         for links in ("spring", "fem"):
             started = time.perf_counter()
             check = crosscheck(posture, links=links)

@@ -20,6 +20,7 @@ from crosscheck_robots import drawn, hexapod, papers_robot
 from validity_figures import pose_figure, validity_figure
 from validity_models import bush_margin, halves_cost, with_bars
 
+from assembly.files.solved_links import solved_link
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
@@ -177,6 +178,7 @@ def forks() -> Iterable[dict]:
     cases = postures("irsbot2")
     names = [f.name for f in cases[0].robot.frames if f.link is not None]
     frame = replace(cases[0].robot.frame(names[0]), link=mesh)
+    frame = replace(frame, link=solved_link(frame))
     solids = dict.fromkeys(names, np.linalg.inv(link_compliance(frame)))
     for case, section in (
         ("bar, r = 40 mm", {"radius": 0.04}),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from assembly.files.robot_file import Closing
 from assembly.files.robot_file import write_robot as write_robot_file
+from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from assembly.robots import load_robot as load_declared
 from forcefit.inputs.table import BadInput, read_bytes
@@ -16,7 +17,9 @@ _BLANKS = b"\xef\xbb\xbf \r\n\t"  # and a byte order mark
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
-def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
+def load_robot(
+    name: str | Path, close: Closing | None = None, *, links: bool = True
+) -> Robot:
     """A built-in robot by its name, or the robot of a file of any kind.
 
     Args:
@@ -24,14 +27,27 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
             beside it), MJCF or SDF file.
         close: makes of a robot as declared one whose closures hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
+        links: whether links given by a mesh or a library are solved or read now, which
+            solvers need; without them a robot can be placed, written and converted,
+            and its assembly zone be found.
 
     Returns:
         The robot; of other programs' files what was taken and what was left out is
         among its remarks.
 
     Raises:
-        BadInput: neither a built-in name nor a file, or the file breaks a rule.
+        BadInput: neither a built-in name nor a file, the file breaks a rule, or a mesh
+            or a library that it names is not usable.
     """
+    robot = _load_declared(name, close)
+    try:
+        return solve_links(robot) if links else robot
+    except BadInput as error:
+        raise BadInput(f"{name}: {error}") from None
+
+
+def _load_declared(name: str | Path, close: Closing | None) -> Robot:
+    """The robot of a name or of a file, its links as they are declared."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
@@ -64,7 +80,8 @@ def read_robot(path: str | Path) -> Robot:
         The robot.
 
     Raises:
-        BadInput: the file breaks a rule.
+        BadInput: the file breaks a rule, or a mesh or a library that it names is not
+            usable.
     """
     return load_robot(Path(path).absolute() if not Path(path).suffix else path)
 

@@ -9,6 +9,7 @@ carries the children.
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, quoted
 from stiffness.screws import rotation_matrix
+
+if TYPE_CHECKING:
+    from stiffness.fem.fea import MeshedLink
 
 JOINTS = ("fixed", "revolute", "prismatic")
 BASE = "base"
@@ -84,6 +88,24 @@ class MatrixLink:
     stiffness: NDArray
 
 
+@dataclass(frozen=True, eq=False)
+class MeshSolution:
+    """The finite elements of a mesh link, in the mesh's axes.
+
+    Attributes:
+        solved: stiffness and fields on the finest mesh.
+        young: [Pa] modulus with which they were solved.
+        digest: SHA-256 of the surface file.
+        mass: (12, 12) [kg m^2 .. kg] consistent mass for screws of base and tip, each
+            read at its end; zero without a density.
+    """
+
+    solved: "MeshedLink"
+    young: float
+    digest: str
+    mass: NDArray
+
+
 @dataclass(frozen=True)
 class MeshLink:
     """A link whose K_E comes from finite elements on its surface.
@@ -102,6 +124,8 @@ class MeshLink:
             origin to the frame's.
         interface: ``"rigid"`` or ``"distributing"``.
         parts: of another material, as :func:`stiffness.fem.part_text.parse_part` reads.
+        solution: of its finite elements, None until
+            :func:`assembly.files.solved_links.solve_links`; it is not pickled.
     """
 
     surface: Path
@@ -116,6 +140,11 @@ class MeshLink:
     interface: str = "rigid"
     axis: tuple[float, float, float] | None = None
     parts: tuple[str, ...] = ()
+    solution: MeshSolution | None = field(default=None, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # tens of megabytes, which a worker finds from the same files
+        return {**vars(self), "solution": None}
 
 
 @dataclass(frozen=True)
@@ -125,10 +154,13 @@ class LibraryLink:
     Attributes:
         library: the library's path.
         key: the entry's key.
+        compliance: (6, 6) [rad/(N m) .. m/N] of the entry, at the frame in its axes;
+            None until :func:`assembly.files.solved_links.solve_links`.
     """
 
     library: Path
     key: str
+    compliance: NDArray | None = field(default=None, compare=False, repr=False)
 
 
 Link = BeamLink | MatrixLink | MeshLink | LibraryLink

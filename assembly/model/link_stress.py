@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.model.mesh_link import mesh_turn, solved_mesh
+from assembly.model.mesh_link import mesh_solution, mesh_turn
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
@@ -56,7 +56,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
         Beams of a declared shape and links given by a surface.
 
     Raises:
-        BadInput: a surface is not usable.
+        BadInput: a mesh was not solved when the robot was loaded.
     """
     return tuple(
         _of_mesh(robot.frame(name), robot.index(name))
@@ -91,7 +91,7 @@ def peak_stresses(
         (..., links) [Pa] in the order of :func:`stressed_links`.
 
     Raises:
-        BadInput: a surface is not usable.
+        BadInput: a mesh was not solved when the robot was loaded.
         ValueError: the shape does not fit the robot.
     """
     w = np.asarray(wrenches, dtype=float)
@@ -128,9 +128,7 @@ def _of_mesh(frame: Frame, row: int) -> LinkStress:
     """Peak stress of a link given by its surface."""
     from stiffness.fem.stress import stress_influence, von_mises
 
-    link = frame.link
-    assert isinstance(link, MeshLink)
-    solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
+    solved = mesh_solution(frame).solved
     influence = stress_influence(solved)
     R = mesh_turn(frame, solved.link.tip - solved.link.base)
 

@@ -5,11 +5,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.mesh_link import mesh_link_stiffness, refuse_unsolved
 from assembly.model.robot import (
     BeamLink,
     Frame,
     LibraryLink,
     MatrixLink,
+    MeshLink,
     Robot,
     beam_axis,
 )
@@ -25,6 +27,9 @@ def link_compliances(robot: Robot) -> NDArray:
 
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
+
+    Raises:
+        BadInput: a mesh or a library was not read when the robot was loaded.
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
@@ -52,13 +57,12 @@ def _compliance(frame: Frame) -> NDArray:
             length, section, link.young, link.poisson,
             theory=link.theory, axis=axis, up=link.up,
         )  # fmt: skip
-    if isinstance(link, LibraryLink):
-        from stiffness.report.library import read_compliance
-
-        return read_compliance(link.library, link.key)
-    from assembly.model.mesh_link import mesh_compliance
-
-    return mesh_compliance(frame)
+    if isinstance(link, MeshLink):
+        return mesh_link_stiffness(frame).compliance
+    assert isinstance(link, LibraryLink)
+    if link.compliance is None:
+        refuse_unsolved(frame)
+    return link.compliance
 
 
 def joint_compliances(robot: Robot) -> NDArray:

@@ -1,132 +1,73 @@
-"""A mesh link's finite elements, solved once, rotated to its frame's axes."""
+"""A mesh link's finite elements in its frame's axes; nothing is solved here.
 
-from typing import TYPE_CHECKING
+:func:`assembly.files.solved_links.solve_links` solves them when a robot is loaded.
+"""
+
+from dataclasses import replace
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.frame import between_origins
-from assembly.model.robot import Frame, MeshLink
+from assembly.model.frame import MeshSolution, between_origins
+from assembly.model.robot import Frame, LibraryLink, MeshLink
 from forcefit.inputs.table import BadInput, quoted
-from stiffness.beam.beam import section_axes
 from stiffness.link import LinkStiffness, turn_link
 from stiffness.screws import rotation_matrix
 
-if TYPE_CHECKING:
-    from stiffness.fem.fea import MeshedLink
-    from stiffness.surface.interface import Interface
-    from stiffness.surface.surface import Surface
+
+def mesh_solution(frame: Frame) -> MeshSolution:
+    """The finite elements of a frame's mesh link, as they were solved at loading.
+
+    Args:
+        frame: one with a :class:`assembly.model.robot.MeshLink`.
+
+    Returns:
+        The solution; for the link's own modulus multiply its stiffness by
+        :func:`modulus_factor`.
+
+    Raises:
+        BadInput: it was not solved when the robot was loaded.
+    """
+    solution = _mesh(frame).solution
+    if solution is None:
+        refuse_unsolved(frame)
+    return solution
 
 
-def mesh_link_stiffness(frame: Frame, accuracy: float = 0.005) -> LinkStiffness:
+def refuse_unsolved(frame: Frame) -> NoReturn:
+    """Refuse a link whose stiffness was not found when the robot was loaded."""
+    kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
+    raise BadInput(
+        f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
+        "of load_robot, or of assembly.files.solved_links.solve_links"
+    )
+
+
+def modulus_factor(frame: Frame) -> float:
+    """Young's modulus of a mesh link over that with which it was solved: K's factor."""
+    return _mesh(frame).young / mesh_solution(frame).young
+
+
+def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
     """Stiffness of a frame's mesh link by finite elements, in the frame's axes.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
-        accuracy: asked of every entry, relative to sqrt(K_ii K_jj).
 
     Returns:
         The link, read at the tip interface's centre, which is the frame's origin.
 
     Raises:
-        BadInput: the surface or an interface is not usable, ``up`` lies along the
-            link, or the distance of the interfaces is not that of the two origins.
-        ValueError: the frame has no mesh link.
+        BadInput: it was not solved when the robot was loaded.
     """
-    link = frame.link
-    if not isinstance(link, MeshLink):
-        raise ValueError(f"frame '{frame.name}' has no mesh link")
-    place = f'frame "{frame.name}".link.mesh'
-    # what can be refused is refused before the finite elements
-    span = _span(link, place)
-    turn = mesh_turn(frame, span)
-    if link.axis is None:
-        _check_tip(place, turn @ span, between_origins(frame))
-    return turn_link(solved_mesh(link, place, accuracy).link, turn)
-
-
-def mesh_compliance(frame: Frame) -> NDArray:
-    """(6, 6) compliance of a frame's mesh link; see :func:`mesh_link_stiffness`."""
-    return mesh_link_stiffness(frame).compliance
-
-
-# by this process
-_SOLVED: "dict[tuple[object, ...], MeshedLink]" = {}
-_SPANS: dict[tuple[object, ...], NDArray] = {}
-
-
-def solved_mesh(
-    link: MeshLink, place: str = "mesh", accuracy: float = 0.005
-) -> "MeshedLink":
-    """The finite elements of a mesh link, in the mesh's axes.
-
-    Stiffness, mass, stress and the solid itself are all read from the same solution;
-    links of one shape and material are solved once.
-
-    Args:
-        link: whose surface is meshed.
-        place: of the link, for messages.
-        accuracy: asked of every entry of K_E, relative to sqrt(K_ii K_jj).
-
-    Returns:
-        The link on its finest mesh.
-
-    Raises:
-        BadInput: the surface or an interface is not usable.
-    """
-    from stiffness.fem.fea import FemOptions, solve_link
-    from stiffness.fem.material import Material
-    from stiffness.fem.part_text import parse_part
-
-    density = link.density or 0.0
-    key = (*_shape_key(link, place), link.young, link.poisson, density, link.interface,
-           link.parts, accuracy)  # fmt: skip
-    if key not in _SOLVED:
-        parts = [parse_part(f"{place}.parts", text) for text in link.parts]
-        _SOLVED[key] = solve_link(
-            *_shape(link, place),
-            (Material(link.young, link.poisson, density), *parts),
-            options=FemOptions(accuracy, link.interface),
-        )
-    return _SOLVED[key]
-
-
-def _span(link: MeshLink, place: str) -> NDArray:
-    """(3,) [m] from the base interface's centre to the tip's, in the mesh's axes."""
-    from stiffness.fem.fea import interface_center
-
-    key = _shape_key(link, place)
-    if key not in _SPANS:
-        surface, base, tip = _shape(link, place)
-        _SPANS[key] = interface_center(surface, tip, "tip") - interface_center(
-            surface, base, "base"
-        )
-    return _SPANS[key]
-
-
-def _shape(link: MeshLink, place: str) -> "tuple[Surface, Interface, Interface]":
-    """Surface, base and tip, as they are read from its file and its entries."""
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
-
-    return (
-        read_surface(link.surface, link.unit),
-        parse_interface(link.base, f"{place}.base"),
-        parse_interface(link.tip, f"{place}.tip"),
-    )
-
-
-def _shape_key(link: MeshLink, place: str) -> tuple[object, ...]:
-    """What a link's shape depends on: its entries, and which state of its file."""
-    from stiffness.surface.surface_files import named_solid
-
-    try:
-        stamp = named_solid(link.surface)[0].stat().st_mtime_ns
-    except OSError as error:
-        raise BadInput(
-            f"{place}: surface {link.surface} cannot be read: {error.strerror}"
-        ) from None
-    return link.surface, stamp, link.unit, repr(link.base), repr(link.tip)
+    link, factor = mesh_solution(frame).solved.link, modulus_factor(frame)
+    if factor != 1.0:
+        link = replace(
+            link, compliance=link.compliance / factor,
+            stiffness_error=link.stiffness_error * factor,
+        )  # fmt: skip
+    return turn_link(link, mesh_turn(frame, link.tip - link.base))
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
@@ -140,19 +81,13 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
         frame's axes; and (3,) [m] from base to tip, in the frame's axes.
 
     Raises:
-        BadInput: the surface or an interface is not usable.
-        ValueError: the frame has no mesh link.
+        BadInput: it was not solved when the robot was loaded.
     """
-    from stiffness.fem.two_ends import two_ends
-
-    link = frame.link
-    if not isinstance(link, MeshLink):
-        raise ValueError(f"frame '{frame.name}' has no mesh link")
-    solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
-    span = solved.centers[1] - solved.centers[0]
+    solution = mesh_solution(frame)
+    span = solution.solved.centers[1] - solution.solved.centers[0]
     turn = mesh_turn(frame, span)
     R = np.kron(np.eye(4), turn)
-    return R @ two_ends(solved).mass @ R.T, turn @ span
+    return R @ solution.mass @ R.T, turn @ span
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
@@ -165,20 +100,8 @@ def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
     Returns:
         (3, 3) it lays the span along the link's ``axis``, or along the line from the
         parent's origin to the frame's if it has none.
-
-    Raises:
-        BadInput: the mesh's ``up`` lies along the span.
-        ValueError: the frame has no mesh link.
     """
-    link = frame.link
-    if not isinstance(link, MeshLink):
-        raise ValueError(f"frame '{frame.name}' has no mesh link")
-    if link.up is not None:
-        try:
-            section_axes(mesh_span, link.up)
-        except BadInput as error:
-            place = f"frame {quoted(frame.name)}.link.mesh.up"
-            raise BadInput(f"{place}: {error}; expected another direction") from None
+    link = _mesh(frame)
     span = between_origins(frame) if link.axis is None else np.array(link.axis)
     return mesh_rotation(mesh_span, span, link.up, link.frame_up)
 
@@ -221,17 +144,8 @@ def _triad(along: NDArray, up: NDArray) -> NDArray:
     return np.column_stack([along, side, np.cross(along, side)])
 
 
-def _check_tip(place: str, tip: NDArray, wanted: NDArray) -> None:
-    """The interfaces must be as far apart as the origins they stand for."""
-    length = float(np.linalg.norm(wanted))
-    if np.linalg.norm(tip - wanted) > 1e-6 + 1e-3 * length:
-        raise BadInput(
-            f"{place}: the tip interface's centre lies at {_point(tip)} from the "
-            f"base's, the frame's origin at {_point(wanted)} from its parent's; "
-            "expected the same point within 1e-6 m + 0.1 % of the length"
-        )
-
-
-def _point(p: NDArray) -> str:
-    """Coordinates for a message."""
-    return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"
+def _mesh(frame: Frame) -> MeshLink:
+    """The mesh link of a frame that has one."""
+    if not isinstance(frame.link, MeshLink):
+        raise ValueError(f"frame '{frame.name}' has no mesh link")
+    return frame.link

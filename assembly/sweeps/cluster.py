@@ -16,10 +16,12 @@ import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from assembly.files.solved_links import solve_links
 from assembly.sweeps.identity import program_hash, question_hash
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.points import Points, SolvedPoints, solve_points
@@ -227,7 +229,8 @@ def solve_task(
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
     """The question, unpickled once on each worker: robots are cached by identity."""
-    question: Question = pickle.loads(content)
+    asked: Question = pickle.loads(content)
+    question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:
         raise BadInput(
             "sweep: a worker reads another robot; expected its meshes and stiffness "

@@ -18,9 +18,10 @@ import assembly
 import forcefit.inputs
 import stiffness
 from assembly.files.robot_file import robot_table
+from assembly.model.links import link_compliance
+from assembly.model.mesh_link import mesh_solution
 from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
-from forcefit.inputs.table import BadInput
 
 # libraries that the numbers depend on: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "numba", "clarabel")
@@ -52,27 +53,17 @@ def robot_hash(robot: Robot) -> str:
         The digest.
 
     Raises:
-        BadInput: a mesh or a library cannot be read.
+        BadInput: a mesh or a library was not read when the robot was loaded.
     """
-    from stiffness.report.library import read_compliance
-
     table = robot_table(robot)
     table.pop("description", None)
     digest = hashlib.sha256(json.dumps(table, default=str).encode())
     for frame in robot.frames:
         if isinstance(frame.link, MeshLink):
-            digest.update(_content(Path(frame.link.surface)))
+            digest.update(mesh_solution(frame).digest.encode())
         if isinstance(frame.link, LibraryLink):
-            digest.update(read_compliance(frame.link.library, frame.link.key).tobytes())
+            digest.update(link_compliance(frame).tobytes())
     return digest.hexdigest()
-
-
-def _content(path: Path) -> bytes:
-    """The content of a file."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def question_hash(question: Any) -> str:
@@ -82,7 +73,7 @@ def question_hash(question: Any) -> str:
         question: plain values, arrays, robots, designs and dataclasses of such.
 
     Returns:
-        The digest; meshes and libraries are read from the robot's paths.
+        The digest.
     """
     return hashlib.sha256(json.dumps(_as_json(question)).encode()).hexdigest()
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from assembly.files.robot_file import declared_robot, robot_of, robot_table
+from assembly.files.solved_links import solve_links
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
@@ -112,9 +113,13 @@ class Design:
 
         Raises:
             BadInput: a path leads to no number, a value breaks a rule of the format,
-                or the closures no longer hold.
+                the closures no longer hold, or a link's mesh or library is not usable.
         """
-        return robot_of(Table(self.changed(values), self.file, ""), self.name)
+        robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
+        try:
+            return solve_links(robot)
+        except BadInput as error:
+            raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
         """Refuse numbers that break a rule of the format.
@@ -148,9 +153,10 @@ def load_design(name: str | Path) -> Design:
     from assembly.exchange.robot_files import OTHERS, load_robot
     from assembly.robots import BUILT_IN
 
+    # refuses a wrong file before numbers are changed
+    robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
-        return design_of(load_robot(name))
-    robot = load_robot(name)  # refuses a wrong file before numbers are changed
+        return design_of(robot)
     return Design(read_toml(Path(name)).content, str(name), robot.name)
 
 

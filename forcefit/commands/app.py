@@ -1,5 +1,6 @@
 """The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
 
+import logging
 import signal
 import sys
 import threading
@@ -109,12 +110,22 @@ def main() -> None:
     if not sys.warnoptions:
         # libraries' warnings are for programmers; ``python -W default -m forcefit``
         warnings.simplefilter("ignore")
+    _tell_links()
     with _interrupts() as interrupts:
         try:
             status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
             sys.exit(_status_after(error, interrupted=bool(interrupts)))
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _tell_links() -> None:
+    """A line on stderr for each link that finite elements solve at loading."""
+    log = logging.getLogger("assembly.files.solved_links")
+    log.setLevel(logging.INFO)
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("forcefit: %(message)s"))
+    log.handlers = [handler]
 
 
 def _status_after(error: BaseException, interrupted: bool) -> int:

@@ -83,7 +83,7 @@ def zone(
     from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 
-    posture = posture_of(robot, pose, joint, rest, mismatch)
+    posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
     margins = zone_of(posture) | singular_status(posture)
     write_json({"robot": robot, "zone": margins}, json)
     if json != "-":

@@ -221,7 +221,7 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
 def posture_of(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
-    note: bool = True,
+    note: bool = True, links: bool = True,
 ) -> Any:  # fmt: skip
     """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
 
@@ -233,6 +233,7 @@ def posture_of(
         mismatch: of ``--mismatch``.
         own_errors: whether the robot keeps its errors beside those of the two.
         note: whether to say on stderr what is to be known of the posture.
+        links: of :func:`assembly.exchange.robot_files.load_robot`.
 
     Returns:
         The posture, of the robot as the effects of its file make it.
@@ -242,7 +243,9 @@ def posture_of(
     """
     from assembly.effects.robot_effects import apply_robot_effects
 
-    declared = declared_posture(robot, pose, joint, rest, mismatch, own_errors, note)
+    declared = declared_posture(
+        robot, pose, joint, rest, mismatch, own_errors, note, links
+    )
     applied = apply_robot_effects(declared)
     if applied.gravity is not None or applied.load.any():
         raise BadInput(
@@ -255,7 +258,7 @@ def posture_of(
 def declared_posture(
     robot: str, pose: list[str] | None, joint: list[str] | None,
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
-    note: bool = True,
+    note: bool = True, links: bool = True,
 ) -> Any:  # fmt: skip
     """The posture of the options, of the robot without the effects of its file.
 
@@ -268,7 +271,8 @@ def declared_posture(
     from assembly.model.largest import LARGEST_LENGTH
 
     joints = parse_assignments(joint, "--joint", LARGEST_LENGTH) if joint else None
-    machine = load_robot(robot, closing_of(rest, mismatch, joints, own_errors))
+    close = closing_of(rest, mismatch, joints, own_errors)
+    machine = load_robot(robot, close, links=links)
     if mismatch is not None and not pose:
         posture = home_posture(machine)
     else:

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.mesh_link import mesh_turn, solved_mesh
+from assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from stiffness.beam.beam import section_axes
 from stiffness.fem.condensation import condense
@@ -76,15 +76,17 @@ def solid_link(frame: Frame) -> SolidLink | None:
         beam given by the constants of its section.
 
     Raises:
-        BadInput: a surface or an interface is not usable, or no mesh can be made.
+        BadInput: a mesh was not solved when the robot was loaded, or none can be made.
     """
     link = frame.link
     if isinstance(link, MeshLink):
-        solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
+        solved, factor = mesh_solution(frame).solved, modulus_factor(frame)
         span = solved.centers[1] - solved.centers[0]
         ends, distributing = _stiffnesses(solved)
-        turn = mesh_turn(frame, span)
-        return SolidLink(ends, distributing, span, turn, _mesh_error(solved))
+        return SolidLink(
+            factor * ends, factor * distributing, span, mesh_turn(frame, span),
+            _mesh_error(solved),
+        )  # fmt: skip
     if not isinstance(link, BeamLink) or "area" in link.section:
         return None
     length, axis = beam_axis(frame)
@@ -114,7 +116,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
         By frame.
 
     Raises:
-        BadInput: a surface or an interface is not usable, or no mesh can be made.
+        BadInput: a mesh was not solved when the robot was loaded, or none can be made.
     """
     solids = {frame.name: solid_link(frame) for frame in robot.frames}
     return {name: solid for name, solid in solids.items() if solid is not None}

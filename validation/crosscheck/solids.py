@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from assembly.model.mesh_link import mesh_turn, solved_mesh
+from assembly.model.mesh_link import mesh_solution, mesh_turn, modulus_factor
 from assembly.model.robot import MeshLink, Robot
 from forcefit.inputs.table import BadInput
 from stiffness.fem.fea import MeshedLink
@@ -21,10 +21,10 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
         one shape and material share one solid.
 
     Raises:
-        BadInput: a surface or an interface is not usable, or an interface is not
-            rigid, the only kind a floating frame has here.
+        BadInput: a mesh was not solved when the robot was loaded, or an interface is
+            not rigid, the only kind a floating frame has here.
     """
-    known: dict[MeshedLink, MeshedSolid] = {}
+    known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}
     for frame in robot.frames:
         link = frame.link
@@ -35,24 +35,24 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
                 f'frame "{frame.name}".link.mesh.interface: found "{link.interface}", '
                 'expected "rigid" for a simulation with solids'
             )
-        solved = solved_mesh(link, f'frame "{frame.name}".link.mesh')
-        if solved not in known:
-            known[solved] = _solid(solved)
-        solid = known[solved]
+        key = mesh_solution(frame).solved, modulus_factor(frame)
+        if key not in known:
+            known[key] = _solid(*key)
+        solid = known[key]
         span = solid.centers[1] - solid.centers[0]
         bodies[frame.name] = MeshBody(solid, mesh_turn(frame, span))
     return bodies
 
 
-def _solid(solved: MeshedLink) -> MeshedSolid:
-    """The finest mesh of a link, with its stiffness matrix."""
+def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
+    """The finest mesh of a link, with its stiffness matrix times a factor."""
     from stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material
     upper = assemble(mesh, constants[:, 0], constants[:, 1])
     return MeshedSolid(
         nodes=mesh.nodes,
-        stiffness=csr_matrix(upper + upper.T - diags(upper.diagonal())),
+        stiffness=factor * csr_matrix(upper + upper.T - diags(upper.diagonal())),
         base=np.unique(mesh.faces[mesh.patch == 0]),
         tip=np.unique(mesh.faces[mesh.patch == 1]),
         centers=solved.centers,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.files.solved_links import solved_link
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.reach import READINGS
@@ -222,7 +223,8 @@ def _compare_links(
     for done, (name, mesh) in enumerate(study.meshes.items()):
         progress("finite elements", done, len(study.meshes))
         frame = study.robot.frame(name)
-        solved = mesh_link_stiffness(replace(frame, link=mesh), study.accuracy)
+        link = solved_link(replace(frame, link=mesh), study.accuracy)
+        solved = mesh_link_stiffness(replace(frame, link=link))
         compared[name] = {
             **_beams(frame),
             "fea": solved.stiffness,

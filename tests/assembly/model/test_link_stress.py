@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from assembly.files.solved_links import solve_links
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import tolerance_sources
@@ -74,7 +75,8 @@ def test_finite_elements_agree_with_the_beam_away_from_the_ends():
     """
     link = MeshLink(PLAIN, "z=0", "z=0.452", 6e10, 0.3)
     frame = Frame("distal", translation=[0.452, 0, 0], link=link)
-    robot = Robot("one", "distal", (frame,))
+    robot = solve_links(Robot("one", "distal", (frame,)))
+    (frame,) = robot.frames
     w = np.zeros((2, 1, 6))
     w[0, 0, 3], w[1, 0, 5] = 1000.0, 1000.0
     r = 0.04

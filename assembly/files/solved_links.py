@@ -1,0 +1,145 @@
+"""Links given by a mesh or a library, found once, when a robot is loaded.
+
+Afterwards a robot holds all that solvers need of its links: they open no file and run
+no finite elements.
+"""
+
+import hashlib
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.frame import MeshSolution, between_origins
+from assembly.model.mesh_link import mesh_turn
+from assembly.model.robot import Frame, LibraryLink, Link, MeshLink, Robot
+from forcefit.inputs.table import BadInput, quoted
+from stiffness.beam.beam import section_axes
+
+_LOG = logging.getLogger(__name__)
+# of this process: links of one shape and material are solved once
+_SOLVED: dict[tuple[object, ...], MeshSolution] = {}
+
+
+def solve_links(robot: Robot) -> Robot:
+    """Find the stiffness of every link that a mesh or a library gives.
+
+    Args:
+        robot: as read, or made in Python.
+
+    Returns:
+        The robot that solvers take; the same object if it has no such link.
+
+    Raises:
+        BadInput: a file cannot be read or is not usable, or an interface is not.
+    """
+    links = {
+        frame.name: solved_link(frame)
+        for frame in robot.frames
+        if (isinstance(frame.link, MeshLink) and frame.link.solution is None)
+        or (isinstance(frame.link, LibraryLink) and frame.link.compliance is None)
+    }
+    return robot.with_links(links) if links else robot
+
+
+def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
+    """The link of one frame, with what its mesh or its library gives.
+
+    Args:
+        frame: one with a mesh or a library link.
+        accuracy: of finite elements, asked of every entry of K_E relative to
+            sqrt(K_ii K_jj).
+
+    Returns:
+        The link.
+
+    Raises:
+        BadInput: a file cannot be read or is not usable, an interface is not, ``up``
+            lies along the link, or the distance of the interfaces is not that of the
+            two origins.
+        ValueError: the frame has another link.
+    """
+    link, place = frame.link, f"frame {quoted(frame.name)}.link"
+    try:
+        if isinstance(link, LibraryLink):
+            place += ".library"
+            return _from_library(link)
+        if isinstance(link, MeshLink):
+            place += ".mesh"
+            return replace(link, solution=_solution(frame, link, accuracy))
+    except BadInput as error:
+        raise BadInput(f"{place}: {error}") from None
+    raise ValueError(f"frame '{frame.name}' has neither a mesh nor a library link")
+
+
+def _from_library(link: LibraryLink) -> LibraryLink:
+    """The link with its entry's compliance."""
+    from stiffness.report.library import read_compliance
+
+    C = read_compliance(link.library, link.key)
+    C.setflags(write=False)
+    return replace(link, compliance=C)
+
+
+def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
+    """The finite elements of a mesh link; those of this process are kept."""
+    from stiffness.fem.fea import FemOptions, interface_center, solve_link
+    from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_part
+    from stiffness.fem.two_ends import two_ends
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
+    from stiffness.surface.surface_files import named_solid
+
+    digest = _digest(named_solid(link.surface)[0])
+    key = (digest, repr(replace(link, up=None, frame_up=None, axis=None)), accuracy)
+    if key in _SOLVED:
+        base, tip = _SOLVED[key].solved.centers
+        _check_place(frame, link, tip - base)
+        return _SOLVED[key]
+    surface = read_surface(link.surface, link.unit)
+    ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
+    base = interface_center(surface, ends[0], "base")
+    tip = interface_center(surface, ends[1], "tip")
+    # what can be refused is refused before the finite elements
+    _check_place(frame, link, tip - base)
+    material = Material(link.young, link.poisson, link.density or 0.0)
+    parts = [parse_part("parts", text) for text in link.parts]
+    options = FemOptions(accuracy, link.interface)
+    _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)
+    solved = solve_link(surface, *ends, (material, *parts), options=options)
+    mass = np.zeros((12, 12)) if link.density is None else two_ends(solved).mass
+    _SOLVED[key] = MeshSolution(solved, link.young, digest, mass)
+    return _SOLVED[key]
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise BadInput(f"surface {path} cannot be read: {error.strerror}") from None
+
+
+def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
+    """Refuse interfaces that are not as far apart as the origins they stand for."""
+    try:
+        section_axes(mesh_span, link.up)
+    except BadInput as error:
+        raise BadInput(f"{error}; expected another direction") from None
+    tip, wanted = mesh_turn(frame, mesh_span) @ mesh_span, between_origins(frame)
+    most = 1e-6 + 1e-3 * float(np.linalg.norm(wanted))
+    if link.axis is None and np.linalg.norm(tip - wanted) > most:
+        raise BadInput(
+            f"the tip interface's centre lies at {_point(tip)} from the base's, the "
+            f"frame's origin at {_point(wanted)} from its parent's; expected the same "
+            "point within 1e-6 m + 0.1 % of the length"
+        )
+
+
+def _point(p: NDArray) -> str:
+    """Coordinates for a message."""
+    return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

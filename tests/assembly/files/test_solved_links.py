@@ -1,0 +1,258 @@
+"""Links of meshes and libraries are found when a robot is loaded, and never later."""
+
+import builtins
+import copy
+import io
+import logging
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.effects.robot_effects import apply_robot_effects
+from assembly.exact.exact import solve_exact
+from assembly.exchange.robot_files import load_robot
+from assembly.files.robot_file import read_robot
+from assembly.files.solved_links import solve_links, solved_link
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import solve_assembly
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.model.error_distributions import tolerance_sources
+from assembly.model.link_stress import peak_stresses
+from assembly.model.links import link_compliances
+from assembly.model.robot import MatrixLink, MeshLink
+from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.statistics.experiment import Experiment
+from assembly.statistics.monte_carlo import run_draws
+from assembly.sweeps.plan import Sweep
+from assembly.sweeps.quantities import Question
+from assembly.sweeps.sweep import sweep_in_memory
+from assembly.sweeps.targets import grid_targets, parse_grid
+from forcefit.inputs.cache_folder import cache_folder
+from forcefit.inputs.table import BadInput
+from stiffness.report.library_build import build_library, read_spec
+from stiffness.surface.beam_surfaces import shape_surface
+from tests.libraries_for_tests import SPEC
+from validation.crosscheck.crosscheck import crosscheck
+
+FILE = """
+name = "loop"
+platform = "coupler"
+[[frame]]
+name = "crank"
+parent = "base"
+joint = "revolute"
+actuated = true
+position = 1.0
+[[frame]]
+name = "elbow"
+parent = "crank"
+translation = [0.3, 0, 0]
+joint = "revolute"
+position = -1.0
+geometric_error = [1e-4, 2e-4, 2e-4, 1e-4, 1e-4, 3e-4]
+clearance = { radial = 2e-5, axial = 2e-5, tilt = 1e-5 }
+link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, \
+young = 6e10, poisson = 0.3, density = 2700 }
+[[frame]]
+name = "coupler"
+parent = "elbow"
+translation = [0.5, 0, 0]
+mass = 1.2
+[[frame]]
+name = "rocker"
+parent = "base"
+translation = [0.5, 0, 0]
+joint = "revolute"
+position = 1.0
+[[frame]]
+name = "wrist"
+parent = "rocker"
+translation = [0.3, 0, 0]
+joint = "revolute"
+position = -1.0
+link = { library = "links#round-beam-length0.3-radius0.01-young6e+10-poisson0.3" }
+[[frame]]
+name = "seat"
+parent = "wrist"
+[[closure]]
+frames = ["coupler", "seat"]
+"""
+LOAD, GRAVITY = (1, 2, -1, 30, 20, -50), (0, 0, -9.81)
+
+
+def swept(posture):
+    targets = grid_targets(parse_grid("q.crank=0.9:1.1:0.1", posture.robot))
+    return sweep_in_memory(
+        Sweep(Question(posture.robot, components=targets.names), targets)
+    )["energy"]
+
+
+def drawn(posture):
+    sources = tolerance_sources(posture.robot, [1e-4] * 6)
+    return run_draws(Experiment(posture, sources), 3)["energy"]
+
+
+SOLVERS = {
+    "zone": lambda at: zone_margin(at).margin,
+    "energy": lambda at: solve_assembly(at, LOAD, gravity=GRAVITY).platform_screw,
+    "pose error": lambda at: bound_pose_error(solve_assembly(at)).translation_error,
+    "exact": lambda at: solve_exact(at, LOAD).platform_screw,
+    "platform stiffness": lambda at: platform_stiffness(at).compliance,
+    "deflection": lambda at: load_deflection(at, 5, [10.0, 20.0]).screws,
+    "prediction": lambda at: predict(as_declared(at, [LOAD])).deviation,
+    "sweep": swept,
+    "draws": drawn,
+    "crosscheck": lambda at: crosscheck(at, links="spring").slope,
+}  # those below need more of a link than its matrix
+OF_A_SHAPE = {
+    "stress": lambda at: peak_stresses(at.robot, solve_assembly(at).wrenches),
+    "frequencies": lambda at: natural_modes(at, 3).frequencies,
+}
+
+
+def refuse(*given, **named):
+    """In place of what only loading may do."""
+    raise AssertionError(f"below the loading of a robot: {given[:1]}")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A robot file, the mesh and the library that it names."""
+    pyvista = pytest.importorskip("pyvista")
+    folder = tmp_path_factory.mktemp("robot")
+    bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
+    pyvista.PolyData.from_regular_faces(bar.points, bar.triangles).save(
+        folder / "bar.stl"
+    )
+    (folder / "spec.toml").write_text(SPEC)
+    build_library(read_spec(folder / "spec.toml"))
+    (folder / "robot.toml").write_text(FILE)
+    return folder
+
+
+@pytest.fixture
+def robot(folder):
+    return load_robot(folder / "robot.toml")
+
+
+@pytest.fixture
+def sealed(monkeypatch, folder):
+    """Called, no file of the robot or mesh may be opened, no finite elements run."""
+    ours = str(folder), str(cache_folder())
+    usual = io.open
+
+    def checked_open(file, *given, **named):
+        opening = refuse if str(file).startswith(ours) else usual
+        return opening(file, *given, **named)
+
+    def seal():
+        for module in (builtins, io):
+            monkeypatch.setattr(module, "open", checked_open)
+        monkeypatch.setattr("stiffness.fem.fea.solve_link", refuse)
+        for module in ("condensation", "own_weight"):
+            monkeypatch.setattr(f"stiffness.fem.{module}.solve", refuse)
+
+    return seal
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solver_of_a_loaded_robot_sees_matrices_alone(robot, solver, sealed):
+    """The same answer as of the robot whose links are given by those matrices."""
+    names = [frame.name for frame in robot.frames]
+    matrices = dict(zip(names, link_compliances(robot), strict=True))
+    twin = robot.with_links({
+        name: MatrixLink(np.linalg.inv(C)) for name, C in matrices.items() if C.any()
+    })  # fmt: skip
+    expected = SOLVERS[solver](home_posture(twin))  # and all is imported and compiled
+    sealed()
+    found = SOLVERS[solver](home_posture(robot))
+    scale = np.abs(np.asarray(expected)).max()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize("solver", OF_A_SHAPE)
+def test_stress_and_mass_of_a_loaded_robot_need_no_file(robot, solver, sealed):
+    expected = OF_A_SHAPE[solver](home_posture(replace(robot)))
+    sealed()
+    found = OF_A_SHAPE[solver](home_posture(replace(robot)))
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_a_modulus_found_softer_divides_the_stiffness(folder, robot, sealed):
+    """K is proportional to E; finite elements do not run again."""
+    soft = FILE + ('[[effect]]\nname = "modulus_scale"\nparameters = { elbow = 0.5 }\n')
+    (folder / "soft.toml").write_text(soft)
+    declared = home_posture(load_robot(folder / "soft.toml"))
+    sealed()
+    found = apply_robot_effects(declared).posture.robot
+    row = robot.index("elbow")
+    np.testing.assert_array_equal(
+        link_compliances(found)[row], 2 * link_compliances(robot)[row]
+    )
+
+
+def test_a_robot_as_declared_is_refused_by_solvers(folder):
+    robot = read_robot(folder / "robot.toml")
+    for name, kind in (("elbow", "mesh"), ("wrist", "library")):
+        message = rf'^frame "{name}"\.link\.{kind}: found no stiffness'
+        with pytest.raises(BadInput, match=message):
+            solve_assembly(home_posture(robot))
+        solved = {name: solved_link(robot.frame(name))}
+        robot = robot.with_links(solved)
+    assert solve_assembly(home_posture(robot)).energy > 0
+
+
+def test_links_that_are_not_solved_leave_the_files_alone(folder):
+    (folder / "missing.toml").write_text(FILE.replace("bar.stl", "none.stl"))
+    robot = load_robot(folder / "missing.toml", links=False)
+    assert zone_margin(home_posture(robot)).margin > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("bar.stl", "none.stl", r'"elbow"\.link\.mesh: .*none.stl.* cannot be read'),
+        ("z=0.3", "z=0.4", r'"elbow"\.link\.mesh: .*no face .* on the tip interface'),
+        ("length0.3", "length0.4", r'"wrist"\.link\.library: .*no entry'),
+        ('"elbow"\nparent = "crank"\ntranslation = [0.3, 0, 0]',
+         '"elbow"\nparent = "crank"\ntranslation = [0.31, 0, 0]',
+         r'"elbow"\.link\.mesh: the tip interface.s centre lies at'),
+    ],
+)  # fmt: skip
+def test_a_file_of_a_link_that_is_not_usable_is_refused(folder, old, new, message):
+    path = folder / "refused.toml"
+    path.write_text(FILE.partition("[[closure]]")[0].replace(old, new))
+    with pytest.raises(BadInput, match=rf"refused\.toml: frame {message}") as refused:
+        load_robot(path)
+    assert "\n" not in str(refused.value)
+
+
+def test_finite_elements_of_one_shape_run_once_and_are_told(folder, caplog):
+    link = 'link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, '
+    link += "young = 7e10, poisson = 0.3, density = 2700 }"
+    both = "\n".join(
+        link if line.startswith("link = {") else line for line in FILE.splitlines()
+    )
+    (folder / "both.toml").write_text(both)
+    with caplog.at_level(logging.INFO, "assembly.files.solved_links"):
+        robot = load_robot(folder / "both.toml")
+    surface = folder / "bar.stl"
+    assert caplog.messages == [f'finite elements of frame "elbow", {surface}']
+    first, second = (f.link for f in robot.frames if isinstance(f.link, MeshLink))
+    assert first.solution is second.solution
+
+
+def test_a_robot_sent_to_another_process_leaves_its_meshes_behind(robot):
+    sent = pickle.dumps(robot)
+    assert len(sent) < 20_000
+    there = solve_links(pickle.loads(sent))
+    np.testing.assert_array_equal(link_compliances(there), link_compliances(robot))
+    assert solve_links(robot) is robot
+    assert copy.deepcopy(robot).frame("wrist").link.compliance is not None
