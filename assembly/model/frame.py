@@ -146,6 +146,9 @@ class MeshLink:
         # tens of megabytes, which a worker finds from the same files
         return {**vars(self), "solution": None}
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":
+        return self  # frozen
+
 
 @dataclass(frozen=True)
 class LibraryLink:

@@ -1,6 +1,5 @@
 """The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
 
-import logging
 import signal
 import sys
 import threading
@@ -17,7 +16,7 @@ from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
 from forcefit.commands.options import JsonOption
-from forcefit.commands.progress import progress_bars
+from forcefit.commands.progress import progress_bars, report_loading
 from forcefit.inputs.errors import BadInput, one_line, quoted
 from forcefit.inputs.writing import write_json
 
@@ -110,22 +109,13 @@ def main() -> None:
     if not sys.warnoptions:
         # libraries' warnings are for programmers; ``python -W default -m forcefit``
         warnings.simplefilter("ignore")
-    _tell_links()
+    report_loading()
     with _interrupts() as interrupts:
         try:
             status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
             sys.exit(_status_after(error, interrupted=bool(interrupts)))
     sys.exit(status if isinstance(status, int) else 0)
-
-
-def _tell_links() -> None:
-    """A line on stderr for each link that finite elements solve at loading."""
-    log = logging.getLogger("assembly.files.solved_links")
-    log.setLevel(logging.INFO)
-    handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("forcefit: %(message)s"))
-    log.handlers = [handler]
 
 
 def _status_after(error: BaseException, interrupted: bool) -> int:

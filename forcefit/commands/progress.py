@@ -1,5 +1,6 @@
 """Progress bars, and the number of threads."""
 
+import logging
 import sys
 import time
 from collections.abc import Generator
@@ -20,6 +21,21 @@ def one_thread() -> AbstractContextManager:
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(1)
+
+
+class _Lines(logging.Handler):
+    """A line on stderr for each record, above the bars if there are any."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the record's message."""
+        print(f"forcefit: {record.getMessage()}", file=sys.stderr)
+
+
+def report_loading() -> None:
+    """From now on, name each link whose finite elements run when a robot is loaded."""
+    log = logging.getLogger("assembly.files.solved_links")
+    log.setLevel(logging.INFO)
+    log.handlers = [_Lines()]
 
 
 @contextmanager

@@ -30,12 +30,14 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
+from assembly.sweeps.identity import robot_hash
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import sweep_in_memory
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.table import BadInput
+from stiffness.link import scaled
 from stiffness.report.library_build import build_library, read_spec
 from stiffness.surface.beam_surfaces import shape_surface
 from tests.libraries_for_tests import SPEC
@@ -186,16 +188,18 @@ def test_stress_and_mass_of_a_loaded_robot_need_no_file(robot, solver, sealed):
 
 
 def test_a_modulus_found_softer_divides_the_stiffness(folder, robot, sealed):
-    """K is proportional to E; finite elements do not run again."""
-    soft = FILE + ('[[effect]]\nname = "modulus_scale"\nparameters = { elbow = 0.5 }\n')
-    (folder / "soft.toml").write_text(soft)
+    """K is proportional to E; finite elements with that E agree to their rounding."""
+    (folder / "half.toml").write_text(FILE.replace("6e10", "3e10", 1))
+    expected = link_compliances(load_robot(folder / "half.toml"))
+    effect = '[[effect]]\nname = "modulus_scale"\nparameters = { elbow = 0.5 }\n'
+    (folder / "soft.toml").write_text(FILE + effect)
     declared = home_posture(load_robot(folder / "soft.toml"))
     sealed()
     found = apply_robot_effects(declared).posture.robot
     row = robot.index("elbow")
-    np.testing.assert_array_equal(
-        link_compliances(found)[row], 2 * link_compliances(robot)[row]
-    )
+    soft = link_compliances(found)[row]
+    np.testing.assert_array_equal(soft, 2 * link_compliances(robot)[row])
+    assert np.abs(scaled(soft - expected[row], soft)).max() < 1e-7
 
 
 def test_a_robot_as_declared_is_refused_by_solvers(folder):
@@ -249,10 +253,23 @@ def test_finite_elements_of_one_shape_run_once_and_are_told(folder, caplog):
     assert first.solution is second.solution
 
 
+def test_a_solid_of_a_step_file_is_known_by_the_whole_file(folder, monkeypatch):
+    """Its name, behind the path, is no file's."""
+    bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
+    monkeypatch.setattr("stiffness.surface.surface.read_surface", lambda *given: bar)
+    (folder / "step.toml").write_text(FILE.replace("bar.stl", "bar.step#*"))
+    digests = set()
+    for content in ("one", "other"):
+        (folder / "bar.step").write_text(content)
+        digests.add(robot_hash(load_robot(folder / "step.toml")))
+    assert len(digests) == 2
+
+
 def test_a_robot_sent_to_another_process_leaves_its_meshes_behind(robot):
     sent = pickle.dumps(robot)
     assert len(sent) < 20_000
     there = solve_links(pickle.loads(sent))
     np.testing.assert_array_equal(link_compliances(there), link_compliances(robot))
     assert solve_links(robot) is robot
-    assert copy.deepcopy(robot).frame("wrist").link.compliance is not None
+    copied = copy.deepcopy(robot)
+    np.testing.assert_array_equal(link_compliances(copied), link_compliances(robot))
