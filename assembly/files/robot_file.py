@@ -46,7 +46,8 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
         close: makes of the robot as declared one whose closures hold; none if absent.
 
     Returns:
-        The robot; its nominal closures hold in its home pose.
+        The robot; its nominal closures hold in its home pose.  Meshes and libraries of
+        its links are not read: see :func:`assembly.files.solved_links.solve_links`.
 
     Raises:
         BadInput: the file breaks a rule of the format, or a closure does not hold.

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.frame import MeshSolution, between_origins
+from assembly.model.frame import between_origins
+from assembly.model.link_kinds import MeshSolution
 from assembly.model.mesh_link import mesh_turn
 from assembly.model.robot import Frame, LibraryLink, Link, MeshLink, Robot
 from forcefit.inputs.table import BadInput, quoted
@@ -85,12 +86,6 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     """The finite elements of a mesh link; those of this process are kept."""
-    from stiffness.fem.fea import FemOptions, interface_center, solve_link
-    from stiffness.fem.material import Material
-    from stiffness.fem.part_text import parse_part
-    from stiffness.fem.two_ends import two_ends
-    from stiffness.surface.interface import parse_interface
-    from stiffness.surface.surface import read_surface
     from stiffness.surface.surface_files import named_solid
 
     digest = _digest(named_solid(link.surface)[0])
@@ -98,7 +93,20 @@ def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     if key in _SOLVED:
         base, tip = _SOLVED[key].solved.centers
         _check_place(frame, link, tip - base)
-        return _SOLVED[key]
+    else:
+        _SOLVED[key] = _solve(frame, link, accuracy, digest)
+    return _SOLVED[key]
+
+
+def _solve(frame: Frame, link: MeshLink, accuracy: float, digest: str) -> MeshSolution:
+    """Mesh a link's surface and solve it by finite elements."""
+    from stiffness.fem.fea import FemOptions, interface_center, solve_link
+    from stiffness.fem.material import Material
+    from stiffness.fem.part_text import parse_part
+    from stiffness.fem.two_ends import two_ends
+    from stiffness.surface.interface import parse_interface
+    from stiffness.surface.surface import read_surface
+
     surface = read_surface(link.surface, link.unit)
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
@@ -111,8 +119,7 @@ def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)
     solved = solve_link(surface, *ends, (material, *parts), options=options)
     mass = np.zeros((12, 12)) if link.density is None else two_ends(solved).mass
-    _SOLVED[key] = MeshSolution(solved, link.young, digest, mass)
-    return _SOLVED[key]
+    return MeshSolution(solved, link.young, digest, mass)
 
 
 def _digest(path: Path) -> str:

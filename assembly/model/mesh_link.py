@@ -9,7 +9,8 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.model.frame import MeshSolution, between_origins
+from assembly.model.frame import between_origins
+from assembly.model.link_kinds import MeshSolution
 from assembly.model.robot import Frame, LibraryLink, MeshLink
 from forcefit.inputs.table import BadInput, quoted
 from stiffness.link import LinkStiffness, turn_link

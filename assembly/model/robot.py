@@ -1,6 +1,7 @@
 """A manipulator as data: a tree of frames, and the closures that hold it together.
 
-What a frame is: :mod:`assembly.model.frame`, whose names may be imported from here.
+What a frame is: :mod:`assembly.model.frame`; what a link is:
+:mod:`assembly.model.link_kinds`.  Their names may be imported from here.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,17 +16,19 @@ from assembly.model.frame import (
     BASE,
     JOINTS,
     LOCKED,
-    BeamLink,
     Clearance,
     Frame,
-    LibraryLink,
-    Link,
-    MatrixLink,
-    MeshLink,
     beam_axis,
     locked,
 )
 from assembly.model.function import Function
+from assembly.model.link_kinds import (
+    BeamLink,
+    LibraryLink,
+    Link,
+    MatrixLink,
+    MeshLink,
+)
 from forcefit.inputs.display import Figures, html_table, largest, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
 from stiffness.screws import rotation_matrix, transform

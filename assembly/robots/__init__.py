@@ -40,7 +40,8 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
             :mod:`assembly.kinematics.closing` does; none if absent.
 
     Returns:
-        The robot.
+        The robot.  Meshes and libraries of its links are not read:
+        :func:`assembly.exchange.robot_files.load_robot` does.
 
     Raises:
         BadInput: neither a built-in name nor a file, or the file breaks a rule.
