@@ -36,9 +36,10 @@ def solve_links(robot: Robot) -> Robot:
     Raises:
         BadInput: a file cannot be read or is not usable, or an interface is not.
     """
+    # libraries first: what can be refused is refused before the finite elements
     links = {
         frame.name: solved_link(frame)
-        for frame in robot.frames
+        for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
         if (isinstance(frame.link, MeshLink) and frame.link.solution is None)
         or (isinstance(frame.link, LibraryLink) and frame.link.compliance is None)
     }
@@ -111,8 +112,7 @@ def _solve(frame: Frame, link: MeshLink, accuracy: float, digest: str) -> MeshSo
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    # what can be refused is refused before the finite elements
-    _check_place(frame, link, tip - base)
+    _check_place(frame, link, tip - base)  # before the finite elements
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
     options = FemOptions(accuracy, link.interface)

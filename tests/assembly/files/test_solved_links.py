@@ -232,7 +232,12 @@ def test_links_that_are_not_solved_leave_the_files_alone(folder):
          r'"elbow"\.link\.mesh: the tip interface.s centre lies at'),
     ],
 )  # fmt: skip
-def test_a_file_of_a_link_that_is_not_usable_is_refused(folder, old, new, message):
+def test_a_file_of_a_link_that_is_not_usable_is_refused(
+    folder, old, new, message, monkeypatch
+):
+    """Before any finite elements, in one line."""
+    monkeypatch.setattr("stiffness.fem.fea.solve_link", refuse)
+    monkeypatch.setattr("assembly.files.solved_links._SOLVED", {})
     path = folder / "refused.toml"
     path.write_text(FILE.partition("[[closure]]")[0].replace(old, new))
     with pytest.raises(BadInput, match=rf"refused\.toml: frame {message}") as refused:
