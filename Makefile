@@ -8,7 +8,10 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 # an environment of another Python is made anew, not taken for ready
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+EMPTY := $(VENV)/empty-$(VERSION)
 READY := $(VENV)/ready-$(VERSION)
+KERNELS := CMakeLists.txt $(wildcard assembly/kernels/*.cpp assembly/kernels/*.h \
+    assembly/kernels/*/*.cpp assembly/kernels/*/*.h)
 
 .PHONY: study test test-slow check docs clean
 
@@ -33,12 +36,17 @@ $(READY)-docs: $(READY)
 	$(BIN)/python -m pip install --quiet -e ".[docs]"
 	@touch $@
 
-$(READY): pyproject.toml
+$(EMPTY): pyproject.toml
 	@sh .ci/system_packages
 	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
+	@touch $@
+
+# C++ is compiled when the package is installed
+$(READY): $(EMPTY) $(KERNELS)
 	$(BIN)/python -m pip install --quiet -e ".[dev]"
 	@touch $@
 
 clean:
 	rm -rf $(VENV) build dist
+	rm -f assembly/kernels/*.so

@@ -45,7 +45,6 @@ from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import Posture, place_many, place_robot
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import reference_assembly, reference_margin
-from assembly.linear.lanes import FEW_LANES
 from assembly.linear.moving_clearances import Asked
 from assembly.linear.pose_error import bound_pose_error, reference_pose_error
 from assembly.linear.zone import zone_margin, zone_margins
@@ -62,7 +61,7 @@ from benchmarks.assembly_peers import (
     loaded_matrices,
     moreau_batched,
 )
-from forcefit.native.libraries import by_numba, load_library
+from forcefit.native.libraries import by_numba
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways
@@ -257,7 +256,6 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
 
 def main() -> None:
     """Print everything."""
-    load_library(FEW_LANES)  # as `forcefit warm-up` does
     robot = paper_robot()
     postures = workspace(robot)
     print(f"{robot.name}, {len(postures)} points, one core")

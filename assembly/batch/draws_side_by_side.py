@@ -1,34 +1,19 @@
-"""Problem (22) for several draws side by side at one posture, by ``draws.cpp``.
+"""Problem (22) for several draws side by side at one posture, compiled.
 
 The same equations and thresholds as :mod:`assembly.batch.compiled_draws`; draws that
 need the interior point are collected first, so that no lane waits for another.
 """
 
-import ctypes
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.native.libraries import address, load_library
+from assembly.kernels.choice import kernels
+from forcefit.native.libraries import numba_alone
 
 if TYPE_CHECKING:
     from assembly.batch.compiled_draws import Energies, Reduced
-
-SOURCE = "assembly/batch/draws.cpp"
-
-
-class _Reduced(ctypes.Structure):
-    """``Reduced`` of draws.cpp."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("nu", "r", "cones")),
-        *(
-            (name, ctypes.c_void_p)
-            for name in ("Gt", "starts", "inverse", "forces", "gram", "d")
-        ),
-        *((name, ctypes.c_double) for name in ("slip", "slack", "stored")),
-    )
 
 
 def least_energies_side_by_side(
@@ -42,26 +27,13 @@ def least_energies_side_by_side(
         out: arrays to fill.
 
     Returns:
-        Whether it did; not where there is no compiler.
+        Whether it did; not where callers asked for numba.
     """
-    library = load_library(SOURCE)
-    if library is None:
+    if numba_alone():
         return False
-    shared = (
-        reduced.Gt, reduced.starts, reduced.inverse, reduced.cones, reduced.gram,
-        reduced.d,
-    )  # fmt: skip
-    arrays = [np.ascontiguousarray(array) for array in (*shared, h)]
-    *fields, d, rows = map(address, arrays)
-    nu, r = reduced.Gt.shape
-    given = _Reduced(
-        nu, r, len(reduced.starts) - 1, *fields, d if reduced.loaded else None,
-        reduced.slip, reduced.slack, reduced.stored,
-    )  # fmt: skip
-    filled = (ctypes.c_void_p * len(out))(*map(address, out))
-    count = ctypes.c_int64(len(h))
-    library.least_energies(
-        ctypes.byref(given), ctypes.c_void_p(rows), ctypes.byref(count),
-        ctypes.byref(filled),
-    )  # fmt: skip
+    s = reduced
+    arrays = s.Gt, s.starts, s.inverse, s.cones, s.gram, s.d, h
+    *shared, d, rows = map(np.ascontiguousarray, arrays)
+    loads = d if s.loaded else None
+    kernels.least_energies(*shared, loads, s.slip, s.slack, s.stored, rows, *out)
     return True

@@ -1,61 +1,36 @@
-"""Continuation to several targets side by side, by ``continuation.cpp``.
+"""Continuation to several targets side by side, compiled.
 
 The same steps and thresholds as :mod:`assembly.kinematics.compiled_continuation`, one
 target in each lane of the processor's vector registers.  No lane depends on another.
 """
 
-import ctypes
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kernels.choice import kernels
 from assembly.kinematics.track import Track
-from forcefit.native.libraries import address, load_library
-
-SOURCE = "assembly/kinematics/continuation.cpp"
-_ARRAYS = ("parents", "kinds", "pairs", "moves", "groups", "fixed")
+from forcefit.native.libraries import numba_alone
 
 
-class TreeAddresses(ctypes.Structure):
-    """``Tree`` of continuation.cpp; ``arrays`` are kept as long as it is."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("n", "closures", "platform")),
-        ("size", ctypes.c_double),
-        *((name, ctypes.c_void_p) for name in _ARRAYS),
-    )
-
-
-class _Targets(ctypes.Structure):
-    """``Targets`` of continuation.cpp."""
-
-    _fields_ = (
-        ("count", ctypes.c_int64),
-        *((name, ctypes.c_void_p) for name in ("start", "poses", "held")),
-        ("guess", ctypes.c_int64),
-    )
-
-
-def tree_of(fields: dict[str, Any]) -> TreeAddresses:
+def tree_of(fields: dict[str, Any]) -> Any:
     """A robot's tree for C++.
 
     Args:
         fields: of :class:`assembly.kinematics.compiled_continuation.Tree`.
 
     Returns:
-        The addresses of its arrays.
+        The same, checked.
+
+    Raises:
+        ValueError: an array has another shape, type or order of its numbers.
     """
-    tree = TreeAddresses(
-        len(fields["parents"]), len(fields["pairs"]), fields["platform"],
-        fields["size"], *(address(fields[name]) for name in _ARRAYS),
-    )  # fmt: skip
-    tree.arrays = fields
-    return tree
+    return kernels.Tree(**fields)
 
 
 def follow_side_by_side(
-    tree: TreeAddresses, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
+    tree: Any, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: Track,
 ) -> bool:  # fmt: skip
     """Follow every target along its straight line.
@@ -69,14 +44,13 @@ def follow_side_by_side(
         track: to fill.
 
     Returns:
-        Whether it did; not where there is no compiler.
+        Whether it did; not where callers asked for numba.
     """
-    library = load_library(SOURCE)
-    if library is None:
+    if numba_alone():
         return False
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
     if len(held) == 1:
-        _follow(library, tree, (start, poses, held), guess, out)
+        _follow(tree, (start, poses, held), guess, out)
         return True
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
@@ -87,7 +61,7 @@ def follow_side_by_side(
         whole = len(rows) == len(held)
         filled = out if whole else tuple(array[rows] for array in out)
         given = (start, poses[rows[: len(poses)]], held[rows])
-        _follow(library, tree, given, guess, filled)
+        _follow(tree, given, guess, filled)
         if not whole:
             for array, part in zip(out, filled, strict=True):
                 array[rows] = part
@@ -95,13 +69,8 @@ def follow_side_by_side(
 
 
 def _follow(
-    library: ctypes.CDLL, tree: TreeAddresses, given: tuple[NDArray, NDArray, NDArray],
-    guess: bool, out: tuple[NDArray, ...],
+    tree: Any, given: tuple[NDArray, NDArray, NDArray], guess: bool,
+    out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
     """Targets that ask for the same entries: start, poses and held coordinates."""
-    arrays = [np.ascontiguousarray(array) for array in given]
-    targets = _Targets(
-        len(arrays[2]), *(address(a) if a.size else None for a in arrays), guess
-    )
-    tracks = (ctypes.c_void_p * len(out))(*map(address, out))
-    library.follow_all(ctypes.byref(tree), ctypes.byref(targets), tracks)
+    kernels.follow_all(tree, *map(np.ascontiguousarray, given), guess, *out)

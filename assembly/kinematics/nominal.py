@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.continuation_side_by_side import (
-    TreeAddresses,
     follow_side_by_side,
     tree_of,
 )
@@ -97,7 +96,7 @@ def _tree(robot: Robot) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=64)
-def _tree_side_by_side(robot: Robot) -> TreeAddresses:
+def _tree_side_by_side(robot: Robot) -> Any:
     """The same for C++."""
     return tree_of(_tree(robot))
 

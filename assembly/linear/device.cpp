@@ -2,8 +2,17 @@
 // lanes.cpp, with one lane.  Compiled for a device at run time, where there is one, and
 // for this machine, where threads take turns, to be tested.
 #define ON_DEVICE
-#include "cpp/energies.h"
-#include "cpp/margins.h"
+#include "../kernels/linear/energies.h"
+#include "../kernels/linear/margins.h"
+
+using namespace LANE_SPACE;
+
+#ifdef __CUDACC_RTC__
+#define EXPORTED extern "C" __global__
+#else
+#define EXPORTED extern "C" __attribute__((visibility("default")))
+EXPORTED const char *source_digest() { return SOURCE_DIGEST; }
+#endif
 
 #ifndef ROOM
 #define ROOM 65536

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.lanes import PointsRecord, robot_record
 from assembly.linear.robot_structure import Structure
 from assembly.linear.solutions import Solutions
 from forcefit.native.libraries import digest_of, numba_alone
@@ -31,7 +30,34 @@ _BLOCKS = 8192  # of a launch: more threads than any device keeps busy
 _SHARE = 0.5  # of the free memory, for points and answers
 _STEP, _LARGEST = 32_768, 458_752  # [bytes] rooms of threads; each size is compiled
 
+_ARRAYS = (
+    "on_path", "patterns", "pattern_of", "springs", "spring_frame", "spring_order",
+    "of_joint", "groups", "group_pattern", "group_on_path", "cone_frame", "cone_axis",
+    "cone_size", "starts", "free_frame", "free_axis", "free_bound",
+)  # fmt: skip
+_COUNTS = ("n", "closures", "np", "ny", "ng", "nu", "cones", "nq")
 Points = tuple[NDArray, NDArray, NDArray]
+
+
+class RobotRecord(ctypes.Structure):
+    """``Robot`` of device.cpp: the fields of a structure, and how many there are."""
+
+    _fields_ = (
+        ("size", ctypes.c_double),
+        ("platform", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in _ARRAYS),
+        *((name, ctypes.c_int64) for name in _COUNTS),
+    )
+
+
+class PointsRecord(ctypes.Structure):
+    """``Points`` of device.cpp; ``erring`` and ``loads`` may be left out."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64), ("T", ctypes.c_void_p), ("errors", ctypes.c_void_p),
+        ("mismatch", ctypes.c_void_p), ("own_errors", ctypes.c_int64),
+        ("erring", ctypes.c_void_p), ("loads", ctypes.c_void_p),
+    )  # fmt: skip
 
 
 class Device(NamedTuple):
@@ -203,3 +229,24 @@ def cuda_device() -> Device | None:
         free_bytes=lambda: runtime.memGetInfo()[0],
         failures=failures,
     )
+
+
+def robot_record(
+    structure: Structure, addressed: Callable[[NDArray], int]
+) -> RobotRecord:
+    """What C++ reads of a robot.
+
+    Args:
+        structure: the robot.
+        addressed: where the numbers of one of its arrays are.
+
+    Returns:
+        Addresses, good as long as the numbers stay there.
+    """
+    s = structure
+    counts = (
+        len(s.on_path), s.patterns.shape[1], len(s.patterns), len(s.springs),
+        len(s.groups) - 1, len(s.cone_frame), len(s.starts) - 1, len(s.free_frame),
+    )  # fmt: skip
+    arrays = [addressed(getattr(s, name)) for name in _ARRAYS]
+    return RobotRecord(s.size, s.platform, *arrays, *counts)

@@ -1,32 +1,23 @@
-"""One cone programme, and one body's farthest screw, by ``one_problem.cpp``.
+"""One cone programme, and one body's farthest screw, compiled.
 
 The same equations and thresholds as :mod:`assembly.solvers.interior`,
 :mod:`assembly.solvers.dual_newton`, and :mod:`assembly.solvers.farthest`, for cones of
 any size.
 """
 
-import ctypes
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.native.libraries import address, load_library
+from assembly.kernels.choice import kernels
+from forcefit.native.libraries import numba_alone
 
-SOURCE = "assembly/solvers/one_problem.cpp"
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
 
 
-class _Given(ctypes.Structure):
-    """``Given`` of one_problem.cpp."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("r", "p", "cones")),
-        *((name, ctypes.c_void_p) for name in ("starts", "G", "h", "d", "H", "k")),
-    )
-
-
-class SolverLimits(ctypes.Structure):
-    """How far a method goes: ``Limits`` of one_problem.cpp.
+class SolverLimits(NamedTuple):
+    """How far a method goes.
 
     Attributes:
         relative: gap asked for, relative to |G u + h|^2 / 2 ..
@@ -35,20 +26,10 @@ class SolverLimits(ctypes.Structure):
         steps: most of Newton's method.
     """
 
-    _fields_ = (
-        *((n, ctypes.c_double) for n in ("relative", "absolute", "first_sigma")),
-        ("steps", ctypes.c_int64),
-    )
-
-
-class _Asked(ctypes.Structure):
-    """``Asked`` of one_problem.cpp."""
-
-    _fields_ = (
-        *((name, ctypes.c_int64) for name in ("p", "cones", "half")),
-        *((n, ctypes.c_void_p) for n in ("starts", "centre", "map", "rows", "start")),
-        ("tolerance", ctypes.c_double),
-    )
+    relative: float
+    absolute: float
+    first_sigma: float
+    steps: int
 
 
 def interior_point(
@@ -63,13 +44,13 @@ def interior_point(
 
     Returns:
         u (nu,) and the multipliers (p,) of H, as far as the method came; None where
-        there is no compiler.
+        callers asked for numba.
     """
+    if numba_alone():
+        return None
     _, h, d, _, k = problem
     u, y = np.zeros(len(d)), np.zeros(len(h) + len(k))
-    limits = SolverLimits(absolute=tolerance)
-    if not _solve("interior_point", problem, starts, limits, u, y):
-        return None
+    kernels.interior_point(*_contiguous(*problem), _integers(starts), tolerance, u, y)
     return u, y[len(h) :]
 
 
@@ -87,30 +68,11 @@ def newton(
             a first guess too.
 
     Returns:
-        Whether it did; not where there is no compiler.
+        Whether it did; not where callers asked for numba.
     """
-    return _solve("newton", problem, starts, limits, u, y)
-
-
-def _solve(
-    name: str,
-    problem: Problem,
-    starts: NDArray,
-    limits: SolverLimits,
-    u: NDArray,
-    y: NDArray,
-) -> bool:
-    """Call a function of the library; whether it did."""
-    library = load_library(SOURCE)
-    if library is None:
+    if numba_alone():
         return False
-    arrays = _contiguous(starts, *problem)
-    sizes = len(problem[1]), len(problem[4]), len(starts) - 1
-    given = _Given(*sizes, *_addresses(*arrays))
-    getattr(library, name)(
-        ctypes.byref(given), ctypes.byref(limits),
-        *map(ctypes.c_void_p, _addresses(u, y)),
-    )  # fmt: skip
+    kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
     return True
 
 
@@ -131,28 +93,24 @@ def farthest(
 
     Returns:
         (2,) lower and upper bound, (6,) the screw that attains the lower, and how many
-        support functions it took; None where there is no compiler, or bounds did not
-        come as close.
+        support functions it took; None where callers asked for numba, or bounds did
+        not come as close.
     """
-    library = load_library(SOURCE)
-    if library is None:
+    if numba_alone():
         return None
-    arrays = _contiguous(starts, centre, X, H, start)
     bounds, screw = np.zeros(2), np.zeros(6)
-    asked = _Asked(len(H), len(starts) - 1, half, *_addresses(*arrays), tolerance)
-    library.farthest.restype = ctypes.c_int64
-    supports = library.farthest(
-        ctypes.byref(asked), *map(ctypes.c_void_p, _addresses(bounds, screw))
-    )
+    supports = kernels.farthest(
+        *_contiguous(centre, X, H, start), _integers(starts), half, tolerance, bounds,
+        screw,
+    )  # fmt: skip
     return None if supports < 0 else (bounds, screw, supports)
 
 
-def _contiguous(starts: NDArray, *arrays: NDArray) -> tuple[NDArray, ...]:
-    """Arrays as C++ reads them."""
-    rows = (np.ascontiguousarray(array, dtype=float) for array in arrays)
-    return (np.ascontiguousarray(starts, dtype=np.int64), *rows)
+def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
+    """Numbers as C++ reads them."""
+    return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
-def _addresses(*arrays: NDArray) -> list[int]:
-    """Where their numbers are."""
-    return [address(array) for array in arrays]
+def _integers(array: NDArray) -> NDArray:
+    """Whole numbers likewise."""
+    return np.ascontiguousarray(array, dtype=np.int64)

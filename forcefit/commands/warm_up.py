@@ -10,7 +10,6 @@ from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import minimise_energies
 from assembly.linear.fallback import reference_assembly, reference_margin
-from assembly.linear.lanes import FEW_LANES
 from assembly.linear.moving_clearances import Asked
 from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
 from assembly.linear.reach import reachable_screws
@@ -19,7 +18,7 @@ from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.worst_clearance import worst_error_slopes
-from forcefit.native.libraries import by_numba, load_library
+from forcefit.native.libraries import by_numba
 
 
 def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> None:
@@ -38,7 +37,6 @@ def warm_up(progress: Callable[[int, int], None] = lambda done, total: None) -> 
     perfect = prepared.solve(np.zeros((1, *errors.shape)))  # clearances undetermined
     rngs = [np.random.default_rng(1)]
     computations: tuple[Callable[[], object], ...] = (
-        lambda: load_library(FEW_LANES),
         lambda: reference_margin(posture, "rigid"),
         *(
             partial(_by_each_method, compute)

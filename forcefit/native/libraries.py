@@ -40,10 +40,7 @@ _OPTIONS = (
 )  # fmt: skip
 _COMPILERS = ("c++", "g++", "clang++")
 # what nearly every command that needs one of them needs
-_TOGETHER = {
-    "assembly/linear/lanes.cpp", "assembly/kinematics/continuation.cpp",
-    "assembly/solvers/one_problem.cpp",
-}  # fmt: skip
+_TOGETHER: set[str] = set()
 _LONGEST = 120  # [s] a compiler may take
 # what /proc/cpuinfo says of processors of one kind
 _NAMED = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
@@ -206,7 +203,7 @@ def digest_of(source: str) -> str:
     """
     parts = [" ".join(_options()), _processor()]
     package = _ROOT / Path(source).parts[0]
-    for file in (_ROOT / source, *sorted(package.glob("*/cpp/*.h"))):
+    for file in (_ROOT / source, *sorted(package.glob("kernels/**/*.h"))):
         parts.append(file.read_text(encoding="utf-8"))
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 

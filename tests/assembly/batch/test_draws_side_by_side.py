@@ -5,16 +5,12 @@ import pytest
 
 from assembly.batch import one_posture
 from assembly.batch.compiled_draws import Energies
-from assembly.batch.draws_side_by_side import SOURCE, least_energies_side_by_side
+from assembly.batch.draws_side_by_side import least_energies_side_by_side
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
 from assembly.robots import BUILT_IN
-from forcefit.native.libraries import by_numba, load_library
+from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import NUMBERS, irsbot2_with
-
-needs_compiler = pytest.mark.skipif(
-    load_library(SOURCE) is None, reason="no C++ compiler"
-)
 
 
 def draws_of(name, size, rng):
@@ -27,7 +23,6 @@ def draws_of(name, size, rng):
     return prepare_energies(home_posture(robot)), errors
 
 
-@needs_compiler
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
 def test_draws_have_numbas_energies(name, size, rng):
@@ -44,7 +39,6 @@ def test_draws_have_numbas_energies(name, size, rng):
     assert np.all(lanes.energy - lanes.bound <= rounding)
 
 
-@needs_compiler
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-3])
 def test_a_draw_does_not_depend_on_its_neighbours(size, rng, monkeypatch):
     """Other order, other neighbours, alone: not a bit changes."""

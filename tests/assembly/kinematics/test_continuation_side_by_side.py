@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.continuation_side_by_side import SOURCE
 from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import home_posture, pose_components
 from assembly.model.robot import Frame, Robot
 from assembly.robots import BUILT_IN
-from forcefit.native.libraries import by_numba, load_library
-
-pytestmark = pytest.mark.skipif(
-    load_library(SOURCE) is None, reason="no compiler for C++"
-)
+from forcefit.native.libraries import by_numba
 
 
 def targets_of(home, rng, count=40):

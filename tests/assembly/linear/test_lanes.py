@@ -1,6 +1,5 @@
 """Problems side by side in C++ against numba's kernels, and against each other."""
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -8,27 +7,20 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import energy, zone
-from assembly.linear import lanes as lanes_of
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies
 from assembly.linear.fallback import reference_assembly, reference_margin
 from assembly.linear.lanes import (
-    FEW_LANES,
-    SOURCE,
     assemble_side_by_side,
     margins_side_by_side,
 )
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margins
 from assembly.robots import BUILT_IN
-from forcefit.native import libraries
-from forcefit.native.libraries import by_numba, load_library
+from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, stack
 
-needs_compiler = pytest.mark.skipif(
-    load_library(SOURCE) is None, reason="no C++ compiler"
-)
 ROWS = (
     "outcome", "energy", "bound", "energy_without_clearance", "platform_screw",
     "closure_residual", "clearances", "motions", "multipliers",
@@ -55,7 +47,6 @@ def assert_both_proved(lanes, numba):
     assert lanes.clearance_excess.max(initial=0.0) < 1e-14
 
 
-@needs_compiler
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 0.2, 0.5, 1.0])
 def test_all_points_of_the_papers_robot_are_certified(grid, kappa):
     robot, postures = grid
@@ -65,7 +56,6 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa):
     assert_both_proved(lanes, numbas_energies(robot, T, kappa * robot.errors, mismatch))
 
 
-@needs_compiler
 def test_no_point_of_the_papers_robot_is_left_to_numba(grid, monkeypatch):
     """Rows that no spring enters are told from rounding, whatever their length."""
     left = []
@@ -77,7 +67,6 @@ def test_no_point_of_the_papers_robot_is_left_to_numba(grid, monkeypatch):
     assert not left
 
 
-@needs_compiler
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
 def test_every_built_in_robot_has_numbas_energies(name, size, rng):
@@ -92,7 +81,6 @@ def test_every_built_in_robot_has_numbas_energies(name, size, rng):
     assert_both_proved(lanes, numba)
 
 
-@needs_compiler
 def test_random_robots_have_numbas_energies_or_its_reasons():
     """What numba's kernel leaves to the fallback, these leave, for the same reason."""
     from assembly.linear.compiled_energy import assemble_all
@@ -139,7 +127,6 @@ def rows_for(joints, robot, count):
     )  # fmt: skip
 
 
-@needs_compiler
 def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
     """By the complementary energy in numpy, which shares nothing with the lanes."""
     robot, postures = grid
@@ -151,7 +138,6 @@ def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
         assert proved == pytest.approx(lanes.bound[i], rel=1e-9)
 
 
-@needs_compiler
 @pytest.mark.parametrize("kappa", [0.2, 1.0])
 def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
     """Other order, other neighbours, alone: not a bit changes."""
@@ -171,7 +157,6 @@ def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
             assert np.array_equal(getattr(alone, name)[0], getattr(whole, name)[i])
 
 
-@needs_compiler
 def test_postures_of_different_rank_stand_side_by_side(rng):
     """Three parallel hinges: their turns are independent unless they stand in line."""
     home = home_posture(BUILT_IN["five_bar"]())
@@ -193,7 +178,6 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
             )
 
 
-@needs_compiler
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_are_numbas_and_proved(grid, compliant):
     robot, postures = grid
@@ -248,7 +232,6 @@ def test_what_no_loop_solves_is_solved_with_its_own_errors(grid, each, monkeypat
     assert np.all(found.bound <= found.margin)
 
 
-@needs_compiler
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_of_any_robot_are_numbas(compliant, rng):
     """Rounding decides what is left to the fallback: its margin is then compared."""
@@ -278,7 +261,6 @@ def test_margins_of_any_robot_are_numbas(compliant, rng):
     assert solved  # what they leave goes to the fallback, as numba's does
 
 
-@needs_compiler
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
     robot, postures = grid
@@ -293,39 +275,14 @@ def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
-def test_without_a_compiler_numba_answers(grid, tmp_path, monkeypatch):
-    robot, postures = grid
-    T, mismatch = stack(postures[:3])
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.setattr(libraries, "folder_of_compiled", lambda: tmp_path)
-    libraries._library.cache_clear()
-    try:
-        batch = minimise_energies(robot, T, mismatch=mismatch)
-        assert load_library(SOURCE) is None
-    finally:
-        libraries._library.cache_clear()
-    assert list(tmp_path.iterdir()) == []
-    numba = numbas_energies(robot, T, None, mismatch)
-    assert np.array_equal(batch.energy, numba.energy)
-
-
-@needs_compiler
 @pytest.mark.parametrize("kappa", [0.1, 0.5, 1.0])
-def test_two_lanes_have_the_bits_of_many(grid, kappa, monkeypatch):
+def test_two_lanes_have_the_bits_of_many(grid, kappa):
     """Products and sums are rounded one by one, whatever the registers hold."""
-    two = load_library(FEW_LANES)
     robot, postures = grid
     T, mismatch = stack(postures)
     errors = kappa * robot.errors
     many = minimise_energies(robot, T, errors, mismatch)
     margins = zone_margins(robot, T, "rigid", mismatch, errors)
-    asked = []
-
-    def at_hand(source):
-        asked.append(source)
-        return two
-
-    monkeypatch.setattr(lanes_of, "library_at_hand", at_hand)
     for i in range(0, len(T), 3):
         some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
         one = minimise_energies(*some)
@@ -334,4 +291,3 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa, monkeypatch):
         one = zone_margins(robot, T[i : i + 1], "rigid", mismatch[i : i + 1], errors)
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
-    assert set(asked) == {FEW_LANES}

@@ -6,17 +6,13 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear import moving_clearances
 from assembly.linear.energy import minimise_energies
-from assembly.linear.lanes import SOURCE
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.pose_error import bound_pose_errors
 from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.robots import BUILT_IN
-from forcefit.native.libraries import by_numba, load_library
+from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import random_robot, stack
 
-needs_compiler = pytest.mark.skipif(
-    load_library(SOURCE) is None, reason="no C++ compiler"
-)
 HALVES = ("rotation", "translation")
 READINGS = ("frozen", "free")
 
@@ -49,7 +45,6 @@ def assert_brackets_share_a_point(lanes, numba, rounding=1e-15):
     return np.count_nonzero(solved)
 
 
-@needs_compiler
 @pytest.mark.parametrize("reading", READINGS)
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.2, 1.0])
 def test_brackets_of_the_papers_robot_hold_numbas(grid, reading, kappa):
@@ -68,7 +63,6 @@ def test_brackets_of_the_papers_robot_hold_numbas(grid, reading, kappa):
         assert np.all(other[:, 0] <= one[:, 1] + 1e-15)
 
 
-@needs_compiler
 @pytest.mark.parametrize("reading", READINGS)
 def test_brackets_of_any_robot_hold_numbas(reading, rng, monkeypatch):
     """At another point of the platform, with and without bounds of passive joints."""
@@ -87,7 +81,6 @@ def test_brackets_of_any_robot_hold_numbas(reading, rng, monkeypatch):
     assert solved
 
 
-@needs_compiler
 @pytest.mark.parametrize("reading", READINGS)
 def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, reading):
     """Other order, other neighbours, alone: not a bit changes."""

@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from assembly.linear.reach import ReachableSet
-from assembly.solvers import one_problem
 from assembly.solvers.conic import cone_sizes, minimise_energy
-from forcefit.native.libraries import by_numba, load_library
-
-needs_compiler = pytest.mark.skipif(
-    load_library(one_problem.SOURCE) is None, reason="no C++ compiler"
-)
+from forcefit.native.libraries import by_numba
 
 
 def random_cones(rng, widest):
@@ -25,7 +20,6 @@ def inside(rng, group):
     return u / cone_sizes(u, group)[group] * rng.uniform(0, 0.9, group.max() + 1)[group]
 
 
-@needs_compiler
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
 def test_least_energies_prove_themselves_and_numbas(rng, widest, springs):
@@ -55,7 +49,6 @@ def test_least_energies_prove_themselves_and_numbas(rng, widest, springs):
         assert other.bound <= one.value + rows + 1e-12
 
 
-@needs_compiler
 def test_the_farthest_point_of_a_ball_and_of_an_interval():
     """|c + r v| with |v| <= 1 is |c| + r; of a ball of three and one more column."""
     centre = np.array([0.0, 0.0, 0.0, 3e-3, 0.0, 4e-3])
@@ -73,7 +66,6 @@ def test_the_farthest_point_of_a_ball_and_of_an_interval():
     assert (low, high) == pytest.approx((5e-3, 5e-3), abs=1e-9)
 
 
-@needs_compiler
 def test_farthest_screws_are_numbas(rng):
     """With rows, and with a cone of many columns, as springs within a budget are."""
     for widest in (2, 12):

@@ -1,0 +1,101 @@
+// Arrays of Python's as addresses, each checked: its numbers, its shape, its order.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <initializer_list>
+#include <string>
+
+namespace nb = nanobind;
+
+// How many rows arrays have that have the same number: what the first of them has.
+struct Size {
+    int64_t value = -1;
+};
+
+inline bool fits(Size &wanted, int64_t found) {
+    if (wanted.value < 0) wanted.value = found;
+    return wanted.value == found;
+}
+inline bool fits(int64_t wanted, int64_t found) { return wanted == found; }
+
+inline std::string text(const Size &size) {
+    return size.value < 0 ? "any" : std::to_string(size.value);
+}
+inline std::string text(int64_t size) { return std::to_string(size); }
+
+// One line that names the argument, what was found and what was expected.
+[[noreturn]] inline void refuse(
+    nb::handle given, const char *name, std::string dtype, bool written,
+    std::initializer_list<std::string> sizes) {
+    const auto said = [](nb::object object) { return std::string(nb::str(object).c_str()); };
+    std::string found = said(given.type().attr("__name__")), wanted;
+    if (nb::hasattr(given, "shape") && nb::hasattr(given, "dtype")) {
+        found = said(given.attr("dtype")) + " of shape " + said(given.attr("shape"));
+        if (nb::hasattr(given, "flags")) {
+            const nb::object flags = given.attr("flags");
+            if (!nb::cast<bool>(flags.attr("c_contiguous"))) found += ", not contiguous";
+            if (written && !nb::cast<bool>(flags.attr("writeable"))) found += ", read-only";
+        }
+    }
+    for (const std::string &size : sizes) wanted += (wanted.empty() ? "" : ", ") + size;
+    if (sizes.size() == 1) wanted += ",";
+    throw nb::value_error(
+        (std::string(name) + ": " + found + ", expected " + (written ? "writable " : "") +
+         dtype + " of shape (" + wanted + "), row after row")
+            .c_str());
+}
+
+// Where an array's numbers are, none where it has none; of a T that is not constant it
+// can be written to.
+template <typename T, typename... Sizes>
+T *address(nb::handle given, const char *name, Sizes &&...sizes) {
+    nb::ndarray<T, nb::c_contig, nb::device::cpu> found;
+    bool right = nb::try_cast(given, found, false) && found.ndim() == sizeof...(sizes);
+    size_t axis = 0;
+    if (right) ((right = fits(sizes, int64_t(found.shape(axis++))) && right), ...);
+    constexpr bool real = std::is_same_v<std::remove_const_t<T>, double>;
+    if (!right)
+        refuse(given, name, real ? "float64" : "int64", !std::is_const_v<T>, {text(sizes)...});
+    return found.size() ? found.data() : nullptr;
+}
+
+template <typename... Sizes>
+const double *reals(nb::handle given, const char *name, Sizes &&...sizes) {
+    return address<const double>(given, name, std::forward<Sizes>(sizes)...);
+}
+template <typename... Sizes>
+const int64_t *integers(nb::handle given, const char *name, Sizes &&...sizes) {
+    return address<const int64_t>(given, name, std::forward<Sizes>(sizes)...);
+}
+
+// Indices, each at least 0 and below the limit.
+inline const int64_t *indices(
+    nb::handle given, const char *name, int64_t limit, Size &size) {
+    const int64_t *all = integers(given, name, size);
+    for (int64_t i = 0; i < size.value; ++i)
+        if (all[i] < 0 || all[i] >= limit)
+            throw nb::value_error(
+                (std::string(name) + "[" + std::to_string(i) + "] is " +
+                 std::to_string(all[i]) + ", expected at least 0 and below " +
+                 std::to_string(limit))
+                    .c_str());
+    return all;
+}
+
+// First rows of groups, and where the last one ends: from 0 on, none before the other,
+// none beyond the limit; `whole`, the last at it.
+inline const int64_t *starts(
+    nb::handle given, const char *name, int64_t limit, bool whole, Size &size) {
+    const int64_t *all = integers(given, name, size);
+    bool right = size.value > 0 && all[0] == 0 && all[size.value - 1] <= limit;
+    right = right && (!whole || all[size.value - 1] == limit);
+    for (int64_t i = 1; right && i < size.value; ++i) right = all[i] >= all[i - 1];
+    if (!right)
+        throw nb::value_error(
+            (std::string(name) + ": expected numbers that begin at 0, do not fall and end " +
+             (whole ? "at " : "at most at ") + std::to_string(limit))
+                .c_str());
+    return all;
+}

@@ -1,0 +1,69 @@
+"""Which of the compiled modules is used: the best for this processor, found at import.
+
+On x86-64 there is a module for each level of its instructions (x86-64 psABI), and the
+same numbers to the last bit in each; ``FORCEFIT_MARCH`` names another level than the
+highest that the processor has.  Elsewhere there is one module.
+"""
+
+import os
+import platform
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+from forcefit.inputs.errors import BadInput, quoted
+
+LEVELS = {f"x86-64-v{level}": level for level in (2, 3, 4)}
+_VARIABLE = "FORCEFIT_MARCH"
+
+
+def levels_here() -> list[str]:
+    """Levels that this processor has, the lowest first; none elsewhere than on x86-64.
+
+    Returns:
+        Names as :data:`LEVELS` has them.
+
+    Raises:
+        ImportError: the compiled modules are not there.
+    """
+    if platform.machine().lower() not in {"x86_64", "amd64"}:
+        return []
+    highest = _load("_processor").level()
+    return [name for name, level in LEVELS.items() if level <= highest]
+
+
+def chosen() -> ModuleType:
+    """The module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
+
+    Returns:
+        The compiled functions.
+
+    Raises:
+        BadInput: the variable names no level, or one that the processor has not.
+        ImportError: the module is not there, or the processor is older than all.
+    """
+    wanted, here = os.environ.get(_VARIABLE), levels_here()
+    if wanted and wanted not in here:
+        raise BadInput(
+            f"{_VARIABLE} is {quoted(wanted)}; expected a level that this processor "
+            f"has, {', '.join(here) or 'of which there are none'}"
+        )
+    if platform.machine().lower() not in {"x86_64", "amd64"}:
+        return _load("_portable")
+    if not here:
+        raise ImportError("forcefit needs a processor with SSE4.2, x86-64-v2")
+    return _load("_" + (wanted or here[-1]).replace("-", "_"))
+
+
+def _load(name: str) -> ModuleType:
+    """A compiled module of this folder."""
+    full = f"{__package__}.{name}"
+    if find_spec(full) is None:
+        raise ImportError(
+            f"{full} is not built: run `pip install -e .` in the folder of the sources"
+        )
+    return import_module(full)
+
+
+kernels: Any = chosen()

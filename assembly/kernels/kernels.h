@@ -1,0 +1,41 @@
+// The compiled functions that Python calls.
+#pragma once
+
+#include "records.h"
+
+// (22) and (21) of every point.  Lanes that nobody needs cost time, and what two lanes
+// touch fits into the fastest cache: the same bits sooner where there are one or two.
+namespace few_lanes {
+void assemble_all(const Robot &robot, const Points &points, Solutions &out);
+void all_margins(const Robot &robot, const Points &points, Margins &out);
+}  // namespace few_lanes
+namespace many_lanes {
+void assemble_all(const Robot &robot, const Points &points, Solutions &out);
+void all_margins(const Robot &robot, const Points &points, Margins &out);
+}  // namespace many_lanes
+
+// Bounds of the largest pose errors, (27), of the points whose outcome is 0.
+void bound_all(
+    const Robot &robot, const Points &points, const Centres &centres,
+    const ClearanceLoads &loads, const Asked &asked, Bounds &out);
+
+// The classical compliance of every point.
+void comply_all(const Robot &robot, const Points &points, Compliances &out);
+
+// A cone programme from within, whatever the guess u (nu,); y (r + p,) of G's rows stays
+// as it is.
+void interior_point(const ConeProblem &given, const Limits &limits, double *u, double *y);
+
+// The same by Newton's method, from the guess of u and of H's multipliers.
+void newton(const ConeProblem &given, const Limits &limits, double *u, double *y);
+
+// Overwrites lower and upper bound (2,), and the screw (6,) that attains the lower; how
+// many support functions it took, or -1 where the bounds are not as close as asked.
+int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
+
+// Follows every target along its straight line.
+void follow_all(const Tree &tree, const Targets &targets, Tracks &out);
+
+// Least energies (22) of `count` draws, rows of h (count, r).
+void least_energies(
+    const Reduced &reduced, const double *h, int64_t count, DrawEnergies &out);

@@ -1,0 +1,30 @@
+// Problems (22) and (21) of all points, with two lanes or with many.
+#pragma once
+
+#include "../kernels.h"
+#include "energies.h"
+#include "margins.h"
+
+#ifdef FEW_LANES
+namespace few_lanes {
+#else
+namespace many_lanes {
+#endif
+using namespace LANE_SPACE;
+
+void assemble_all(const Robot &robot, const Points &points, Solutions &out) {
+    Energies energies(robot, points);
+    in_blocks(all_of(points.count), [&](const Block &block, Whole pending) {
+        return energies.solve(points, block, pending, out);
+    });
+}
+
+// Of robots without springs.
+void all_margins(const Robot &robot, const Points &points, Margins &out) {
+    ZoneMargins zone(robot, points);
+    in_blocks(all_of(points.count), [&](const Block &block, Whole pending) {
+        return zone.margins(points, block, pending, out);
+    });
+}
+
+}  // namespace

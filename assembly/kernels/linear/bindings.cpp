@@ -1,0 +1,207 @@
+// Problems (22), (21) and (27), and the classical compliance, as Python calls them.
+#include "../arrays.h"
+#include "../bindings.h"
+#include "../kernels.h"
+
+namespace {
+
+// A robot's arrays, kept as long as their addresses are.
+struct KeptRobot {
+    nb::object structure;
+    Robot robot;
+};
+
+KeptRobot robot_of(nb::object s) {
+    const auto own = [&](const char *name) { return s.attr(name); };
+    Robot r = {};
+    Size n, closures, np, ny, ends, ng, nu, cone_ends, nq;
+    r.size = nb::cast<double>(own("size"));
+    r.platform = nb::cast<int64_t>(own("platform"));
+    r.on_path = reals(own("on_path"), "on_path", n);
+    if (r.platform < 0 || r.platform >= n.value)
+        throw nb::value_error("platform: expected the row of a frame");
+    r.patterns = reals(own("patterns"), "patterns", np, closures);
+    r.pattern_of = indices(own("pattern_of"), "pattern_of", np.value, n);
+    r.springs = reals(own("springs"), "springs", ny, 6);
+    r.spring_frame = indices(own("spring_frame"), "spring_frame", n.value, ny);
+    r.spring_order = indices(own("spring_order"), "spring_order", ny.value, ny);
+    r.of_joint = indices(own("of_joint"), "of_joint", 2, ny);
+    r.groups = starts(own("groups"), "groups", ny.value, false, ends);
+    ng.value = ends.value - 1;
+    r.group_pattern = indices(own("group_pattern"), "group_pattern", np.value, ng);
+    r.group_on_path = reals(own("group_on_path"), "group_on_path", ng);
+    r.cone_frame = indices(own("cone_frame"), "cone_frame", n.value, nu);
+    r.cone_axis = indices(own("cone_axis"), "cone_axis", 6, nu);
+    r.cone_size = reals(own("cone_size"), "cone_size", nu);
+    r.starts = starts(own("starts"), "starts", nu.value, true, cone_ends);
+    r.free_frame = indices(own("free_frame"), "free_frame", n.value, nq);
+    r.free_axis = indices(own("free_axis"), "free_axis", 6, nq);
+    r.free_bound = reals(own("free_bound"), "free_bound", nq);
+    r.n = n.value, r.closures = closures.value, r.np = np.value, r.ny = ny.value;
+    r.ng = ng.value, r.nu = nu.value, r.cones = cone_ends.value - 1, r.nq = nq.value;
+    return {std::move(s), r};
+}
+
+// Frames, their errors, and the closure error that they have already.
+Points points_of(
+    const Robot &r, nb::handle T, nb::handle errors, nb::handle mismatch, Size &k) {
+    Size sets;
+    Points points = {};
+    points.T = reals(T, "T", k, r.n, 4, 4);
+    points.errors = reals(errors, "errors", sets, r.n, 6);
+    if (sets.value != k.value && sets.value != 1) reals(errors, "errors", k, r.n, 6);
+    points.own_errors = sets.value > 1;
+    points.mismatch = reals(mismatch, "mismatch", k);
+    points.count = k.value;
+    return points;
+}
+
+void call_assemble_all(
+    const KeptRobot &of, nb::handle T, nb::handle errors, nb::handle mismatch,
+    nb::handle loads, nb::handle outcome, nb::handle energy, nb::handle bound,
+    nb::handle without_clearance, nb::handle work, nb::handle platform_screw,
+    nb::handle clearances, nb::handle motions, nb::handle multipliers,
+    nb::handle residual, nb::handle elastic) {
+    const Robot &r = of.robot;
+    Size k, rows, columns;
+    Points points = points_of(r, T, errors, mismatch, k);
+    if (!loads.is_none()) points.loads = reals(loads, "loads", k, 2, r.n, 6);
+    Solutions out;
+    out.outcome = address<int64_t>(outcome, "outcome", k);
+    out.energy = address<double>(energy, "energy", k);
+    out.bound = address<double>(bound, "bound", k);
+    out.without_clearance = address<double>(without_clearance, "without_clearance", k);
+    out.work = address<double>(work, "work", k);
+    out.platform_screw = address<double>(platform_screw, "platform_screw", k, 6);
+    out.clearances = address<double>(clearances, "clearances", k, r.nu);
+    out.motions = address<double>(motions, "motions", k, r.nq);
+    out.multipliers = address<double>(multipliers, "multipliers", k, 6 * r.closures);
+    out.residual = address<double>(residual, "residual", k);
+    out.elastic = address<double>(elastic, "elastic", rows, columns);
+    if (out.elastic) address<double>(elastic, "elastic", k, r.ny);
+    const nb::gil_scoped_release others;
+    if (points.count <= 2)
+        few_lanes::assemble_all(r, points, out);
+    else
+        many_lanes::assemble_all(r, points, out);
+}
+
+void call_all_margins(
+    const KeptRobot &of, nb::handle T, nb::handle errors, nb::handle mismatch,
+    nb::handle margin, nb::handle bound, nb::handle outcome) {
+    Size k;
+    const Points points = points_of(of.robot, T, errors, mismatch, k);
+    Margins out = {
+        address<double>(margin, "margin", k), address<double>(bound, "bound", k),
+        address<int64_t>(outcome, "outcome", k)};
+    const nb::gil_scoped_release others;
+    if (points.count <= 2)
+        few_lanes::all_margins(of.robot, points, out);
+    else
+        many_lanes::all_margins(of.robot, points, out);
+}
+
+void call_bound_all(
+    const KeptRobot &of, nb::handle T, nb::handle errors, nb::handle mismatch,
+    nb::handle screws, nb::handle clearances, nb::handle motions, const KeptRobot &held,
+    nb::handle multipliers, nb::handle held_clearances, nb::handle energy,
+    nb::handle without_clearance, nb::handle cone_of, nb::handle offset,
+    nb::handle tolerance, nb::handle rotation, nb::handle translation,
+    nb::handle rotation_screw, nb::handle translation_screw, nb::handle supports,
+    nb::handle outcome) {
+    const Robot &r = of.robot, &h = held.robot;
+    Size k, cones;
+    cones.value = r.cones;
+    const Points points = points_of(r, T, errors, mismatch, k);
+    const Centres centres = {
+        reals(screws, "screws", k, 6), reals(clearances, "clearances", k, r.nu),
+        reals(motions, "motions", k, r.nq)};
+    const ClearanceLoads loads = {
+        &h, reals(multipliers, "multipliers", k, 6 * h.closures),
+        reals(held_clearances, "held_clearances", k, h.nu), reals(energy, "energy", k),
+        reals(without_clearance, "without_clearance", k),
+        indices(cone_of, "cone_of", h.cones, cones)};
+    const Asked asked = {reals(offset, "offset", 3), reals(tolerance, "tolerance", 2)};
+    Bounds out = {
+        {address<double>(rotation, "rotation", k, 2),
+         address<double>(translation, "translation", k, 2)},
+        {address<double>(rotation_screw, "rotation_screw", k, 6),
+         address<double>(translation_screw, "translation_screw", k, 6)},
+        address<int64_t>(supports, "supports", k),
+        address<int64_t>(outcome, "outcome", k)};
+    const nb::gil_scoped_release others;
+    bound_all(r, points, centres, loads, asked, out);
+}
+
+void call_comply_all(
+    const KeptRobot &of, nb::handle T, nb::handle errors, nb::handle mismatch,
+    nb::handle springs, nb::handle status) {
+    Size k;
+    const Points points = points_of(of.robot, T, errors, mismatch, k);
+    Compliances out = {
+        address<double>(springs, "springs", k, 6, of.robot.ny),
+        address<int64_t>(status, "status", k)};
+    const nb::gil_scoped_release others;
+    comply_all(of.robot, points, out);
+}
+
+void call_least_energies(
+    nb::handle Gt, nb::handle cones, nb::handle inverse, nb::handle forces,
+    nb::handle gram, nb::handle d, double slip, double slack, double stored, nb::handle h,
+    nb::handle u, nb::handle y, nb::handle energy, nb::handle bound, nb::handle outcome) {
+    Size nu, r, ends, k;
+    Reduced own;
+    own.Gt = reals(Gt, "Gt", nu, r);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.inverse = reals(inverse, "inverse", nu, r);
+    own.forces = reals(forces, "forces", nu, r);
+    own.gram = reals(gram, "gram", r, r);
+    own.loaded = !d.is_none();
+    own.d = own.loaded ? reals(d, "d", nu) : nullptr;
+    own.nu = nu.value, own.r = r.value, own.cones = ends.value - 1;
+    own.slip = slip, own.slack = slack, own.stored = stored;
+    const double *rows = reals(h, "h", k, r);
+    DrawEnergies out = {
+        address<double>(u, "u", k, nu), address<double>(y, "y", k, r),
+        address<double>(energy, "energy", k), address<double>(bound, "bound", k),
+        address<int64_t>(outcome, "outcome", k)};
+    const nb::gil_scoped_release others;
+    least_energies(own, rows, k.value, out);
+}
+
+}  // namespace
+
+void bind_linear(nb::module_ &m) {
+    nb::class_<KeptRobot>(m, "Robot")
+        .def(nb::new_(&robot_of), nb::arg("structure"));
+    m.def(
+        "assemble_all", &call_assemble_all,
+        nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
+        nb::arg("loads").none(), nb::arg("outcome"), nb::arg("energy"), nb::arg("bound"),
+        nb::arg("without_clearance"), nb::arg("work"), nb::arg("platform_screw"),
+        nb::arg("clearances"), nb::arg("motions"), nb::arg("multipliers"),
+        nb::arg("residual"), nb::arg("elastic"));
+    m.def(
+        "all_margins", &call_all_margins,
+        nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
+        nb::arg("margin"), nb::arg("bound"), nb::arg("outcome"));
+    m.def(
+        "bound_all", &call_bound_all,
+        nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
+        nb::arg("screws"), nb::arg("clearances"), nb::arg("motions"), nb::arg("held"),
+        nb::arg("multipliers"), nb::arg("held_clearances"), nb::arg("energy"),
+        nb::arg("without_clearance"), nb::arg("cone_of"), nb::arg("offset"),
+        nb::arg("tolerance"), nb::arg("rotation"), nb::arg("translation"),
+        nb::arg("rotation_screw"), nb::arg("translation_screw"), nb::arg("supports"),
+        nb::arg("outcome"));
+    m.def(
+        "comply_all", &call_comply_all,
+        nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
+        nb::arg("springs"), nb::arg("status"));
+    m.def(
+        "least_energies", &call_least_energies,
+        nb::arg("Gt"), nb::arg("starts"), nb::arg("inverse"), nb::arg("forces"),
+        nb::arg("gram"), nb::arg("d").none(), nb::arg("slip"), nb::arg("slack"),
+        nb::arg("stored"), nb::arg("h"), nb::arg("u"), nb::arg("y"), nb::arg("energy"),
+        nb::arg("bound"), nb::arg("outcome"));
+}

@@ -1,0 +1,63 @@
+// The classical compliance at several postures side by side: compiled_compliance.py in
+// lanes.
+#pragma once
+
+#include "reduction.h"
+
+namespace LANE_SPACE {
+
+enum { COMPLIANT, LOOSE, UNCLEAR };
+constexpr double STILL = 1e-9;
+
+// Blocks of points of one robot, one after the other.
+class Compliance : public Reduction {
+public:
+    using Reduction::Reduction;
+
+    Whole comply(const Points &points, const Block &block, Whole asked, Compliances &out);
+};
+
+// The classical compliance of the lanes asked for that have the ranks of the first of
+// them; returns the others.  Of the springs y = B e + Y^T mu under a unit wrench e, the
+// closures' wrenches mu make |y| least.
+inline Whole Compliance::comply(
+    const Points &points, const Block &block, Whole asked, Compliances &out) {
+    const auto settle = [&](Whole where, int64_t status) {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) out.status[block.point[l]] = status;
+        return ~where;
+    };
+    Whole others = asked;
+    read(points, block);
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Ranks ranks = eliminate(tolerance, asked);
+    others &= settle(ranks.unclear, UNCLEAR);
+    if (!any(asked = ranks.same)) return others;
+    const int rank = ranks.free, r = ranks.springs;
+    Row closing(m), bent(6 * ng), on(6 * np);
+    for (int row = 0; row < 6; ++row) {
+        const Whole loose = hold_free_motions(rank, row, STILL, closing);
+        others &= settle(asked & loose, LOOSE);
+        if (!any(asked &= ~loose)) return others;
+        for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+        for (int g = 0; g < ng; ++g)
+            for (int b = 0; b < 6; ++b) {
+                Real total = s.group_on_path[g] * L[6 * g + row][b];
+                for (int a = 0; a < 6; ++a)
+                    total += L[6 * g + a][b] * on[6 * s.group_pattern[g] + a];
+                bent[6 * g + b] = total;
+            }
+        bend_least(r, bent, closing);
+        for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+        for (int c = 0; c < s.ny; ++c) {
+            const int64_t j = s.spring_frame[c];
+            Real total = s.on_path[j] * elastic[c][row];
+            for (int a = 0; a < 6; ++a)
+                total += elastic[c][a] * on[6 * s.pattern_of[j] + a];
+            block.write(out.springs, 6 * s.ny, row * s.ny + c, total, asked);
+        }
+    }
+    return others & settle(asked, COMPLIANT);
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,310 @@
+// Problem (22) at several postures side by side, from the frames' poses to the certified
+// answer: compiled_energy.py in lanes.
+#pragma once
+
+#include "loads.h"
+
+namespace LANE_SPACE {
+
+// assembly/solvers/conic.py
+constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
+// assembly/linear/thresholds.py
+constexpr double OPEN = 1e-11;
+// assembly/linear/compiled_energy.py
+enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN };
+constexpr double STOP = 3e-3;
+
+// Solves blocks of points of one robot, one after the other.
+class Energies : public Loaded {
+public:
+    Energies(const Robot &s, const Points &points)
+        : Loaded(s, points), solver(cones, m), v(m) {}
+
+    Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
+
+private:
+    Solver solver;
+    Row v;  // G u + h
+
+    Whole rigid_rows(int rank, int count, Real tolerance);
+    Whole minimise(int r, Whole asked);
+    Row least_multipliers(int r, int count);
+    void own_springs(
+        const Row &grouped, const Block &block, double *elastic, Whole where);
+    struct Proof { Real gain, cost; };
+    Proof complementary(const Row &motions, const Row &multipliers);
+    Real loaded_gap(
+        int r, const Row &grouped, const Row &motions, const Row &multipliers);
+};
+
+// Lanes where clearances or errors enter rows that no spring enters.
+inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
+    Array<Real> most(np), sizes(nu);
+    for (int g = 0; g < np; ++g)
+        for (int i = rank; slot[g] >= 0 && i < count; ++i)
+            for (int a = 0; a < 6; ++a)
+                most[g] = larger(magnitude(parts[i][6 * slot[g] + a]), most[g]);
+    Real worst = {};
+    for (int c = 0; c < nu; ++c)
+        for (int a = 0; a < 6; ++a) sizes[c] = larger(magnitude(play[c][a]), sizes[c]);
+    const Real limit = largest_clearance() * (NOISE / CLEAR);
+    for (int c = 0; c < nu; ++c) {
+        const int64_t g = s.pattern_of[s.cone_frame[c]];
+        const Whole near = 6.0 * sizes[c] * most[g] > limit;
+        if (!any(near)) continue;  // as nearly all are
+        for (int i = rank; i < count; ++i) {
+            const Real total = enters(c, parts[i] + 6 * slot[g]);
+            worst = near ? larger(magnitude(total), worst) : worst;
+        }
+    }
+    Whole rigid = worst > limit;
+    const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
+    for (int i = rank; i < count; ++i)  // written so that NaN is rigid
+        rigid |= ~(magnitude(inner(known.data(), Z[i], m)) <= allowed);
+    return rigid;
+}
+
+// Least |G u + h|^2 / 2 - d.u: u, v = G u + h, and the multipliers y.  Newton alone where
+// all constraints are active, else after an interior point.  Returns the outcomes.
+inline Whole Energies::minimise(int r, Whole asked) {
+    Programme &q = programme;
+    Real square = inner(q.h.data(), q.h.data(), r), size = square;
+    for (int c = 0; c < nu; ++c) {
+        Real column = {};
+        for (int i = 0; i < r; ++i) column += q.M[i][c] * q.M[i][c];
+        size = larger(column, size);
+    }
+    Whole some = square > 0.0;
+    for (int c = 0; loaded && c < nu; ++c) {
+        size = larger(magnitude(q.d[c]), size);
+        some |= q.d[c] != 0.0;
+    }
+    size = root(size);
+    std::fill(q.u.begin(), q.u.end(), Real{});
+    std::copy(q.h.begin(), q.h.begin() + r, q.y.begin());
+    std::copy(q.h.begin(), q.h.begin() + r, v.begin());
+    asked &= some;
+    if (nu == 0 || !any(asked)) return Whole{};
+    const Real over = 1.0 / (some ? size : real(1.0));
+    for (int i = 0; i < r; ++i) {
+        q.h[i] *= over;
+        for (int c = 0; c < nu; ++c) q.M[i][c] *= over;
+    }
+    const Real without = 0.5 * inner(q.h.data(), q.h.data(), r);
+    Real absolute = STOP * GAP_WITHOUT_CLEARANCE * without;
+    Real near = NEAR_WITHOUT_CLEARANCE * without;
+    if (loaded) {
+        const Real bent = stored * over * over;
+        absolute += STOP * (GAP + GAP_WITHOUT_CLEARANCE) * bent;
+        near += (NEAR + NEAR_WITHOUT_CLEARANCE) * bent;
+        for (int c = 0; c < nu; ++c) q.d[c] *= over * over;
+    }
+    const Whole left = asked & ~solver.newton_alone(q, STOP * GAP, absolute, asked);
+    solver.interior_then_newton(q, STOP * GAP, absolute, near, left);
+    multiply(q.M.rows(), r, q.u.data(), nu, v.data());
+    for (int i = 0; i < r; ++i) {
+        v[i] = (v[i] + q.h[i]) * size;
+        q.y[i] = asked ? q.y[i] * size : q.y[i];
+        q.h[i] *= size;
+    }
+    for (int c = 0; loaded && c < nu; ++c) q.d[c] *= size * size;
+    return left ? whole(INTERIOR) : whole(NEWTON);
+}
+
+// Multipliers of the closures, the least ones where they are not unique.
+inline Row Energies::least_multipliers(int r, int count) {
+    Row multipliers = loaded ? holding : Row(m);
+    combine(Z.data(), r, programme.y.data(), m, multipliers.data());
+    // nothing feels those along Z's other rows, made orthonormal here
+    for (int i = r; i < count; ++i) {
+        Real *own = Z[i];
+        for (int l = r; l < i; ++l) {
+            const Real along = inner(Z[l], own, m);
+            for (int a = 0; a < m; ++a) own[a] -= along * Z[l][a];
+        }
+        const Real over = 1.0 / root(inner(own, own, m));
+        for (int a = 0; a < m; ++a) own[a] *= over;
+        const Real along = inner(own, multipliers.data(), m);
+        for (int a = 0; a < m; ++a) multipliers[a] -= along * own[a];
+    }
+    return multipliers;
+}
+
+// Deformation of every spring, from that of the groups' six.
+inline void Energies::own_springs(
+    const Row &grouped, const Block &block, double *elastic, Whole where) {
+    Triangle rows(6, widest);
+    for (int g = 0; g < ng; ++g) {
+        const int count = spring_group(g, rows);
+        triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
+        Row own(count);
+        std::copy(&grouped[6 * g], &grouped[6 * g] + 6, own.begin());
+        Real *x = own.data();
+        turn_all(rows, 6, count, &x, 1);
+        for (int64_t c = s.groups[g]; c < s.groups[g + 1]; ++c) {
+            Real strain = own[c - s.groups[g]];
+            if (loaded) strain += tight[c];
+            block.write(elastic, s.ny, s.spring_order[c], strain, where);
+        }
+    }
+    for (int64_t c = s.groups[ng]; loaded && c < s.ny; ++c)
+        block.write(elastic, s.ny, s.spring_order[c], tight[int(c)], where);
+}
+
+// Wrenches times f prove f gain - f^2 cost / 2, on the problem before elimination.
+inline Energies::Proof Energies::complementary(const Row &motions, const Row &multipliers) {
+    Real gain = -inner(multipliers.data(), known.data(), m), cost = {};
+    Row at_platform(6 * np);
+    for (int g = 0; g < np; ++g) part(multipliers.data(), g, &at_platform[6 * g]);
+    const auto on = [&](int64_t j) { return &at_platform[6 * s.pattern_of[j]]; };
+    for (int c = 0; c < s.ny; ++c) {
+        Real force = {};
+        for (int a = 0; a < 6; ++a) force += elastic[c][a] * on(s.spring_frame[c])[a];
+        cost += force * force;
+    }
+    cones.each([&](auto size, int, int at) {
+        Real squares = {};
+        for (int i = at; i < at + size; ++i) {
+            const int c = int(cones.column[i]);
+            const Real force = enters(c, on(s.cone_frame[c]));
+            squares += force * force;
+        }
+        gain -= root(squares);
+    });
+    for (int c = 0; c < nq; ++c) {
+        Real force = {};
+        for (int a = 0; a < 6; ++a) force += motion[c][a] * on(s.free_frame[c])[a];
+        gain -= magnitude(force * motions[c]);
+    }
+    return {gain, cost};
+}
+
+// How far energy minus work is above what the wrenches prove, on the problem before
+// elimination:  |y - s|^2 / 2  with s the springs' strains that balance the wrenches, and
+// what clearances could still gain.  Loads bend both y and s by t, which cancels.
+inline Real Energies::loaded_gap(
+    int r, const Row &grouped, const Row &motions, const Row &multipliers) {
+    Row closing(m);
+    combine(Z.data(), r, programme.y.data(), m, closing.data());
+    Row on = on_patterns(closing);
+    Real gap = 0.5 * inner(v.data(), v.data(), r);
+    for (int g = 0; g < ng; ++g)
+        for (int a = 0; a < 6; ++a)
+            gap -= inner(L[6 * g + a], &grouped[6 * g], 6) * on[6 * s.group_pattern[g] + a];
+    for (int c = 0; c < s.ny; ++c) {
+        const Real force = along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
+        gap += 0.5 * force * force;
+    }
+    gap = larger(gap, Real{});
+    on = on_patterns(multipliers);
+    cones.each([&](auto size, int, int at) {
+        Real squares = {}, work = {};
+        for (int i = at; i < at + size; ++i) {
+            const int c = int(cones.column[i]);
+            const Real force = on_play[c] + enters(c, &on[6 * s.pattern_of[s.cone_frame[c]]]);
+            squares += force * force, work += force * programme.u[i];
+        }
+        gap += larger(root(squares) - work, Real{});
+    });
+    for (int c = 0; c < nq; ++c) {
+        const Real work =
+            motions[c] * (drive[c] + along(motion[c], &on[6 * s.pattern_of[s.free_frame[c]]]));
+        gap += magnitude(work) - work;
+    }
+    return gap;
+}
+
+// Solves the lanes asked for that have the ranks of the first of them, and writes their
+// rows; returns the others.
+inline Whole Energies::solve(
+    const Points &points, const Block &block, Whole asked, Solutions &out) {
+    const auto settle = [&](Whole where, int64_t outcome) {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) out.outcome[block.point[l]] = outcome;
+    };
+    const Whole all = asked;
+    read(points, block);
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Ranks ranks = eliminate(tolerance, asked);
+    settle(ranks.unclear, AMBIGUOUS);
+    const Whole settled = ranks.unclear | ranks.same;
+    if (!any(asked = ranks.same)) return all & ~settled;
+    const int rank = ranks.free, count = m - rank, r = ranks.springs;
+    clearance_parts(count);
+    const Whole rigid = rigid_rows(r, count, tolerance);
+    settle(asked & rigid, RIGID);
+    if (!any(asked &= ~rigid)) return all & ~settled;
+    small_problem(r);
+    Real without = 0.5 * inner(programme.h.data(), programme.h.data(), r);
+    if (loaded) {
+        const Whole driven = balance(points, block, rank, r);
+        settle(asked & driven, DRIVEN);
+        if (!any(asked &= ~driven)) return all & ~settled;
+        without += stored;
+    }
+    const Whole solved = minimise(r, asked);
+    // back to the full problem
+    Row multipliers = least_multipliers(r, count);
+    for (int i = 0; loaded && i < r; ++i) v[i] -= left[i];
+    const Row grouped = spring_strains(r, v);
+    Row moved = moved_by(grouped);
+    for (int c = 0; loaded && c < s.ny; ++c) {
+        const int64_t j = s.spring_frame[c];
+        Real step[6];
+        for (int a = 0; a < 6; ++a) step[a] = elastic[c][a] * tight[c];
+        move(s.pattern_of[j], s.on_path[j], step, moved);
+    }
+    const Row motions = least_motions(rank, moved);
+    Whole outcome = solved;
+    for (int c = 0; c < nq; ++c) {
+        outcome = magnitude(motions[c]) > s.free_bound[c] ? whole(BOUNDED) : outcome;
+        const int64_t j = s.free_frame[c];
+        Real step[6];
+        for (int a = 0; a < 6; ++a)
+            step[a] = motion[c][a] * motions[c];
+        move(s.pattern_of[j], s.on_path[j], step, moved);
+    }
+    Real residual = {}, slip = {};
+    for (int a = 0; a < m; ++a) {
+        residual = larger(magnitude(moved[a]), residual);
+        slip += magnitude(moved[a] * multipliers[a]);
+    }
+    Real energy = 0.5 * inner(v.data(), v.data(), r), bound, work = {}, factor = real(1.0);
+    if (loaded) {
+        energy += stored + inner(v.data(), left.data(), r);
+        bound = energy - loaded_gap(r, grouped, motions, multipliers) - slip;
+        // t is orthogonal to what closures do to springs, and known what they have to close
+        work = 2.0 * stored + inner(programme.d.data(), programme.u.data(), nu) +
+               inner(holding.data(), known.data(), m);
+    } else {
+        const Proof proof = complementary(motions, multipliers);
+        // any multiple of the wrenches proves a bound: the best one, zero inside a zone
+        const Real gain = proof.gain - slip, cost = proof.cost;
+        const Whole some = (gain > 0.0) & (cost > 0.0);
+        factor = some ? gain / cost : Real{};
+        bound = 0.5 * factor * factor * cost;
+    }
+    // written so that NaN fails
+    const Real allowed =
+        GAP * energy + GAP_WITHOUT_CLEARANCE * (without + magnitude(work));
+    const Whole proved = (energy - bound <= allowed) & (residual <= OPEN);
+    outcome = (outcome == whole(BOUNDED)) | proved ? outcome : whole(UNCERTIFIED);
+    for (int l = 0; l < LANES; ++l)
+        if (asked[l]) out.outcome[block.point[l]] = outcome[l];
+    block.write(out.energy, 1, 0, energy, asked);
+    block.write(out.bound, 1, 0, bound, asked);
+    block.write(out.without_clearance, 1, 0, without, asked);
+    block.write(out.work, 1, 0, work, asked);
+    block.write(out.residual, 1, 0, residual, asked);
+    for (int a = 0; a < 6; ++a)
+        block.write(out.platform_screw, 6, a, a < 3 ? screw[a] : screw[a] * s.size, asked);
+    for (int c = 0; c < nu; ++c)
+        block.write(out.clearances, nu, cones.column[c], programme.u[c], asked);
+    for (int c = 0; c < nq; ++c) block.write(out.motions, nq, c, motions[c], asked);
+    for (int a = 0; a < m; ++a)
+        block.write(out.multipliers, m, a, factor * multipliers[a], asked);
+    if (out.elastic) own_springs(grouped, block, out.elastic, asked);
+    return all & ~settled;
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,190 @@
+// The linear model of a robot, (16)-(20), at several postures side by side: what moves the
+// platform and what the closures say of it; compiled_structure.py in lanes.
+//
+// ========  =============  ============================================================
+// symbol    shape          meaning
+// ========  =============  ============================================================
+// P         (n, 6, 6)      row `axis`: unit screw of frame j along it, read at the
+//                          platform in base axes, translations by the reference length;
+//                          of the slides only what the turns say is kept
+// m                        6 closures, the rows A of (16)-(20)
+// known     (m,)           closure error that the geometric errors cause
+// ========  =============  ============================================================
+#pragma once
+
+#include "../solvers/block.h"
+#include "../records.h"
+
+namespace LANE_SPACE {
+
+// assembly/linear/thresholds.py
+constexpr double RANK = 1e-10, MISMATCH_FACTOR = 30.0, NOISE = 1e-12;
+
+// A closure that a frame enters, and the sign.
+struct Entry {
+    int closure;
+    double sign;
+};
+
+// Reads blocks of points of one robot, one after the other.
+class Linearised {
+public:
+    Linearised(const Robot &s, const Points &points);
+
+protected:
+    const Robot &s;
+    const int n, m, np, ng, nu, nq;
+    Array<Array<Entry>> patterns;
+    Array<bool> felt, erring;  // frames
+    Table P;                       // (n, 18) the three turns of each frame: `column`
+    Table motion, play, elastic;   // (.., 6) columns of free motions, clearances, springs
+    Row known;
+    Real screw[6];  // of the platform
+    Real largest_error, largest_spring;
+
+    void read(const Points &points, const Block &block);
+    void column(int64_t j, int64_t axis, Real *out) const;
+    void move(int64_t pattern, double on_path, const Real *step, Row &open);
+    void part(const Real *row, int64_t pattern, Real *out) const;
+    Real enters(int c, const Real *part) const;
+    Real largest_clearance() const;
+
+private:
+    void read_frame(const Points &points, const Block &block, int j, const Real *origin);
+    void read_errors(const Points &points, const Block &block, int j);
+    void columns();
+};
+
+inline Linearised::Linearised(const Robot &s, const Points &points)
+    : s(s), n(int(s.n)), m(int(6 * s.closures)), np(int(s.np)), ng(int(s.ng)),
+      nu(int(s.nu)), nq(int(s.nq)), patterns(np), felt(n), erring(n), P(n, 18),
+      motion(nq, 6), play(nu, 6), elastic(int(s.ny), 6), known(m) {
+    for (int g = 0; g < np; ++g)
+        for (int k = 0; k < s.closures; ++k)
+            if (const double sign = s.patterns[g * s.closures + k])
+                patterns[g].push_back({k, sign});
+    for (int c = 0; c < nu; ++c) felt[s.cone_frame[c]] = true;
+    for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
+    for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
+    // a frame without errors at any point adds exact zeros
+    for (int j = 0; points.erring && j < n; ++j) erring[j] = points.erring[j];
+    const int64_t sets = points.erring ? 0 : points.own_errors ? points.count : 1;
+    for (int64_t i = 0; i < sets * n; ++i)
+        for (int axis = 0; axis < 6; ++axis)
+            if (points.errors[6 * i + axis] != 0.0) erring[i % n] = true;
+}
+
+// The columns that the frames' poses give, the closure error and the platform's screw
+// that their errors cause.
+inline void Linearised::read(const Points &points, const Block &block) {
+    Real origin[3];
+    for (int a = 0; a < 3; ++a)
+        origin[a] = block.read(points.T, n * 16, s.platform * 16 + 4 * a + 3);
+    std::fill(known.begin(), known.end(), Real{});
+    std::fill(screw, screw + 6, Real{});
+    largest_error = Real{};
+    for (int j = 0; j < n; ++j) {
+        if (felt[j] || erring[j]) read_frame(points, block, j, origin);
+        if (erring[j]) read_errors(points, block, j);
+    }
+    columns();
+}
+
+// A frame's turns: unit screws about its axes.
+inline void Linearised::read_frame(
+    const Points &points, const Block &block, int j, const Real *origin) {
+    const auto entry = [&](int a, int b) {
+        return block.read(points.T, n * 16, j * 16 + 4 * a + b);
+    };
+    const Real x = (entry(0, 3) - origin[0]) / s.size;
+    const Real y = (entry(1, 3) - origin[1]) / s.size;
+    const Real z = (entry(2, 3) - origin[2]) / s.size;
+    for (int axis = 0; axis < 3; ++axis) {
+        const Real a = entry(0, axis), b = entry(1, axis), c = entry(2, axis);
+        Real *turned = P[j] + 6 * axis;
+        turned[0] = a, turned[1] = b, turned[2] = c;
+        turned[3] = y * c - z * b, turned[4] = z * a - x * c, turned[5] = x * b - y * a;
+    }
+}
+
+// What a frame's errors move.
+inline void Linearised::read_errors(const Points &points, const Block &block, int j) {
+    Real own[6] = {}, step[6];
+    for (int axis = 0; axis < 6; ++axis) {
+        const Real error = points.own_errors
+                               ? block.read(points.errors, n * 6, j * 6 + axis)
+                               : real(points.errors[j * 6 + axis]);
+        column(j, axis, step);
+        for (int a = axis < 3 ? 0 : 3; a < 6; ++a) {
+            step[a] *= error;
+            own[a] += step[a];
+            largest_error = larger(magnitude(step[a]), largest_error);
+        }
+    }
+    move(s.pattern_of[j], s.on_path[j], own, known);
+}
+
+// P's row `axis` of frame j.
+inline void Linearised::column(int64_t j, int64_t axis, Real *out) const {
+    const Real *turned = P[int(j)] + 6 * (axis % 3);
+    for (int a = 0; a < 3; ++a) {
+        out[a] = axis < 3 ? turned[a] : Real{};
+        out[3 + a] = axis < 3 ? turned[3 + a] : turned[a] * (1.0 / s.size);
+    }
+}
+
+// Columns of free motions, clearances and springs.
+inline void Linearised::columns() {
+    for (int c = 0; c < nq; ++c) column(s.free_frame[c], s.free_axis[c], motion[c]);
+    for (int c = 0; c < nu; ++c) {
+        column(s.cone_frame[c], s.cone_axis[c], play[c]);
+        for (int a = 0; a < 6; ++a) play[c][a] *= s.cone_size[c];
+    }
+    Real step[6];
+    largest_spring = Real{};
+    for (int c = 0; c < s.ny; ++c) {
+        std::fill(elastic[c], elastic[c] + 6, Real{});
+        for (int axis = 0; axis < 6; ++axis)
+            if (const double weight = s.springs[6 * c + axis]) {
+                column(s.spring_frame[c], axis, step);
+                for (int a = 0; a < 6; ++a) elastic[c][a] += weight * step[a];
+            }
+        for (int a = 0; c < s.groups[ng] && a < 6; ++a)
+            largest_spring = larger(magnitude(elastic[c][a]), largest_spring);
+    }
+}
+
+// Adds a step of a frame to the platform's screw and to what closures are open.
+inline void Linearised::move(int64_t pattern, double on_path, const Real *step, Row &open) {
+    if (on_path)
+        for (int a = 0; a < 6; ++a) screw[a] += on_path * step[a];
+    for (const Entry &e : patterns[pattern])
+        for (int a = 0; a < 6; ++a) open[6 * e.closure + a] += e.sign * step[a];
+}
+
+// What a screw of this pattern is in a row over the closures.
+inline void Linearised::part(const Real *row, int64_t pattern, Real *out) const {
+    Real own[6] = {};
+    for (const Entry &e : patterns[pattern])
+        for (int a = 0; a < 6; ++a) own[a] += e.sign * row[6 * e.closure + a];
+    std::copy(own, own + 6, out);
+}
+
+// What clearance c is in a row, of which screws of its pattern are `part`.
+inline Real Linearised::enters(int c, const Real *part) const {
+    Real total = {};
+    for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += play[c][a] * part[a];
+    return total;
+}
+
+// Largest entry of the clearances' closure columns, for the noise floor.
+inline Real Linearised::largest_clearance() const {
+    Real largest = {};
+    for (int c = 0; c < nu; ++c)
+        for (const Entry &e : patterns[s.pattern_of[s.cone_frame[c]]])
+            for (int a = 0; a < 6; ++a)
+                largest = larger(magnitude(e.sign * play[c][a]), largest);
+    return largest;
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,115 @@
+// What loads do to a robot without clearances and errors, at several postures side by
+// side.  Of problem (22) under loads,
+//
+//     minimise  |y|^2 / 2 - f.y - c.u - g.q   subject to  A_q q + A_u u + A_y y = -known,
+//
+// closures' wrenches w that hold the free motions, A_q^T w = -g, and bend springs least
+// make  t = f + A_y^T w  orthogonal to all that closures do to springs.  With y = t + ..,
+//
+//     |t|^2 / 2 is stored beside  |G u + h|^2 / 2 - d.u,   d = c + A_u^T w:
+//
+// G and h are those without loads, and clearances feel what they carry when tight.
+#pragma once
+
+#include "reduction.h"
+
+namespace LANE_SPACE {
+
+constexpr double STILL_OF_DRIVE = 1e-9;  // of the largest force on a free motion
+
+class Loaded : public Reduction {
+public:
+    Loaded(const Robot &s, const Points &points)
+        : Reduction(s, points), loaded(points.loads), tight(loaded ? s.ny : 0),
+          holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0),
+          left(loaded ? 6 * ng : 0) {
+        programme.loaded = loaded;
+    }
+
+protected:
+    const bool loaded;
+    Row tight;     // (ny,) t
+    Row holding;   // (m,) w
+    Row drive;     // (nq,) g
+    Row on_play;   // (nu,) c, in the robot's order
+    Row left;      // (r,) what rounding leaves of t in the springs of closures
+    Real stored;   // |t|^2 / 2
+
+    Whole balance(const Points &points, const Block &block, int rank, int r);
+    Real along(const Real *column, const Real *wrench) const;
+    Row on_patterns(const Row &closing) const;
+
+private:
+    Row bent_groups();
+};
+
+// The work of a wrench on a column.
+inline Real Loaded::along(const Real *column, const Real *wrench) const {
+    Real total = {};
+    for (int a = 0; a < 6; ++a) total += column[a] * wrench[a];
+    return total;
+}
+
+// (6 np,) closures' wrenches on frames of each pattern.
+inline Row Loaded::on_patterns(const Row &closing) const {
+    Row on(6 * np);
+    for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+    return on;
+}
+
+// What t is of the groups' six springs.
+inline Row Loaded::bent_groups() {
+    Row bent(6 * ng);
+    Triangle rows(6, widest);
+    for (int g = 0; g < ng; ++g) {
+        const int count = spring_group(g, rows), first = int(s.groups[g]);
+        triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
+        Row own(count);
+        std::copy(&tight[first], &tight[first] + (s.groups[g + 1] - first), own.begin());
+        turn_back(rows, 6, count, own.data());
+        std::copy(own.begin(), own.begin() + 6, &bent[6 * g]);
+    }
+    return bent;
+}
+
+// Springs, closures and clearances of the tight robot under its loads; returns the lanes
+// where these drive a motion that nothing resists.
+inline Whole Loaded::balance(
+    const Points &points, const Block &block, int rank, int r) {
+    const auto load = [&](int64_t half, int64_t j, int64_t axis) {
+        return block.read(points.loads, 12 * n, 6 * (n * half + j) + axis);
+    };
+    Row own(s.ny);
+    Real most = {};
+    for (int c = 0; c < nq; ++c) {
+        drive[c] = load(1, s.free_frame[c], s.free_axis[c]);
+        most = larger(magnitude(drive[c]), most);
+    }
+    const Whole loose = hold_free_motions(rank, drive, STILL_OF_DRIVE * most, holding);
+    for (int c = 0; c < s.ny; ++c)
+        for (int axis = 0; axis < 6; ++axis)
+            if (const double weight = s.springs[6 * c + axis])
+                own[c] += weight * load(s.of_joint[c], s.spring_frame[c], axis);
+    const auto bend = [&] {
+        const Row on = on_patterns(holding);
+        for (int c = 0; c < s.ny; ++c)
+            tight[c] = own[c] + along(elastic[c], &on[6 * s.pattern_of[s.spring_frame[c]]]);
+        return on;
+    };
+    bend();
+    Row bent = bent_groups();
+    bend_least(r, bent, holding);
+    const Row on = bend();
+    stored = 0.5 * inner(tight.data(), tight.data(), int(s.ny));
+    left = bent_groups();
+    turn_back(springs, r, 6 * ng, left.data());
+    for (int c = 0; c < nu; ++c) {
+        const int k = int(cones.column[c]);
+        const int64_t j = s.cone_frame[k];
+        on_play[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
+        programme.d[c] = on_play[k] + enters(k, &on[6 * s.pattern_of[j]]);
+    }
+    return loose;
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,227 @@
+// Problem (27), readings frozen and free, at several postures side by side, from the
+// frames' poses to the certified bounds: compiled_reach.py in lanes.
+#pragma once
+
+#include <map>
+
+#include "../solvers/farthest.h"
+#include "rows.h"
+
+namespace LANE_SPACE {
+
+// assembly/linear/thresholds.py and assembly/linear/compiled_reach.py
+constexpr double UNBOUNDED = 1e-8, APART = 100.0;
+
+// Columns are filled up to a multiple of this many cones, so that bodies share lanes.
+constexpr int FILLED = 2;
+
+// Blocks of points of one robot without springs, one after the other.
+class ReachableSets : public Rows {
+public:
+    ReachableSets(
+        const Robot &s, const Points &points, const Centres &centres, const ClearanceLoads &loads,
+        const double *offset)
+        : Rows(s, points), centres(centres), loads(loads), offset(offset), X(6, nu),
+          start(nu), held(nu), cone(nu) {
+        for (int c = 0; c < s.cones; ++c)
+            for (int64_t i = s.starts[c]; i < s.starts[c + 1]; ++i) of_cone.push_back(c);
+        for (int c = 0; c < nq; ++c) bounded = bounded || s.free_bound[c] < INFINITY;
+    }
+
+    Whole read_bodies(
+        const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
+        int64_t *outcome);
+
+private:
+    const Centres &centres;
+    const ClearanceLoads &loads;
+    const double *offset;
+    std::vector<int> of_cone;  // (nu,) the cone of each column
+    bool bounded = false;      // some free motion
+    Table X;                   // (6, nu) [rad, m] columns in the solver's order
+    Row start;                 // (nu,) likewise
+    std::vector<Whole> held, cone;  // columns in the solver's order; cones
+
+    Whole held_cones(const Block &block);
+    Whole follow(int rank);
+    Whole within_bounds(int rank, const Block &block);
+    Body body_of(int l, int64_t point, int p, const Real *centre) const;
+};
+
+// Lanes where it is unambiguous which clearances are loaded; those are held.  Load times
+// slack is about the solver's gap, so one of the two is nearly zero.
+inline Whole ReachableSets::held_cones(const Block &block) {
+    const Robot &h = *loads.robot;
+    const int closures = int(h.closures);
+    Row on(6 * h.np), multipliers(6 * closures);
+    for (int a = 0; a < 6 * closures; ++a)
+        multipliers[a] = block.read(loads.multipliers, 6 * closures, a);
+    for (int g = 0; g < h.np; ++g)
+        for (int k = 0; k < closures; ++k)
+            if (const double sign = h.patterns[g * closures + k])
+                for (int a = 0; a < 6; ++a) on[6 * g + a] += sign * multipliers[6 * k + a];
+    const Real energy = block.read(loads.energy, 1, 0);
+    const Real least = larger(1e-9 * block.read(loads.without_clearance, 1, 0), real(1e-300));
+    const Real scale = larger(energy, least);
+    Whole decided = whole(-1);
+    for (int c = 0; c < s.cones; ++c) {
+        Real squares = {}, size = {}, screw[6];
+        const int64_t own = loads.cone_of[c];
+        for (int64_t i = h.starts[own]; i < h.starts[own + 1]; ++i) {
+            const int64_t j = h.cone_frame[i];
+            column(j, h.cone_axis[i], screw);
+            const Real force = inner(screw, &on[6 * h.pattern_of[j]], 6) * h.cone_size[i];
+            squares += force * force;
+            const Real u = block.read(loads.clearances, h.nu, i);
+            size += u * u;
+        }
+        const Real load = root(squares) / scale, left = 1.0 - root(size);
+        const Real slack = left <= 0.0 ? Real{} : left;  // in this order NaN stays NaN
+        cone[c] = (load > slack) & (load > 1e-9);
+        // written so that NaN is ambiguous
+        decided &= (load > APART * slack) | (slack > APART * load) |
+                   ((load <= 1e-9) & (slack <= 1e-9));
+    }
+    for (int c = 0; c < nu; ++c) held[c] = cone[of_cone[cones.column[c]]];
+    return decided;
+}
+
+// X: what clearances do to the platform, free motions too, at the point asked; the lanes
+// where no free motion moves it by itself.
+inline Whole ReachableSets::follow(int rank) {
+    Whole still = whole(-1);
+    Row closing(m), on(6 * np);
+    for (int a = 0; a < 6; ++a) {
+        still &= ~hold_free_motions(rank, a, UNBOUNDED / CLEAR, closing);
+        for (int g = 0; g < np; ++g) part(closing.data(), g, &on[6 * g]);
+        for (int c = 0; c < nu; ++c) {
+            const int own = int(cones.column[c]);
+            const int64_t j = s.cone_frame[own];
+            const Real moved =
+                s.on_path[j] * play[own][a] + inner(play[own], &on[6 * s.pattern_of[j]], 6);
+            X[a][c] = a < 3 ? moved : moved * s.size;
+        }
+    }
+    for (int c = 0; c < nu; ++c)
+        for (int a = 0; a < 3; ++a) {
+            const int b = (a + 1) % 3, d = (a + 2) % 3;
+            X[3 + a][c] += X[b][c] * offset[d] - X[d][c] * offset[b];
+        }
+    return still;
+}
+
+// Lanes where no passive joint passes its bound, whatever the clearances do.
+inline Whole ReachableSets::within_bounds(int rank, const Block &block) {
+    Row middle(nq), most(nq), squares(nq), moved(m);
+    for (int q = 0; q < nq; ++q) middle[q] = block.read(centres.motions, nq, q);
+    cones.each([&](auto of, int, int at) {
+        std::fill(squares.begin(), squares.end(), Real{});
+        for (int c = at; c < at + of; ++c) {
+            const int own = int(cones.column[c]);
+            std::fill(moved.begin(), moved.end(), Real{});
+            for (const Entry &e : patterns[s.pattern_of[s.cone_frame[own]]])
+                for (int a = 0; a < 6; ++a)
+                    moved[6 * e.closure + a] = held[c] ? Real{} : e.sign * play[own][a];
+            const Row step = least_motions(rank, moved);
+            for (int q = 0; q < nq; ++q) {
+                middle[q] -= step[q] * start[c];
+                squares[q] += step[q] * step[q];
+            }
+        }
+        for (int q = 0; q < nq; ++q) most[q] += root(squares[q]);
+    });
+    Whole within = whole(-1);
+    for (int q = 0; q < nq; ++q)
+        if (s.free_bound[q] < INFINITY)  // written so that NaN is not within
+            within &= magnitude(middle[q]) + most[q] <= s.free_bound[q];
+    return within;
+}
+
+// A lane's body: the columns that are not held, filled up.
+inline Body ReachableSets::body_of(int l, int64_t point, int p, const Real *centre) const {
+    const auto filled = [](int count) { return (count + FILLED - 1) / FILLED * FILLED; };
+    std::vector<int> columns;
+    for (int c = 0; c < 2 * cones.discs; ++c)
+        if (!held[c][l]) columns.push_back(c);
+    const int discs = int(columns.size()) / 2;
+    columns.resize(2 * filled(discs), -1);
+    for (int c = 2 * cones.discs; c < nu; ++c)
+        if (!held[c][l]) columns.push_back(c);
+    const int intervals = int(columns.size()) - 2 * filled(discs);
+    columns.resize(2 * filled(discs) + filled(intervals), -1);
+    Body body = {
+        point, Cones(filled(discs), filled(intervals), {}), discs, intervals, p, {}, {},
+        {}, {}};
+    const auto copy = [&](const Real *row, std::vector<double> &to) {
+        for (int c : columns) to.push_back(c < 0 ? 0.0 : row[c][l]);
+    };
+    for (int a = 0; a < 6; ++a) body.centre[a] = centre[a][l], copy(X[a], body.X);
+    for (int i = 0; i < p; ++i) copy(programme.M[i], body.H);
+    copy(start.data(), body.start);
+    return body;
+}
+
+// The sets of platform screws of the lanes asked for that have the ranks of the first of
+// them; returns the others.
+inline Whole ReachableSets::read_bodies(
+    const Points &points, const Block &block, Whole asked, std::vector<Body> &bodies,
+    int64_t *outcome) {
+    const auto leave = [&](Whole where) {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) outcome[block.point[l]] = FALLBACK;
+        return ~where;
+    };
+    Whole others = asked;
+    read(points, block);
+    others &= leave(asked & ~held_cones(block));
+    if (!any(asked = others)) return others;
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    const Ranks ranks = eliminate_free(tolerance, asked);
+    others &= leave(ranks.unclear);
+    if (!any(asked = ranks.same)) return others;
+    const int count = m - ranks.free;
+    for (int c = 0; c < nu; ++c) {
+        const Real own = block.read(centres.clearances, nu, cones.column[c]);
+        start[c] = held[c] ? Real{} : own;
+    }
+    cones.each([&](auto of, int, int at) {  // rounding may have left the cones
+        const Real shorter = larger(root(inner(&start[at], &start[at], of)), real(1.0));
+        for (int c = at; c < at + of; ++c) start[c] /= shorter;
+    });
+    Whole valid = follow(ranks.free);
+    if (bounded) valid &= within_bounds(ranks.free, block);
+    others &= leave(asked & ~valid);
+    if (!any(asked &= valid)) return others;
+    const Whole clear = triangulate_rows(count, &held);
+    others &= leave(asked & (clear < 0));
+    if (!any(asked &= clear >= 0)) return others;
+    const int p = rank_of_first(clear, asked);
+    asked &= clear == p;
+    orthonormal_rows(p);
+    Real centre[6];
+    for (int a = 0; a < 6; ++a) centre[a] = block.read(centres.screws, 6, a);
+    for (int a = 0; a < 3; ++a) {
+        const int b = (a + 1) % 3, d = (a + 2) % 3;
+        centre[3 + a] += centre[b] * offset[d] - centre[d] * offset[b];
+    }
+    for (int l = 0; l < LANES; ++l)
+        if (asked[l]) bodies.push_back(body_of(l, block.point[l], p, centre));
+    return others & ~asked;
+}
+
+// Searches of all bodies in both halves; together those of bodies that are filled up to
+// the same numbers of rows and columns.
+typedef std::map<std::array<int, 3>, std::vector<Task>> Groups;
+
+inline Groups searches_of(const std::vector<Body> &bodies, const double *tolerance) {
+    Groups groups;
+    for (const Body &body : bodies) {
+        const int p = (body.p + FILLED - 1) / FILLED * FILLED;
+        for (int half = 0; half < 2; ++half)
+            groups[{p, body.cones.discs, body.cones.intervals}].push_back(
+                {&body, 3 * half, tolerance[half]});
+    }
+    return groups;
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,299 @@
+// Free motions and springs eliminated at several postures side by side, what is left for
+// the solvers, and the way back: compiled_reduction.py in lanes.
+//
+// ========  =============  ============================================================
+// symbol    shape          meaning
+// ========  =============  ============================================================
+// F         (nq, m)        columns of the free motions as rows
+// L         (ng, 6, 6)     each group's springs as six, lower triangular but for pivoting
+// Y         (.., 6 ng)     Z times the springs' columns
+// Z         (m - rank, m)  orthonormal, orthogonal to all free motions, in one table
+//                          with Y; later L^-1 Z, and the rows that no spring enters
+// G, h      (r, nu), (r,)  strains by clearances and by errors
+// u, v, y                  clearances, strains G u + h, multipliers of the springs
+// ========  =============  ============================================================
+#pragma once
+
+#include "../solvers/dual_newton.h"
+#include "../solvers/householder.h"
+#include "linearised.h"
+
+namespace LANE_SPACE {
+
+// The rank in the first of these lanes.
+inline int rank_of_first(Whole ranks, Whole lanes) {
+    int l = 0;
+    while (!lanes[l]) ++l;
+    return int(ranks[l]);
+}
+
+// Places of the patterns with clearances; -1 for the others.
+inline Array<int> loose_patterns(const Robot &s) {
+    Array<int> slot(s.np, -1);
+    int next = 0;
+    for (int c = 0; c < s.nu; ++c) {
+        int &own = slot[s.pattern_of[s.cone_frame[c]]];
+        if (own < 0) own = next++;
+    }
+    return slot;
+}
+
+// The linear model, reduced.
+class Reduction : public Linearised {
+public:
+    Reduction(const Robot &s, const Points &points);
+
+protected:
+    const Cones cones;
+    Array<int> slot;  // of the patterns with clearances, in parts; else -1
+    Triangle free, springs;  // F; Y with Z beside it
+    Table L, parts;          // parts: Z's rows, for a screw of each pattern
+    Programme programme;
+    Array<Real *> Z;  // rows beside Y's
+    int widest;             // most springs of a group, at least six
+
+    Whole triangulate_free(Real tolerance);
+    void orthogonal_rows(int rank, int count);
+    struct Ranks { int free, springs; Whole same, unclear; };
+    Ranks eliminate(Real tolerance, Whole asked);
+    void clearance_parts(int count);
+    void small_problem(int r);
+    Row spring_strains(int r, const Row &v);
+    Row moved_by(const Row &grouped);
+    Row least_motions(int rank, const Row &moved);
+    Whole hold_free_motions(int rank, const Row &drive, Real still, Row &closing);
+    Whole hold_free_motions(int rank, int row, double still, Row &closing);
+    void bend_least(int r, Row &bent, Row &closing);
+    int spring_group(int g, Triangle &rows);
+
+private:
+    void grouped_springs();
+    void spring_rows(int count);
+    void eliminate_springs(int rank, int count);
+};
+
+inline Reduction::Reduction(const Robot &s, const Points &points)
+    : Linearised(s, points), cones(s.starts, int(s.cones)), slot(loose_patterns(s)),
+      free(nq, m), springs(m, 6 * ng + m), L(6 * ng, 6),
+      parts(m, 6 * (1 + *std::max_element(slot.begin(), slot.end()))),
+      programme(cones, m), Z(m), widest(6) {
+    for (int g = 0; g < ng; ++g)
+        widest = std::max(widest, int(s.groups[g + 1] - s.groups[g]));
+}
+
+// Free motions brought to a triangle; the rank of each lane, -1 where it is unclear.
+inline Whole Reduction::triangulate_free(Real tolerance) {
+    for (int c = 0; c < nq; ++c) {
+        std::fill(free.F[c], free.F[c] + m, Real{});
+        for (const Entry &e : patterns[s.pattern_of[s.free_frame[c]]])
+            for (int a = 0; a < 6; ++a)
+                free.F[c][6 * e.closure + a] = e.sign * motion[c][a];
+    }
+    return triangulate(free, nq, m, tolerance, Real{}, 1e-11, m);
+}
+
+// (6, springs) columns of a group's springs; returns how many, at least six.
+inline int Reduction::spring_group(int g, Triangle &rows) {
+    const int count = int(s.groups[g + 1] - s.groups[g]);
+    for (int i = 0; i < 6; ++i)
+        for (int c = 0; c < std::max(6, count); ++c)
+            rows.F[i][c] = c < count ? elastic[int(s.groups[g]) + c][i] : Real{};
+    return std::max(6, count);
+}
+
+// Springs that act together, combined into six with the same sum of squares.
+inline void Reduction::grouped_springs() {
+    Triangle rows(6, widest);
+    for (int g = 0; g < ng; ++g) {
+        const int count = spring_group(g, rows);
+        const Whole rank = triangulate(rows, 6, count, Real{}, Real{}, -1.0, count);
+        for (int i = 0; i < 6; ++i) {
+            Real own[6] = {};
+            for (int b = 0; b < i; ++b) own[b] = rank > b ? rows.F[i][b] : Real{};
+            own[i] = rank > i ? rows.diagonal[i] : Real{};
+            for (int b = 0; b < 6; ++b)
+                for (int l = 0; l < LANES; ++l)
+                    L[int(6 * g + rows.order[i][l])][b][l] = own[b][l];
+        }
+    }
+}
+
+// Z, orthogonal to the free motions.
+inline void Reduction::orthogonal_rows(int rank, int count) {
+    for (int i = 0; i < count; ++i) {
+        Z[i] = springs.F[i] + 6 * ng;
+        std::fill(Z[i], Z[i] + m, Real{});
+        Z[i][rank + i] = real(1.0);
+    }
+    turn_all(free, rank, m, Z.data(), count);
+}
+
+// Y = Z times the grouped springs' columns.
+inline void Reduction::spring_rows(int count) {
+    for (int i = 0; i < count; ++i)
+        for (int g = 0; g < ng; ++g) {
+            Real of_group[6], own[6] = {};
+            part(Z[i], s.group_pattern[g], of_group);
+            for (int a = 0; a < 6; ++a)
+                for (int b = 0; b < 6; ++b) own[b] += of_group[a] * L[6 * g + a][b];
+            std::copy(own, own + 6, springs.F[i] + 6 * g);
+        }
+}
+
+// Divides Z, ordered like Y's triangle, by it: rows that springs enter first.
+inline void Reduction::eliminate_springs(int rank, int count) {
+    Row weights(rank);
+    for (int i = 0; i < count; ++i) {
+        const Real *Y = springs.F[i];
+        Z[i] = springs.F[i] + 6 * ng;
+        const int before = std::min(i, rank);
+        for (int l = 0; l < before; ++l) weights[l] = -Y[l];
+        combine(Z.data(), before, weights.data(), m, Z[i]);
+        // rows that no spring enters have length 1: what is rounding there has their size
+        const Real size = i < rank ? springs.diagonal[i] : root(inner(Z[i], Z[i], m));
+        const Real over = 1.0 / size;
+        for (int a = 0; a < m; ++a) Z[i][a] *= over;
+    }
+}
+
+// Free motions, then springs brought to triangles, in the lanes asked for that have the
+// ranks of the first of them.
+inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
+    Ranks ranks = {};
+    const Whole free_rank = triangulate_free(tolerance);
+    ranks.unclear = asked & (free_rank < 0);
+    if (!any(asked &= free_rank >= 0)) return ranks;
+    ranks.free = rank_of_first(free_rank, asked);
+    const int count = m - ranks.free;
+    asked &= free_rank == ranks.free;
+    grouped_springs();
+    orthogonal_rows(ranks.free, count);
+    spring_rows(count);
+    const Whole spring_rank = triangulate(
+        springs, count, 6 * ng, tolerance, NOISE * largest_spring, -1.0, 6 * ng + m);
+    ranks.unclear |= asked & (spring_rank < 0);
+    if (!any(asked &= spring_rank >= 0)) return ranks;
+    ranks.springs = rank_of_first(spring_rank, asked);
+    ranks.same = asked & (spring_rank == ranks.springs);
+    eliminate_springs(ranks.springs, count);
+    return ranks;
+}
+
+// What a screw of each pattern is in Z's rows.
+inline void Reduction::clearance_parts(int count) {
+    for (int i = 0; i < count; ++i)
+        for (int g = 0; g < np; ++g)
+            if (slot[g] >= 0) part(Z[i], g, parts[i] + 6 * slot[g]);
+}
+
+// G and h, in the solver's order of columns.
+inline void Reduction::small_problem(int r) {
+    programme.r = r;
+    for (int i = 0; i < r; ++i) programme.h[i] = -inner(known.data(), Z[i], m);
+    for (int c = 0; c < nu; ++c) {
+        const int own = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[own]]];
+        Real screw[6];
+        for (int a = 0; a < 6; ++a) screw[a] = -play[own][a];
+        for (int i = 0; i < r; ++i) {
+            Real total = {};
+            for (int a = 0; a < 6; ++a) total += screw[a] * parts[i][6 * g + a];
+            programme.M[i][c] = total;
+        }
+    }
+}
+
+// Deformation of the grouped springs.
+inline Row Reduction::spring_strains(int r, const Row &v) {
+    Row spring(6 * ng);
+    std::copy(v.begin(), v.begin() + r, spring.begin());
+    Real *own = spring.data();
+    turn_all(springs, r, 6 * ng, &own, 1);
+    return spring;
+}
+
+// Closure error of errors, clearances and grouped springs, which move the platform.
+inline Row Reduction::moved_by(const Row &grouped) {
+    Row total = known;
+    Real step[6];
+    for (int c = 0; c < nu; ++c) {
+        const int64_t own = cones.column[c], j = s.cone_frame[own];
+        for (int a = 0; a < 6; ++a) step[a] = play[int(own)][a] * programme.u[c];
+        move(s.pattern_of[j], s.on_path[j], step, total);
+    }
+    for (int g = 0; g < ng; ++g) {
+        for (int a = 0; a < 6; ++a) step[a] = inner(L[6 * g + a], &grouped[6 * g], 6);
+        move(s.group_pattern[g], s.group_on_path[g], step, total);
+    }
+    return total;
+}
+
+// Free motions of least size that close the rest.
+inline Row Reduction::least_motions(int rank, const Row &moved) {
+    Row right(std::max(m, nq)), least(nq), motions(nq);
+    for (int a = 0; a < m; ++a) right[a] = -moved[a];
+    turn_back(free, rank, m, right.data());
+    if (rank == nq) {
+        for (int i = nq - 1; i >= 0; --i) {
+            least[i] = right[i];
+            for (int l = i + 1; l < nq; ++l) least[i] -= free.F[l][i] * least[l];
+            least[i] /= free.diagonal[i];
+        }
+    } else {
+        // the triangle's columns, as rows, triangulated once more
+        Triangle R(rank, nq);
+        for (int i = 0; i < rank; ++i) {
+            R.F[i][i] = free.diagonal[i];
+            for (int l = i + 1; l < nq; ++l) R.F[i][l] = free.F[l][i];
+        }
+        triangulate(R, rank, nq, Real{}, Real{}, -1.0, nq);
+        for (int i = 0; i < rank; ++i) {
+            for (int l = 0; l < LANES; ++l) least[i][l] = right[R.order[i][l]][l];
+            for (int l = 0; l < i; ++l) least[i] -= R.F[i][l] * least[l];
+            least[i] /= R.diagonal[i];
+        }
+        Real *own = least.data();
+        turn_all(R, rank, nq, &own, 1);
+    }
+    for (int i = 0; i < nq; ++i)
+        for (int l = 0; l < LANES; ++l) motions[free.order[i][l]][l] = least[i][l];
+    return motions;
+}
+
+// The closures' least wrenches with which forces `drive` on the free motions move none,
+// but for `still`; returns the lanes that have none.
+inline Whole Reduction::hold_free_motions(
+    int rank, const Row &drive, Real still, Row &closing) {
+    Whole loose = {};
+    std::fill(closing.begin(), closing.end(), Real{});
+    for (int i = 0; i < nq; ++i) {
+        Real left;
+        for (int l = 0; l < LANES; ++l) left[l] = -drive[free.order[i][l]][l];
+        for (int l = 0; l < std::min(i, rank); ++l) left -= free.F[i][l] * closing[l];
+        if (i < rank)
+            closing[i] = left / free.diagonal[i];
+        else
+            loose |= magnitude(left) > still;
+    }
+    Real *own = closing.data();
+    turn_all(free, rank, m, &own, 1);
+    return loose;
+}
+
+// The same for a unit wrench on the platform.
+inline Whole Reduction::hold_free_motions(
+    int rank, int row, double still, Row &closing) {
+    Row drive(nq);
+    for (int c = 0; c < nq; ++c)
+        drive[c] = s.on_path[s.free_frame[c]] * motion[c][row];
+    return hold_free_motions(rank, drive, real(still), closing);
+}
+
+// Adds to the closures' wrenches those that bend springs least; `bent`, what the others
+// bend of the groups' springs, is overwritten with what these are of Z's first rows.
+inline void Reduction::bend_least(int r, Row &bent, Row &closing) {
+    turn_back(springs, r, 6 * ng, bent.data());
+    for (int i = 0; i < r; ++i) bent[i] = -bent[i];
+    combine(Z.data(), r, bent.data(), m, closing.data());
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,67 @@
+// Rows that clearances alone have to satisfy, at several postures side by side: those of
+// the closures that no free motion of a robot without springs enters.
+//
+// ========  =============  ============================================================
+// B, w      (p, nu), (p,)  B u = w must hold, B's rows orthonormal
+// ========  =============  ============================================================
+#pragma once
+
+#include "reduction.h"
+
+namespace LANE_SPACE {
+
+constexpr double ROWS_RANK = 1e-9;  // assembly/linear/thresholds.py
+
+// Robots without springs.
+class Rows : public Reduction {
+public:
+    Rows(const Robot &s, const Points &points)
+        : Reduction(s, points), rows(m, nu + 1) {}
+
+protected:
+    Triangle rows;  // with their right sides beside them
+
+    struct Ranks { int free; Whole same, unclear; };
+    Ranks eliminate_free(Real tolerance, Whole asked);
+    Whole triangulate_rows(int count, const Array<Whole> *held);
+    void orthonormal_rows(int count);
+};
+
+// Free motions eliminated in the lanes asked for that have the rank of the first of them:
+// G and h of the small problem are the rows.
+inline Rows::Ranks Rows::eliminate_free(Real tolerance, Whole asked) {
+    const Whole found = triangulate_free(tolerance);
+    Ranks ranks = {0, asked & (found >= 0), asked & (found < 0)};
+    if (!any(ranks.same)) return ranks;
+    ranks.free = rank_of_first(found, ranks.same);
+    ranks.same &= found == ranks.free;
+    orthogonal_rows(ranks.free, m - ranks.free);
+    clearance_parts(m - ranks.free);
+    small_problem(m - ranks.free);
+    return ranks;
+}
+
+// The rows brought to a triangle, without the columns held; the rank of each lane, -1
+// where it is unclear.
+inline Whole Rows::triangulate_rows(int count, const Array<Whole> *held) {
+    for (int i = 0; i < count; ++i) {
+        std::copy(programme.M[i], programme.M[i] + nu, rows.F[i]);
+        rows.F[i][nu] = -programme.h[i];
+        for (int c = 0; held && c < nu; ++c)
+            rows.F[i][c] = (*held)[c] ? Real{} : rows.F[i][c];
+    }
+    return triangulate(
+        rows, count, nu, real(ROWS_RANK), NOISE * largest_clearance(), -1.0, nu + 1);
+}
+
+// B, in the first rows of the programme's M.
+inline void Rows::orthonormal_rows(int count) {
+    Real *const *B = programme.M.rows();
+    for (int i = 0; i < count; ++i) {
+        std::fill(B[i], B[i] + nu, Real{});
+        B[i][i] = real(1.0);
+    }
+    turn_all(rows, count, nu, B, count);
+}
+
+}  // namespace LANE_SPACE

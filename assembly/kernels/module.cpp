@@ -1,0 +1,10 @@
+// One module of compiled functions, for one level of instructions.
+#include "bindings.h"
+#include "solvers/real.h"
+
+NB_MODULE(MODULE, m) {
+    m.attr("lanes") = LANE_SPACE::LANES;
+    bind_linear(m);
+    bind_kinematics(m);
+    bind_solvers(m);
+}

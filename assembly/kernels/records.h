@@ -1,0 +1,144 @@
+// What Python hands to the kernels, as addresses of arrays and how many rows they have.
+#pragma once
+
+#ifndef __CUDACC_RTC__
+#include <cstdint>
+#endif
+
+// A robot: assembly/linear/robot_structure.py's Structure, and how many there are.
+struct Robot {
+    double size;
+    int64_t platform;
+    const double *on_path, *patterns;
+    const int64_t *pattern_of;
+    const double *springs;
+    const int64_t *spring_frame, *spring_order, *of_joint, *groups, *group_pattern;
+    const double *group_on_path;
+    const int64_t *cone_frame, *cone_axis;
+    const double *cone_size;
+    const int64_t *starts, *free_frame, *free_axis;
+    const double *free_bound;
+    int64_t n, closures, np, ny, ng, nu, cones, nq;
+};
+
+// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (n,)
+// whether a frame errs at any point, which is found out where nobody says it; (k, 2, n,
+// 6) loads on bodies and on joints, in the frames' axes, or none.
+struct Points {
+    int64_t count;
+    const double *T, *errors, *mismatch;
+    int64_t own_errors;
+    const bool *erring;
+    const double *loads;
+};
+
+// assembly/linear/solutions.py's Solutions, one row a point; no `elastic` where nobody
+// asks.
+struct Solutions {
+    int64_t *outcome;
+    double *energy, *bound, *without_clearance, *work, *platform_screw, *clearances,
+        *motions, *multipliers, *residual, *elastic;
+};
+
+// Margins (21) and their bounds, one a point.
+struct Margins {
+    double *margin, *bound;
+    int64_t *outcome;
+};
+
+// Deformation of every spring under six unit wrenches on the platform, (k, 6, ny), and
+// whether a point has one.
+struct Compliances {
+    double *springs;
+    int64_t *status;
+};
+
+// Where the solution of (22) leaves the points, one row each: solutions.py's Centres.
+struct Centres {
+    const double *screws, *clearances, *motions;
+};
+
+// Loads and slack of the clearances, one row a point: solutions.py's ClearanceLoads.
+struct ClearanceLoads {
+    const Robot *robot;
+    const double *multipliers, *clearances, *energy, *without_clearance;
+    const int64_t *cone_of;
+};
+
+// What is asked of (27): from the platform's origin to the point whose error is meant; of
+// upper minus lower bounds.
+struct Asked {
+    const double *offset, *tolerance;  // (3,), (2,)
+};
+
+// solutions.py's Bounds, one row a point: those of rotation, then translation.
+struct Bounds {
+    double *bounds[2], *screw[2];
+    int64_t *supports, *outcome;
+};
+
+// minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_k| <= 1 for each cone.
+struct ConeProblem {
+    int64_t r, p, cones;
+    const int64_t *starts;                // (cones + 1,)
+    const double *G, *h, *d, *H, *k;      // (r, nu), (r,), (nu,), (p, nu), (p,)
+};
+
+// The gap that is asked for, and of Newton's method most steps and the first sigma.
+struct Limits {
+    double relative, absolute, first_sigma;
+    int64_t steps;
+};
+
+// A body of platform screws; the half, 0 or 3, that is meant, and what is asked of upper
+// minus lower bounds.
+struct AskedBody {
+    int64_t p, cones, half;
+    const int64_t *starts;                      // (cones + 1,)
+    const double *centre, *map, *rows, *start;  // (6,), (6, nv), (p, nv), (nv,)
+    double tolerance;
+};
+
+// A robot's frames, in the order of their parents: fixed (n, 4, 4) transforms, kinds of
+// joints (0 fixed, 1 turns, 2 slides), pairs of frames that closures join, and for each
+// closure, then the platform, the joints that move it, with signs.
+struct Tree {
+    int64_t n, closures, platform;
+    double size;
+    const int64_t *parents, *kinds, *pairs, *moves, *groups;
+    const double *fixed;
+};
+
+// (n,) coordinates at home, (k, 6) poses, if any, and (k, n) coordinates held, NaN where
+// free: the same entries in every row.
+struct Targets {
+    int64_t count;
+    const double *start, *poses, *held;
+    int64_t guess;
+};
+
+// (k, n) coordinates, (k,) progress, (k, n, 4, 4) frames, (k, closures) left open.
+struct Tracks {
+    double *ends, *progress, *transforms, *still_open;
+};
+
+// What all draws of the errors at a posture share.
+struct Reduced {
+    int64_t nu, r, cones;
+    const double *Gt;       // (nu, r)
+    const int64_t *starts;
+    const double *inverse;  // (nu, r) pseudoinverse of G
+    const double *forces;   // (nu, r) `cones`
+    const double *gram;
+    bool loaded;            // else d is none
+    const double *d;        // (nu,) what clearances carry under the loads
+    double slip;            // [per size of y] how much free motions may gain by rounding
+    double slack;           // the same whatever y is
+    double stored;          // energy that loads alone bend
+};
+
+// The draws' answers, one row each.
+struct DrawEnergies {
+    double *u, *y, *energy, *bound;
+    int64_t *outcome;
+};

@@ -1,0 +1,83 @@
+// One cone programme, and one body's farthest screw, as Python calls them.
+#include "../arrays.h"
+#include "../bindings.h"
+#include "../kernels.h"
+
+namespace {
+
+// The problem that u and y, the first guess, are of; cones of any size.
+ConeProblem problem_of(
+    nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
+    nb::handle cones) {
+    Size r, p, nu, ends;
+    ConeProblem own;
+    own.h = reals(h, "h", r);
+    own.d = reals(d, "d", nu);
+    own.k = reals(k, "k", p);
+    own.G = reals(G, "G", r, nu);
+    own.H = reals(H, "H", p, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.r = r.value, own.p = p.value, own.cones = ends.value - 1;
+    return own;
+}
+
+void call_interior_point(
+    nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
+    nb::handle cones, double tolerance, nb::handle u, nb::handle y) {
+    const ConeProblem own = problem_of(G, h, d, H, k, cones);
+    double *guess = address<double>(u, "u", own.starts[own.cones]);
+    double *multipliers = address<double>(y, "y", own.r + own.p);
+    const Limits limits = {0.0, tolerance, 0.0, 0};
+    const nb::gil_scoped_release others;
+    interior_point(own, limits, guess, multipliers);
+}
+
+void call_newton(
+    nb::handle G, nb::handle h, nb::handle d, nb::handle H, nb::handle k,
+    nb::handle cones, double relative, double absolute, double first_sigma, int64_t steps,
+    nb::handle u, nb::handle y) {
+    const ConeProblem own = problem_of(G, h, d, H, k, cones);
+    double *guess = address<double>(u, "u", own.starts[own.cones]);
+    double *multipliers = address<double>(y, "y", own.r + own.p);
+    const Limits limits = {relative, absolute, first_sigma, steps};
+    const nb::gil_scoped_release others;
+    newton(own, limits, guess, multipliers);
+}
+
+int64_t call_farthest(
+    nb::handle centre, nb::handle X, nb::handle H, nb::handle start, nb::handle cones,
+    int64_t half, double tolerance, nb::handle bounds, nb::handle screw) {
+    Size p, nv, ends;
+    AskedBody own;
+    if (half != 0 && half != 3) throw nb::value_error("half: expected 0 or 3");
+    own.start = reals(start, "start", nv);
+    own.centre = reals(centre, "centre", 6);
+    own.map = reals(X, "X", 6, nv);
+    own.rows = reals(H, "H", p, nv);
+    own.starts = starts(cones, "starts", nv.value, true, ends);
+    own.p = p.value, own.cones = ends.value - 1, own.half = half;
+    own.tolerance = tolerance;
+    double *low_and_high = address<double>(bounds, "bounds", 2);
+    double *best = address<double>(screw, "screw", 6);
+    const nb::gil_scoped_release others;
+    return farthest(own, low_and_high, best);
+}
+
+}  // namespace
+
+void bind_solvers(nb::module_ &m) {
+    m.def(
+        "interior_point", &call_interior_point,
+        nb::arg("G"), nb::arg("h"), nb::arg("d"), nb::arg("H"), nb::arg("k"),
+        nb::arg("starts"), nb::arg("tolerance"), nb::arg("u"), nb::arg("y"));
+    m.def(
+        "newton", &call_newton,
+        nb::arg("G"), nb::arg("h"), nb::arg("d"), nb::arg("H"), nb::arg("k"),
+        nb::arg("starts"), nb::arg("relative"), nb::arg("absolute"),
+        nb::arg("first_sigma"), nb::arg("steps"), nb::arg("u"), nb::arg("y"));
+    m.def(
+        "farthest", &call_farthest,
+        nb::arg("centre"), nb::arg("X"), nb::arg("H"), nb::arg("start"),
+        nb::arg("starts"), nb::arg("half"), nb::arg("tolerance"), nb::arg("bounds"),
+        nb::arg("screw"));
+}

@@ -1,0 +1,48 @@
+// Blocks of problems that stand side by side.
+#pragma once
+
+#include "real.h"
+
+namespace LANE_SPACE {
+
+// The points of one block of lanes.
+struct Block {
+    int64_t point[LANES];
+
+    Real read(const double *from, int64_t stride, int64_t at) const {
+        Real x;
+        for (int l = 0; l < LANES; ++l) x[l] = from[point[l] * stride + at];
+        return x;
+    }
+    void write(double *to, int64_t stride, int64_t at, Real x, Whole where) const {
+        for (int l = 0; l < LANES; ++l)
+            if (where[l]) to[point[l] * stride + at] = x[l];
+    }
+};
+
+#ifndef ON_DEVICE
+// 0 .. count - 1.
+inline std::vector<int64_t> all_of(int64_t count) {
+    std::vector<int64_t> all(count);
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+}
+
+// These points in blocks of lanes; solve returns the lanes that it left, to be asked
+// again.  Lanes that are too many repeat the last point, and are not asked for.
+template <typename Solve>
+inline void in_blocks(const std::vector<int64_t> &points, Solve solve) {
+    for (size_t first = 0; first < points.size(); first += LANES) {
+        Block block;
+        Whole pending;
+        for (int l = 0; l < LANES; ++l) {
+            const bool inside = first + l < points.size();
+            block.point[l] = inside ? points[first + l] : points.back();
+            pending[l] = inside ? -1 : 0;
+        }
+        while (any(pending)) pending = solve(block, pending);
+    }
+}
+#endif
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,139 @@
+// Householder triangulation with pivoting, assembly/solvers/householder.py in lanes:
+// rows F[order] = L Q^T with L lower triangular, Q a product of reflectors.
+//
+// Sources: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4.
+#pragma once
+
+#include "real.h"
+
+namespace LANE_SPACE {
+
+constexpr double CLEAR = 10.0;  // within this factor of the threshold a rank is in doubt
+
+// What triangulation leaves: reflectors above the diagonal, the triangle below it.
+struct Triangle {
+    Table F;
+    Row turns, diagonal;  // factors of the reflectors; of the triangle
+    Array<Whole> order;  // original rows in their new order
+    Triangle(int rows, int columns)
+        : F(rows, columns), turns(rows), diagonal(rows), order(rows) {}
+};
+
+// R rows reflected: row -= turn (own.row) own, over the columns from .. to; if they are
+// sized, what is left of their squares beyond the first column.
+template <int R, bool sized>
+inline void reflect(
+    const Real *own, Real turn, Real *const *rows, int from, int to, Real *sizes) {
+    Real along[R], size[R] = {};
+    inner_tile<R>(rows, own, from, to, along);
+    for (int i = 0; i < R; ++i) {
+        along[i] *= turn;
+        rows[i][from] -= along[i] * own[from];
+    }
+    for (int a = from + 1; a < to; ++a) {
+        const Real weight = once(own[a]);
+        for (int i = 0; i < R; ++i) {
+            const Real left = rows[i][a] - along[i] * weight;
+            rows[i][a] = left;
+            if (sized) size[i] += left * left;
+        }
+    }
+    if (sized) std::copy(size, size + R, sizes);
+}
+
+template <bool sized>
+inline void reflect_all(
+    const Real *own, Real turn, Real *const *rows, int count, int from, int to,
+    Real *sizes) {
+    int i = 0;
+    for (; i + 4 <= count; i += 4)
+        reflect<4, sized>(own, turn, rows + i, from, to, sizes + i);
+    for (; i + 2 <= count; i += 2)
+        reflect<2, sized>(own, turn, rows + i, from, to, sizes + i);
+    if (i < count) reflect<1, sized>(own, turn, rows + i, from, to, sizes + i);
+}
+
+// Rows `step` and `at` change places, in each lane its own.
+inline void exchange(Real **rows, int step, Whole at, int width) {
+    bool same = true;
+    for (int l = 1; l < LANES; ++l) same = same && at[l] == at[0];
+    if (same) return std::swap(rows[step], rows[at[0]]);
+    for (int l = 0; l < LANES; ++l)
+        if (at[l] != step)
+            for (int a = 0; a < width; ++a) {
+                const double kept = rows[step][a][l];
+                rows[step][a][l] = rows[at[l]][a][l];
+                rows[at[l]][a][l] = kept;
+            }
+}
+
+// Turn p rows of m columns into a triangle, the largest remaining row first.
+//
+// relative  a row this small relative to the first adds nothing new,
+// floor     nor does one this small;
+// clean     where some row adds nothing, its largest size relative to the first;
+//           any if negative;
+// width     of the rows that change places: columns beyond m go along.
+//
+// Returns the rank of each lane; -1 where it is numerically ambiguous.
+inline Whole triangulate(
+    Triangle &T, int p, int m, Real relative, Real floor, double clean, int width) {
+    Real **F = T.F.rows();
+    Array<Real> sizes(p);
+    for (int i = 0; i < p; ++i) {
+        T.order[i] = whole(i);
+        sizes[i] = inner(F[i], F[i], m);
+    }
+    Whole rank = whole(p), going = whole(-1);
+    Real first = {};
+    for (int step = 0; step < p; ++step) {
+        Real best = real(-1.0);
+        Whole at = whole(step);
+        for (int i = step; i < p; ++i) {
+            const Whole more = sizes[i] > best;
+            best = more ? sizes[i] : best;
+            at = more ? whole(i) : at;
+        }
+        best = root(best);
+        if (step == 0) first = best;
+        const Real limit = larger(floor, relative * first);
+        const Whole clear = best > limit * CLEAR, ends = going & ~clear;
+        if (any(ends)) {
+            Whole doubt = (best > limit / CLEAR) | (best != best);
+            if (clean >= 0.0) doubt |= best > clean * first;
+            rank = ends ? (doubt ? whole(-1) : whole(step)) : rank;
+            going &= clear;
+            if (!any(going)) break;
+        }
+        at = going ? at : whole(step);  // lanes at their end stay as they are
+        exchange(F, step, at, width);
+        for (int l = 0; l < LANES; ++l) {
+            sizes[at[l]][l] = sizes[step][l];
+            const int64_t kept = T.order[step][l];  // a lane cannot be referred to
+            T.order[step][l] = T.order[at[l]][l];
+            T.order[at[l]][l] = kept;
+        }
+        Real *own = F[step];
+        const Real diagonal = own[step] > 0.0 ? -best : best;
+        own[step] -= going ? diagonal : Real{};
+        const Real turn = going ? -1.0 / (diagonal * own[step]) : Real{};
+        T.diagonal[step] = going ? diagonal : real(1.0);
+        T.turns[step] = turn;
+        reflect_all<true>(own, turn, F + step + 1, p - step - 1, step, m, &sizes[step] + 1);
+    }
+    return rank;
+}
+
+// Every row x becomes Q x.
+inline void turn_all(Triangle &T, int rank, int m, Real *const *x, int count) {
+    for (int step = rank - 1; step >= 0; --step)
+        reflect_all<false>(T.F[step], T.turns[step], x, count, step, m, nullptr);
+}
+
+// x becomes Q^T x.
+inline void turn_back(Triangle &T, int rank, int m, Real *x) {
+    for (int step = 0; step < rank; ++step)
+        reflect<1, false>(T.F[step], T.turns[step], &x, step, m, nullptr);
+}
+
+}  // namespace LANE_SPACE

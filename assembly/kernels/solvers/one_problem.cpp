@@ -1,0 +1,75 @@
+// One cone programme, and one body's farthest screw, with cones of any size: interior.py
+// and farthest.py for callers with a single problem.
+#define FEW_LANES
+#include "../kernels.h"
+#include "block.h"
+#include "dual_newton.h"
+#include "farthest.h"
+
+using namespace LANE_SPACE;
+
+namespace {
+
+// Overwrites a first guess u (nu,) and the multipliers y (r + p,), of H's rows last, with
+// what a method makes of the problem, which stands in every lane.
+template <typename Method>
+void solve(const ConeProblem &given, double *u, double *y, Method method) {
+    const Cones cones(given.starts, int(given.cones));
+    const int r = int(given.r), p = int(given.p), nu = cones.nu;
+    Programme q(cones, r + p);
+    q.r = r, q.p = p, q.loaded = true;
+    for (int c = 0; c < nu; ++c) {
+        const int64_t own = cones.column[c];
+        for (int i = 0; i < r; ++i) q.M[i][c] = real(given.G[i * nu + own]);
+        for (int i = 0; i < p; ++i) q.M[r + i][c] = real(given.H[i * nu + own]);
+        q.d[c] = real(given.d[own]);
+        q.u[c] = real(u[own]);
+    }
+    for (int i = 0; i < r; ++i) q.h[i] = real(given.h[i]);
+    for (int i = 0; i < p; ++i) q.e[i] = real(given.k[i]);
+    for (int i = 0; i < r + p; ++i) q.y[i] = real(y[i]);
+    Solver solver(cones, r + p);
+    method(solver, q);
+    for (int c = 0; c < nu; ++c) u[cones.column[c]] = q.u[c][0];
+    for (int i = 0; i < r + p; ++i) y[i] = q.y[i][0];
+}
+
+}  // namespace
+
+void interior_point(
+    const ConeProblem &given, const Limits &limits, double *u, double *y) {
+    solve(given, u, y, [&](Solver &solver, Programme &q) {
+        solver.interior_point(q, real(limits.absolute), limits.relative, whole(-1));
+    });
+}
+
+void newton(const ConeProblem &given, const Limits &limits, double *u, double *y) {
+    solve(given, u, y, [&](Solver &solver, Programme &q) {
+        solver.dual_newton(
+            q, int(limits.steps), limits.first_sigma, limits.relative,
+            real(limits.absolute), whole(-1));
+    });
+}
+
+int64_t farthest(const AskedBody &asked, double *bounds, double *screw) {
+    const Cones given(asked.starts, int(asked.cones));
+    const int nv = given.nu, p = int(asked.p);
+    Body body = {0, Cones(given.discs, given.intervals, given.balls), given.discs,
+                 given.intervals, p, {}, {}, {}, {}};
+    const auto ordered = [&](const double *from, int rows, std::vector<double> &to) {
+        for (int i = 0; i < rows; ++i)
+            for (int64_t column : given.column) to.push_back(from[i * nv + column]);
+    };
+    std::copy(asked.centre, asked.centre + 6, body.centre);
+    ordered(asked.map, 6, body.X);
+    ordered(asked.rows, p, body.H);
+    ordered(asked.start, 1, body.start);
+    int64_t supports = -1;
+    const Task task = {&body, int(asked.half), asked.tolerance};
+    Farthest(body, p).search({task}, [&](const Search &own, bool done) {
+        bounds[0] = own.low, bounds[1] = own.high;
+        std::copy(own.best, own.best + 6, screw);
+        if (done) supports = own.supports;
+    });
+    return supports;
+}

@@ -1,0 +1,94 @@
+// A convex polytope in three dimensions, cut plane by plane: polytope.py.
+#pragma once
+
+#include <array>
+
+#include "real.h"
+
+namespace LANE_SPACE {
+
+typedef std::array<double, 3> Point;
+
+inline double inner(const Point &a, const Point &b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// The points below a growing number of planes.
+class Polytope {
+public:
+    // A box with these orthonormal rows as its directions.
+    void start_box(const Point *axes, const Point &low, const Point &high) {
+        corners.clear();
+        for (int i = 0; i < 8; ++i) {
+            Corner corner = {};
+            for (int axis = 0; axis < 3; ++axis) {
+                const int side = i >> axis & 1;
+                const double height = side ? high[axis] : low[axis];
+                for (int a = 0; a < 3; ++a) corner.at[a] += height * axes[axis][a];
+                corner.planes[axis] = 2 * axis + side;
+            }
+            corners.push_back(corner);
+        }
+        planes = 6;
+    }
+
+    // Keeps the points x with normal . x <= height; not where corners become too many.
+    void cut(const Point &normal, double height) {
+        const int plane = planes++, count = int(corners.size());
+        double size = 0.0;
+        for (Corner &corner : corners) {
+            corner.above = inner(corner.at, normal) - height;
+            for (double x : corner.at) size = std::max(size, std::fabs(x));
+        }
+        const double limit = 1e-14 * size;
+        fresh.clear();
+        for (int i = 0; i < count; ++i) {
+            const Corner one = corners[i];
+            if (one.above <= limit) continue;
+            for (int j = 0; j < count; ++j) {
+                const Corner &other = corners[j];
+                if (other.above > limit) continue;
+                int shared[2] = {-1, -1}, common = 0;  // the planes in common
+                for (int own : one.planes)
+                    if (own == other.planes[0] || own == other.planes[1] ||
+                        own == other.planes[2]) {
+                        ++common;
+                        shared[1] = shared[0], shared[0] = own;
+                    }
+                if (common < 2) continue;
+                if (count + int(fresh.size()) == MOST) return;
+                // an inner corner above the plane by rounding is itself the new one
+                const double share = std::min(1.0, one.above / (one.above - other.above));
+                Corner corner = {{}, {shared[0], shared[1], plane}, 0.0};
+                for (int a = 0; a < 3; ++a)
+                    corner.at[a] = one.at[a] + share * (other.at[a] - one.at[a]);
+                fresh.push_back(corner);
+            }
+        }
+        const auto outside = [&](const Corner &corner) { return !(corner.above <= limit); };
+        corners.erase(std::remove_if(corners.begin(), corners.end(), outside), corners.end());
+        corners.insert(corners.end(), fresh.begin(), fresh.end());
+    }
+
+    // The corner farthest from the origin.
+    Point farthest_corner() const {
+        double best = -1.0;
+        Point at = {};
+        for (const Corner &corner : corners)
+            if (const double size = inner(corner.at, corner.at); size > best)
+                best = size, at = corner.at;
+        return at;
+    }
+
+private:
+    static constexpr int MOST = 4096;  // corners; 400 planes make 800
+    struct Corner {
+        Point at;
+        std::array<int, 3> planes;
+        double above;  // the plane of the last cut
+    };
+    std::vector<Corner> corners, fresh;
+    int planes = 0;
+};
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,103 @@
+// Cone programmes over plain tables, one in each lane, and the systems that their solvers
+// factor:
+//
+//     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
+#pragma once
+
+#include "real.h"
+
+namespace LANE_SPACE {
+
+// The cones' columns: discs of two columns each first, then intervals of one, then balls
+// of more.
+struct Cones {
+    int discs = 0, intervals = 0, count = 0, nu = 0;
+    Array<int> balls;       // columns of each
+    Array<int64_t> column;  // (nu,) as the robot counts them
+
+    Cones(const int64_t *starts, int cones) : count(cones), nu(int(starts[cones])) {
+        const auto add = [&](int c) {
+            for (int64_t i = starts[c]; i < starts[c + 1]; ++i) column.push_back(i);
+        };
+        for (int c = 0; c < cones; ++c)
+            if (starts[c + 1] - starts[c] == 2) ++discs, add(c);
+        for (int c = 0; c < cones; ++c)
+            if (starts[c + 1] - starts[c] == 1) ++intervals, add(c);
+        for (int c = 0; c < cones; ++c)
+            if (const int size = int(starts[c + 1] - starts[c]); size > 2)
+                balls.push_back(size), add(c);
+    }
+
+    // So many discs, then intervals, then balls of so many columns each.
+    Cones(int discs, int intervals, const Array<int> &balls)
+        : discs(discs), intervals(intervals), count(discs + intervals + int(balls.size())),
+          nu(std::accumulate(balls.begin(), balls.end(), 2 * discs + intervals)),
+          balls(balls) {}
+
+    // Calls visit(columns, cone, first column) for every cone.
+    template <typename Visit> void each(Visit visit) const {
+        int c = 0, at = 0;
+        for (; c < discs; ++c, at += 2) visit(Size<2>{}, c, at);
+        for (; c < discs + intervals; ++c, ++at) visit(Size<1>{}, c, at);
+        for (int size : balls) visit(Size<0>{size}, c++, at), at += size;
+    }
+    template <int width> struct Size {  // of a ball if the width is 0
+        static constexpr bool ball = width == 0;
+        int columns = width;
+        constexpr operator int() const { return ball ? columns : width; }
+    };
+};
+
+// A problem in each lane, and its answer.
+struct Programme {
+    const Cones &cones;
+    int r, p;     // rows of G and of H
+    Table M;      // (r + p, nu)
+    Row h, d, e;  // (r,), (nu,), (p,)
+    Row u, y;     // (nu,), (r + p,) the answer
+    bool loaded = false;  // else d is zero
+    Programme(const Cones &cones, int rows)
+        : cones(cones), r(rows), p(0), M(rows, cones.nu), h(rows), d(cones.nu), e(rows),
+          u(cones.nu), y(rows) {}
+};
+
+// Symmetric systems S x = right, factored in the lower half of S: S = L D L^T, no roots.
+class System {
+public:
+    Table S;
+    explicit System(int rows) : S(rows, rows), size(rows) {}
+
+    // Lanes where every pivot is a number; one lost to rounding is made huge, or, where
+    // that is not allowed, fails.  The diagonal is overwritten with D^-1.
+    Whole factor(int m, bool replace) {
+        Whole good = whole(-1);
+        for (int j = 0; j < m; ++j) size[j] = S[j][j];
+        for (int j = 0; j < m; ++j) {
+            const Real pivot = S[j][j];
+            const Whole clear = pivot > (replace ? 1e-15 * size[j] : Real{});
+            S[j][j] = clear ? 1.0 / pivot : real(1e-128);
+            good &= replace ? clear | ((pivot == pivot) & (size[j] >= 0.0)) : clear;
+            for (int i = j + 1; i < m; ++i) {
+                const Real own = S[i][j], weight = own * S[j][j];
+                for (int l = j + 1; l < i; ++l) S[i][l] -= weight * S[j][l];
+                S[i][i] -= weight * own;
+                S[j][i] = own, S[i][j] = weight;  // D L^T above, L below
+            }
+        }
+        return good;
+    }
+
+    void solve(int m, Real *x) {
+        for (int j = 0; j < m; ++j) {
+            x[j] *= S[j][j];
+            for (int i = j + 1; i < m; ++i) x[i] -= S[j][i] * x[j];
+        }
+        for (int j = m - 1; j >= 0; --j)
+            for (int i = 0; i < j; ++i) x[i] -= S[j][i] * x[j];
+    }
+
+private:
+    Row size;
+};
+
+}  // namespace LANE_SPACE

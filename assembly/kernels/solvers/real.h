@@ -1,0 +1,168 @@
+// Numbers of several problems side by side, one in each lane of a vector register.
+//
+// Every lane computes as if it were alone: nothing sums over lanes, and a lane that has
+// finished is frozen by masks.  So an answer does not depend on its neighbours.
+#pragma once
+
+#include "standard.h"
+
+#ifdef ON_DEVICE  // or its simulation
+#include "arena.h"
+#include "one_lane.h"
+
+#define LANE_SPACE lanes_1
+namespace LANE_SPACE {
+
+inline Real real(double value) { return value; }
+inline Whole whole(int64_t value) { return value; }
+#else
+// One module holds code for two lanes, where few problems come at once, and for as many
+// as registers have: each in a namespace of its own.
+#if defined(FEW_LANES)
+#define LANE_COUNT 2
+#define LANE_SPACE lanes_2
+#elif defined(__AVX512F__)
+#define LANE_COUNT 8
+#define LANE_SPACE lanes_8
+#elif defined(__AVX__)
+#define LANE_COUNT 4
+#define LANE_SPACE lanes_4
+#else
+#define LANE_COUNT 2
+#define LANE_SPACE lanes_2
+#endif
+namespace LANE_SPACE {
+
+constexpr int LANES = LANE_COUNT;
+template <typename T> using Array = std::vector<T>;
+
+typedef double Real __attribute__((vector_size(8 * LANES)));
+typedef int64_t Whole __attribute__((vector_size(8 * LANES)));  // or a mask: 0 or -1
+
+inline Real real(double value) { return value - Real{}; }
+inline Whole whole(int64_t value) { return value - Whole{}; }
+
+inline Real root(Real x) {
+    for (int l = 0; l < LANES; ++l) x[l] = __builtin_sqrt(x[l]);
+    return x;
+}
+
+// A number that is used several times, read once: compilers would rather read it again
+// with every product, and reading is what these loops wait for.
+inline Real once(Real x) {
+#if defined(__x86_64__)
+    asm("" : "+x"(x));
+#endif
+    return x;
+}
+#endif
+
+inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
+inline Real larger(Real a, Real b) { return a > b ? a : b; }
+
+inline bool any(Whole mask) {
+    int64_t bits = 0;
+    for (int l = 0; l < LANES; ++l) bits |= mask[l];
+    return bits != 0;
+}
+
+// A matrix whose rows can change places.
+class Table {
+public:
+    Table(int rows, int columns) : numbers(size_t(rows) * columns), at(rows) {
+        for (int i = 0; i < rows; ++i) at[i] = numbers.data() + size_t(i) * columns;
+    }
+    Real *operator[](int row) const { return at[row]; }
+    Real **rows() { return at.data(); }
+    Real *const *rows() const { return at.data(); }
+
+private:
+    Array<Real> numbers;
+    Array<Real *> at;
+};
+
+typedef Array<Real> Row;
+
+// Inner products of R rows with x over the columns from .. to, in partial sums that
+// hide the latency of one: 8 / R for each row.
+template <int R>
+inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real *out) {
+    constexpr int PARTS = 8 / R;
+    Real total[R][PARTS] = {};
+    int a = from;
+    for (; a + PARTS <= to; a += PARTS)
+        for (int b = 0; b < PARTS; ++b) {
+            const Real own = once(x[a + b]);
+            for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
+        }
+    for (; a < to; ++a) {
+        const Real own = once(x[a]);
+        for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
+    }
+    for (int i = 0; i < R; ++i) {
+        for (int half = PARTS / 2; half > 0; half /= 2)
+            for (int b = 0; b < half; ++b) total[i][b] += total[i][b + half];
+        out[i] = total[i][0];
+    }
+}
+
+inline Real inner(const Real *a, const Real *b, int n) {
+    Real total, *row = const_cast<Real *>(a);
+    inner_tile<1>(&row, b, 0, n, &total);
+    return total;
+}
+
+// out = A x.
+inline void multiply(Real *const *A, int count, const Real *x, int columns, Real *out) {
+    int i = 0;
+    for (; i + 4 <= count; i += 4) inner_tile<4>(A + i, x, 0, columns, out + i);
+    for (; i + 2 <= count; i += 2) inner_tile<2>(A + i, x, 0, columns, out + i);
+    if (i < count) inner_tile<1>(A + i, x, 0, columns, out + i);
+}
+
+template <int C>
+inline void combine_tile(Real *const *A, int count, const Real *y, int column, Real *out) {
+    Real total[C];
+    for (int j = 0; j < C; ++j) total[j] = out[column + j];
+    for (int i = 0; i < count; ++i) {
+        const Real own = once(y[i]);
+        for (int j = 0; j < C; ++j) total[j] += own * A[i][column + j];
+    }
+    for (int j = 0; j < C; ++j) out[column + j] = total[j];
+}
+
+// out += A^T y.
+inline void combine(Real *const *A, int count, const Real *y, int columns, Real *out) {
+    int j = 0;
+    for (; j + 8 <= columns; j += 8) combine_tile<8>(A, count, y, j, out);
+    for (; j + 2 <= columns; j += 2) combine_tile<2>(A, count, y, j, out);
+    if (j < columns) combine_tile<1>(A, count, y, j, out);
+}
+
+template <int R, int C>
+inline void product_tile(
+    Real *const *B, Real *const *M, int column, int width, Real *const *out) {
+    Real total[R][C] = {};
+    for (int a = 0; a < width; ++a) {
+        Real own[R];
+        for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
+        for (int j = 0; j < C; ++j) {
+            const Real other = once(M[column + j][a]);
+            for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
+        }
+    }
+    for (int i = 0; i < R; ++i)
+        for (int j = 0; j < C; ++j) out[i][column + j] = total[i][j];
+}
+
+// R rows B M^T, of the first rows of M.
+template <int R>
+inline void products(
+    Real *const *B, Real *const *M, int rows, int width, Real *const *out) {
+    int l = 0;
+    for (; l + 4 <= rows; l += 4) product_tile<R, 4>(B, M, l, width, out);
+    for (; l + 2 <= rows; l += 2) product_tile<R, 2>(B, M, l, width, out);
+    if (l < rows) product_tile<R, 1>(B, M, l, width, out);
+}
+
+}  // namespace LANE_SPACE

@@ -1,0 +1,208 @@
+// The state of a search of (27): bounds of the farthest point of a convex body of platform
+// screws, from one support function to the next; farthest.py.
+//
+// A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.
+//
+// Sources: those of farthest.py.
+#pragma once
+
+#include "majorant.h"
+
+namespace LANE_SPACE {
+
+constexpr int CLIMBS = 8, MOST_KEPT = 32;
+constexpr double GAIN = 1e-3;  // [tolerances] a climb that gains less is over
+
+// A body, its columns filled up with zeros to a number that others have too.
+struct Body {
+    int64_t point;
+    Cones cones;                   // of the columns
+    int own_discs, own_intervals;  // that are not filled up
+    int p;
+    double centre[6];
+    std::vector<double> X, H, start;  // (6, nv), (p, nv), (nv,)
+
+    int nv() const { return cones.nu; }
+    double inner_of(const double *a, const double *b) const {
+        double total = 0.0;
+        for (int j = 0; j < nv(); ++j) total += a[j] * b[j];
+        return total;
+    }
+};
+
+// A search: of a body, in the rotation (0) or the translation (3), to bounds so close.
+struct Task {
+    const Body *body;
+    int half;
+    double tolerance;
+};
+
+// The state of a search.
+struct Search {
+    const Body *body = nullptr;
+    int half = 0;
+    double tolerance, low, high;
+    double best[6];          // attains the lower bound
+    Point direction = {};    // of the next support
+    enum Stage { CLIMBING, BOXING, CUTTING } stage;
+    int supports;
+    bool gained;             // by the last support
+    Point axes[3];           // of the box
+    Point heights[2];        // of the box, low and high, NaN where not known
+    struct Plane { Point normal; double height; };
+    std::vector<Plane> planes;  // found before there was a box
+    Polytope outer;
+
+    void begin(const Task &task);
+    void improve(const double *screw);
+    void add_plane(const Point &normal, double height);
+    void choose();
+
+private:
+    void first_direction();
+    void set_side(const Plane &plane);
+    void start_boxing();
+    void towards(const double *point) {
+        const double size =
+            std::sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2]);
+        for (int a = 0; a < 3; ++a) direction[a] = point[a] / size;
+    }
+};
+
+inline void Search::begin(const Task &task) {
+    body = task.body, half = task.half, tolerance = task.tolerance;
+    std::copy(body->centre, body->centre + 6, best);
+    const double *own = best + half;
+    low = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    high = INFINITY;
+    stage = CLIMBING, supports = 0, gained = false;
+    heights[0].fill(NAN), heights[1].fill(NAN);
+    planes.clear();
+    if (body->nv())
+        first_direction();
+    else
+        high = low;
+}
+
+// The direction of farthest reach if there were no closures.
+inline void Search::first_direction() {
+    const Body &b = *body;
+    const int nv = b.nv();
+    std::vector<double> free(&b.X[half * nv], &b.X[half * nv] + 3 * nv);
+    for (int i = 0; i < b.p; ++i)
+        for (int a = 0; a < 3; ++a) {
+            const double along = b.inner_of(&free[a * nv], &b.H[i * nv]);
+            for (int j = 0; j < nv; ++j) free[a * nv + j] -= along * b.H[i * nv + j];
+        }
+    Point Q[3], values, V[3];
+    for (int a = 0; a < 3; ++a)
+        for (int c = 0; c < 3; ++c) Q[a][c] = b.inner_of(&free[a * nv], &free[c * nv]);
+    eigenvectors(Q, values, V);
+    double most = -1.0;
+    for (int candidate = 0; candidate < 4; ++candidate) {
+        Point d;
+        for (int a = 0; a < 3; ++a)
+            d[a] = candidate < 3 ? V[a][candidate] : b.centre[half + a];
+        const double size = std::sqrt(inner(d, d));
+        if (!(size > 0.0)) continue;
+        double middle = 0.0, height = 0.0;
+        for (int a = 0; a < 3; ++a) {
+            d[a] /= size;
+            middle += d[a] * b.centre[half + a];
+        }
+        b.cones.each([&](int columns, int, int at) {
+            double length = 0.0;
+            for (int j = at; j < at + columns; ++j) {
+                const double own =
+                    d[0] * free[j] + d[1] * free[nv + j] + d[2] * free[2 * nv + j];
+                length += own * own;
+                middle -= own * b.start[j];
+            }
+            height += std::sqrt(length);
+        });
+        if (height + std::fabs(middle) > most) {
+            most = height + std::fabs(middle);
+            for (int a = 0; a < 3; ++a) direction[a] = middle >= 0.0 ? d[a] : -d[a];
+        }
+    }
+}
+
+// Keeps a screw that is farther than the best.
+inline void Search::improve(const double *screw) {
+    const double *own = screw + half;
+    const double size = std::sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
+    if (!(size > low)) return;
+    if (size > low + GAIN * tolerance) gained = true;
+    low = size;
+    std::copy(screw, screw + 6, best);
+}
+
+// A plane for the box, for those kept for it, or for the polytope.
+inline void Search::add_plane(const Point &normal, double height) {
+    if (stage == CUTTING)
+        outer.cut(normal, height);
+    else if (stage == BOXING)
+        set_side({normal, height});
+    else if (planes.size() < MOST_KEPT)
+        planes.push_back({normal, height});
+}
+
+// A side of the box, if the plane's normal is one of its axes or the opposite.
+inline void Search::set_side(const Plane &plane) {
+    for (int axis = 0; axis < 3; ++axis) {
+        bool along = true, against = true;
+        for (int a = 0; a < 3; ++a) {
+            along = along && plane.normal[a] == axes[axis][a];
+            against = against && plane.normal[a] == -axes[axis][a];
+        }
+        if (along)
+            heights[1][axis] = plane.height;
+        else if (against)
+            heights[0][axis] = -plane.height;
+    }
+}
+
+// The next direction, and the stage.
+inline void Search::choose() {
+    if (stage == CLIMBING) {
+        if (gained && supports < CLIMBS) return towards(best + half);
+        start_boxing();
+    }
+    if (stage == BOXING) {
+        for (int axis = 0; axis < 3; ++axis)
+            for (int side = 0; side < 2; ++side)
+                if (std::isnan(heights[side][axis])) {
+                    for (int a = 0; a < 3; ++a)
+                        direction[a] = (2 * side - 1) * axes[axis][a];
+                    return;
+                }
+        outer.start_box(axes, heights[0], heights[1]);
+        stage = CUTTING;
+        for (const Plane &plane : planes) outer.cut(plane.normal, plane.height);
+    }
+    const Point corner = outer.farthest_corner();
+    high = std::max(low, std::min(high, std::sqrt(inner(corner, corner))));
+    // where the last support gained, the direction of its point gains more, and the
+    // second bound is tightest there; else the farthest vertex
+    towards(gained ? best + half : corner.data());
+}
+
+// A box along the best point's direction, its planes not known yet.
+inline void Search::start_boxing() {
+    stage = BOXING;
+    const Point own = direction;
+    int least = 0;
+    for (int a = 1; a < 3; ++a)
+        if (std::fabs(own[a]) < std::fabs(own[least])) least = a;
+    axes[0] = own;
+    for (int a = 0; a < 3; ++a) axes[1][a] = (a == least) - own[least] * own[a];
+    const double size = std::sqrt(inner(axes[1], axes[1]));
+    for (double &x : axes[1]) x /= size;
+    for (int a = 0; a < 3; ++a) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        axes[2][a] = own[b] * axes[1][c] - own[c] * axes[1][b];
+    }
+    for (const Plane &plane : planes) set_side(plane);
+}
+
+}  // namespace LANE_SPACE
