@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from forcefit.inputs.cache_folder import cache_folder
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
-from forcefit.native.libraries import load_library
 from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
 from stiffness.mesh.solid import Solid
 from stiffness.surface.decimate import coarser_surface
@@ -34,7 +33,8 @@ from stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-_SAME_NUMBERS = "stiffness/mesh/same_random_numbers.cpp"  # makes meshes reproducible
+# makes meshes reproducible; there is none where the C++ library is not GNU's
+_SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
 _FORMAT = 4  # of the cached meshes; raised when what they hold changes
 
 
@@ -115,8 +115,8 @@ def _tetrahedralize(
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
         # -P: our modules' names are not to be taken for others'
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
-        if (library := load_library(_SAME_NUMBERS)) is not None:
-            command.append(library._name)
+        if _SAME_NUMBERS.exists():
+            command.append(str(_SAME_NUMBERS))
         try:
             # the mesher leaves a file in the folder it runs in
             run = subprocess.run(

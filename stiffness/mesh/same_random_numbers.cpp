@@ -8,5 +8,3 @@
 EXPORTED std::random_device::result_type std::random_device::_M_getval() {
     return 5489;  // the standard generator's own default
 }
-
-extern "C" EXPORTED const char *source_digest() { return SOURCE_DIGEST; }

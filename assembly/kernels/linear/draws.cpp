@@ -172,7 +172,7 @@ private:
         } else {
             const Real worth = inner(h.data(), y.data(), r) - slip - most;
             // any multiple of y proves a bound: the best one, zero inside a zone
-            factor = (worth > 0.0) & (cost > 0.0) ? worth / cost : Real{};
+            factor = ((worth > 0.0) & (cost > 0.0)) ? worth / cost : Real{};
             bound = 0.5 * factor * factor * cost;
         }
         // written so that NaN fails

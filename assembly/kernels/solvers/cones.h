@@ -204,7 +204,7 @@ inline Real Solver::fastest() const {
     const auto crossing = [](Real a, Real b, Real minus_c, Real over_c) {
         const Real under = b * b + a * minus_c;
         const Real below = b + root(under > 0.0 ? under : Real{});
-        return (under >= 0.0) & (below > 0.0) ? below * over_c : Real{};
+        return ((under >= 0.0) & (below > 0.0)) ? below * over_c : Real{};
     };
     k.each([&](auto size, int c, int at) {
         const Head &o = heads[c];

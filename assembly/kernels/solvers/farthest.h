@@ -226,7 +226,7 @@ inline void Farthest::within(Row &v) {
         const Whole beyond = aa + 2.0 * ab + bb > 0.0;
         const Real under = ab * ab - aa * bb, r = root(under > 0.0 ? under : Real{});
         const Real most = ab > 0.0 ? -bb / (ab + r) : (r - ab) / aa;
-        share = beyond & (most < share) ? most : share;
+        share = (beyond & (most < share)) ? most : share;
     });
     share = larger(share, Real{});
     for (int j = 0; j < nv; ++j) v[j] = body.start[j] + share * v[j];

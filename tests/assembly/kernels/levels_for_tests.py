@@ -1,0 +1,71 @@
+"""Prints a digest of each kind of compiled answer; test_choice.py runs it."""
+
+import hashlib
+from dataclasses import is_dataclass
+
+import numpy as np
+
+from assembly.batch.many_draws import prepare_energies
+from assembly.kernels.choice import kernels
+from assembly.kinematics.posture import home_posture, place_many
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.pose_error import bound_pose_errors
+from assembly.linear.zone import zone_margins
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.robots import load_robot
+from assembly.solvers.conic import minimise_energy
+
+LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
+
+
+def digest(answer):
+    """Of all floating-point numbers of an answer, in their order."""
+    found = hashlib.sha256()
+
+    def take(one):
+        if isinstance(one, np.ndarray) and one.dtype == float:
+            found.update(one.tobytes())
+        elif isinstance(one, float):
+            found.update(np.float64(one).tobytes())
+        elif isinstance(one, tuple | list):
+            list(map(take, one))
+        elif is_dataclass(one):
+            take([getattr(one, name) for name in one.__dataclass_fields__])
+
+    take(answer)
+    assert found.digest() != hashlib.sha256().digest()
+    return found.hexdigest()
+
+
+def answers():
+    """Name, and answer, of problems that have more points than any level has lanes."""
+    rng = np.random.default_rng(5)
+    for name, k in (("five_bar", 11), ("hexapod", 9)):
+        robot = load_robot(name)
+        home = home_posture(robot)
+        pose = np.array([*home.pose().values()]) + [*[0.02] * 3, *[0.0] * 3]
+        poses = pose * rng.uniform(0.95, 1.05, (k, 1))
+        if name == "five_bar":
+            poses[:, 2:] = np.nan
+        placed = [one for one in place_many(robot, poses)[0] if one is not None]
+        yield f"{name} placed", [one.transforms for one in placed]
+        T = np.array([home.transforms] * k)
+        T[: len(placed)] = [one.transforms for one in placed]
+        errors = 1e-4 * rng.normal(size=(k, len(robot.frames), 6))
+        yield f"{name} (22)", minimise_energies(robot, T, errors)
+        yield f"{name} (22) of one", minimise_energies(robot, T[:1], errors[:1])
+        yield f"{name} loaded", solve_assembly([home] * k, LOAD, errors=errors)
+        yield f"{name} (21)", zone_margins(robot, T, "free", errors=errors)
+        yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
+        yield f"{name} K_C", platform_stiffnesses(robot, T)
+        yield f"{name} draws", prepare_energies(home).solve(errors)
+    group = np.repeat(np.arange(4), [1, 2, 3, 4])
+    H = rng.normal(size=(2, 10))
+    given = rng.normal(size=(5, 10)), 3 * rng.normal(size=5), rng.normal(size=10)
+    yield "cones", minimise_energy(*given, H, H @ (0.1 * rng.normal(size=10)), group)
+
+
+if __name__ == "__main__":
+    print(kernels.__name__.rpartition(".")[2], kernels.lanes, sep="\t")
+    for name, answer in answers():
+        print(name, digest(answer), sep="\t")

@@ -1,0 +1,156 @@
+"""Arrays of a wrong shape, type or order are refused by name before they are read."""
+
+import re
+
+import numpy as np
+import pytest
+
+from assembly.kernels.choice import kernels
+from assembly.kinematics import nominal
+from assembly.kinematics.posture import home_posture
+from assembly.linear.lanes import _robot
+from assembly.linear.robot_structure import structure_of
+from assembly.robots import load_robot
+
+ROBOT = load_robot("five_bar")
+N, K = len(ROBOT.frames), 3
+
+
+def given():
+    """Arguments of (22) by their names, as they should be."""
+    joints, structure = structure_of(ROBOT)
+    nu, nq = joints.cones.shape[1], joints.free.shape[1]
+    m, ny = 6 * len(ROBOT.closures), joints.elastic.shape[1]
+    home = home_posture(ROBOT)
+    return {
+        "robot": _robot(structure), "T": np.array([home.transforms] * K),
+        "errors": np.full((K, N, 6), 1e-4), "mismatch": np.zeros(K), "loads": None,
+        "outcome": np.zeros(K, dtype=np.int64), "energy": np.zeros(K),
+        "bound": np.zeros(K), "without_clearance": np.zeros(K), "work": np.zeros(K),
+        "platform_screw": np.zeros((K, 6)), "clearances": np.zeros((K, nu)),
+        "motions": np.zeros((K, nq)), "multipliers": np.zeros((K, m)),
+        "residual": np.zeros(K), "elastic": np.zeros((K, ny)),
+    }  # fmt: skip
+
+
+def test_what_is_right_is_taken():
+    right = given()
+    kernels.assemble_all(**right)
+    assert (right["energy"] >= right["bound"]).all()
+    one_set = given() | {"errors": right["errors"][:1]}
+    kernels.assemble_all(**one_set)
+    assert np.array_equal(one_set["energy"], right["energy"])
+
+
+def read_only(array):
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+@pytest.mark.parametrize("name", [name for name in given() if name != "robot"])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda array: array[..., None],
+        lambda array: array[None],
+        lambda array: array.astype(np.float32),
+        lambda array: np.repeat(array, 2, axis=0)[::2],  # not one after the other
+        lambda array: array.tolist(),
+        lambda array: "none",
+    ],
+)
+def test_a_wrong_argument_of_22_is_named(name, spoil):
+    right = given()
+    array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
+    with pytest.raises(ValueError, match=rf"^{name}: .*, expected .*of shape \("):
+        kernels.assemble_all(**right | {name: spoil(array)})
+
+
+@pytest.mark.parametrize("name", [n for n in given() if n not in {"robot", "T"}])
+def test_an_array_of_22_with_other_points_than_the_frames_is_named(name):
+    right = given()
+    array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
+    with pytest.raises(ValueError, match=rf"^{name}: .* \({K - 1},.* \({K},"):
+        kernels.assemble_all(**right | {name: array[:-1]})
+
+
+def test_the_message_says_what_was_found_and_what_was_expected():
+    wrong = given() | {"T": np.zeros((K, N, 4, 3), dtype=np.float32)}
+    message = (
+        f"T: float32 of shape ({K}, {N}, 4, 3), expected float64 of shape "
+        f"(any, {N}, 4, 4), row after row"
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        kernels.assemble_all(**wrong)
+
+
+@pytest.mark.parametrize("name", ["outcome", "energy", "elastic"])
+def test_what_is_filled_must_be_writable(name):
+    wrong = given()
+    with pytest.raises(ValueError, match=rf"^{name}: .*read-only, expected writable"):
+        kernels.assemble_all(**wrong | {name: read_only(wrong[name])})
+
+
+def test_what_is_only_read_may_be_read_only():
+    right, same = given(), given()
+    kernels.assemble_all(**right)
+    same |= {name: read_only(same[name]) for name in ("T", "errors", "mismatch")}
+    kernels.assemble_all(**same)
+    assert np.array_equal(right["energy"], same["energy"])
+
+
+INDEXED = ("pattern_of", "spring_frame", "spring_order", "of_joint", "group_pattern",
+           "cone_frame", "cone_axis", "free_frame", "free_axis")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INDEXED)
+@pytest.mark.parametrize("index", [-1, 10**6])
+def test_an_index_that_leads_out_of_an_array_is_refused(name, index):
+    structure = structure_of(ROBOT)[1]
+    wrong = getattr(structure, name).copy()
+    wrong[-1] = index
+    with pytest.raises(ValueError, match=re.escape(f"{name}[{len(wrong) - 1}] is ")):
+        kernels.Robot(structure._replace(**{name: wrong}))
+
+
+@pytest.mark.parametrize("name", ["groups", "starts"])
+@pytest.mark.parametrize("at", [0, -1])
+def test_groups_that_do_not_fit_their_rows_are_refused(name, at):
+    structure = structure_of(ROBOT)[1]
+    wrong = getattr(structure, name).copy()
+    wrong[at] = 10**6
+    with pytest.raises(ValueError, match=rf"^{name}: expected numbers that begin at 0"):
+        kernels.Robot(structure._replace(**{name: wrong}))
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [("parents", [[0, 1]]), ("kinds", [7]), ("pairs", [[0, 99]]), ("moves", [[99, 1]]),
+     ("groups", [1]), ("fixed", [1.0])],
+)  # fmt: skip
+def test_a_wrong_array_of_a_tree_is_named(name, wrong):
+    fields = nominal._tree(ROBOT)
+    kernels.Tree(**fields)
+    wrong = np.array(wrong, dtype=np.asarray(fields[name]).dtype)
+    if wrong.shape[1:] == fields[name].shape[1:]:
+        wrong = np.concatenate([wrong, fields[name][1:]])
+    with pytest.raises(ValueError, match=rf"^{name}\b"):
+        kernels.Tree(**fields | {name: wrong})
+
+
+@pytest.mark.parametrize("name", ["G", "h", "d", "H", "k", "starts", "u", "y"])
+def test_a_wrong_argument_of_a_cone_programme_is_named(name, rng):
+    right = {
+        "G": rng.normal(size=(3, 5)), "h": np.ones(3), "d": np.ones(5),
+        "H": rng.normal(size=(1, 5)), "k": np.zeros(1),
+        "starts": np.array([0, 2, 3, 5]), "tolerance": 1e-9,
+        "u": np.zeros(5), "y": np.zeros(4),
+    }  # fmt: skip
+    kernels.interior_point(**right)
+    assert right["u"].any()
+    shorter = right | {name: right[name][:-1].copy()}
+    # G and h, H and k: of two numbers of rows it is the second that is wrong
+    named = {"h": "G", "d": "G", "k": "H"}.get(name, name)
+    with pytest.raises(ValueError, match=rf"^{named}\b"):
+        kernels.interior_point(**shorter)

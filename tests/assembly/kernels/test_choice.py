@@ -1,0 +1,126 @@
+"""Which compiled module is chosen, and that answers do not depend on it."""
+
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from assembly.kernels import choice
+from assembly.kernels.choice import LEVELS, chosen, kernels, levels_here
+from forcefit.inputs.errors import BadInput
+
+PROGRAM = Path(__file__).with_name("levels_for_tests.py")
+ROOT = Path(__file__).parents[3]
+# x86-64 psABI, table 3.1, in Linux's words: what each level adds
+FLAGS = {
+    "x86-64-v2": "cx16 lahf_lm popcnt pni ssse3 sse4_1 sse4_2",
+    "x86-64-v3": "avx avx2 bmi1 bmi2 f16c fma abm movbe",
+    "x86-64-v4": "avx512f avx512bw avx512cd avx512dq avx512vl",
+}
+x86_64 = pytest.mark.skipif(not levels_here(), reason="no levels elsewhere")
+
+
+def run(level, *words):
+    """A fresh Python's exit status and both of its outputs."""
+    given = os.environ | {"FORCEFIT_MARCH": level, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, *map(str, words)], env=given, text=True,
+                          capture_output=True, cwd=ROOT, check=False)  # fmt: skip
+    return done.returncode, done.stdout, done.stderr
+
+
+@cache
+def digests(level):
+    """Name of the module used, and digests of its answers by their names."""
+    status, out, err = run(level, PROGRAM)
+    assert status == 0, err
+    first, *rows = out.splitlines()
+    return first.split("\t"), dict(row.split("\t") for row in rows)
+
+
+@x86_64
+@pytest.mark.parametrize("level", LEVELS)
+def test_every_level_has_the_same_bits(level):
+    """Products and sums are rounded one by one, in the same order on every machine.
+
+    Energies with loads and without, margins, pose errors, compliances, draws, tracks
+    and cones, of more points than there are lanes; one point takes two lanes.
+    """
+    if level not in levels_here():
+        pytest.skip("this processor has not got it")
+    name = "_" + level.replace("-", "_")
+    lanes = {"x86-64-v2": "2", "x86-64-v3": "4", "x86-64-v4": "8"}[level]
+    (used, of), found = digests(level)
+    assert (used, of) == (name, lanes)
+    assert found == digests(levels_here()[0])[1]
+    assert len(found) == 17
+
+
+@pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="no list of flags")
+@x86_64
+def test_the_levels_are_those_that_the_system_says_the_processor_has():
+    cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    flags = next(line for line in cpuinfo.splitlines() if line.startswith("flags"))
+    wanted, expected = set(), []
+    for level, more in FLAGS.items():
+        wanted |= set(more.split())
+        if wanted <= set(flags.split()):
+            expected.append(level)
+    assert levels_here() == expected
+
+
+@x86_64
+def test_the_highest_level_is_taken_if_none_is_named(monkeypatch):
+    monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
+    assert chosen().__name__.endswith(levels_here()[-1].replace("-", "_"))
+
+
+@x86_64
+@pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
+def test_what_is_no_level_is_refused_in_one_line(level):
+    words = ["-m", "forcefit", "assembly", "zone", "five_bar"]
+    status, out, err = run(level, *words)
+    assert (status, out) == (2, "")
+    assert err == (
+        f'forcefit: FORCEFIT_MARCH is "{level}"; expected a level that this processor '
+        f"has, {', '.join(levels_here())}\n"
+    )
+
+
+def test_a_level_that_the_processor_has_not_is_refused(monkeypatch):
+    monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 3))
+    monkeypatch.setenv("FORCEFIT_MARCH", "x86-64-v4")
+    with pytest.raises(BadInput, match=r'is "x86-64-v4"; .* x86-64-v2, x86-64-v3$'):
+        chosen()
+
+
+def test_a_processor_older_than_every_module_is_named(monkeypatch):
+    monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
+    monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 1))
+    with pytest.raises(ImportError, match=r"x86-64-v2$"):
+        chosen()
+
+
+def test_there_are_no_levels_elsewhere(monkeypatch):
+    monkeypatch.setattr(choice.platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(choice, "_load", lambda name: name)
+    monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
+    assert chosen() == "_portable"
+    monkeypatch.setenv("FORCEFIT_MARCH", "x86-64-v3")
+    with pytest.raises(BadInput, match=r"of which there are none$"):
+        chosen()
+
+
+def test_modules_that_are_not_built_are_named(monkeypatch):
+    monkeypatch.setattr(choice, "find_spec", lambda _: None)
+    with pytest.raises(ImportError, match=r"^assembly.kernels.\w+ is not built: run `"):
+        chosen()
+
+
+def test_modules_have_the_lanes_of_their_registers():
+    assert kernels.lanes in {2, 4, 8}
