@@ -1,7 +1,6 @@
 """Faults put into functions that are loaded: their code is exchanged in a fork.
 
-All tests are collected once, all modules imported, all compiled functions loaded.  For
-each fault the process forks, exchanges the code of the fault's functions, and runs the
+All tests are collected once, all modules imported.  For each fault the process forks, exchanges the code of the fault's functions, and runs the
 tests that pass its line: hundredths of a second more than the tests, not the seconds
 that a process of its own takes.  Only a statement within a function of a file without
 compiled loops can be exchanged so; what an import has worked out is in use already.
@@ -54,7 +53,6 @@ class Session:
             if path.name not in {"__main__.py", "mesh_worker.py"}:
                 names = path.with_suffix("").parts
                 importlib.import_module(".".join(names).removesuffix(".__init__"))
-        importlib.import_module("forcefit.commands.warm_up").warm_up()
         self.functions = defaultdict[str, list[FunctionType]](list)
         for found in gc.get_objects():
             if type(found) is FunctionType:  # a proxy of what is gone has no class

@@ -17,9 +17,6 @@ import typer
 from hypothesis import settings
 
 from forcefit.commands import app as command
-from forcefit.commands.warm_up import warm_up
-from forcefit.inputs.locking import locked_file
-from forcefit.native.libraries import folder_of_compiled
 
 # a command is the same whenever it is called: its options are read from the signatures
 # once, not in each of a thousand tests
@@ -30,15 +27,6 @@ typer.main.get_command = cache(typer.main.get_command)
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("repeatable")
-
-
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Of several processes with the tests, one compiles, and the others wait for it."""
-    if hasattr(session.config, "workerinput"):
-        folder = folder_of_compiled()
-        folder.mkdir(parents=True, exist_ok=True)
-        with locked_file(folder / "tests.lock"):
-            warm_up()
 
 
 @pytest.fixture

@@ -92,18 +92,6 @@ def study(
         raise typer.Exit(1)
 
 
-@app.command("warm-up")
-def warm_up() -> None:
-    """Compile the solvers now, once on this machine.
-
-    What is compiled is kept on disk; later commands then start at once.
-    """
-    from forcefit.commands.warm_up import warm_up as compile_all
-
-    with progress_bars() as update:
-        compile_all(lambda done, total: update("compiling", done, total))
-
-
 def main() -> None:
     """Run the command; bad input is one line on stderr and exit status 2."""
     if not sys.warnoptions:

@@ -1,4 +1,7 @@
-"""Prints a digest of each kind of compiled answer; test_choice.py runs it."""
+"""Prints a digest of each kind of compiled answer; test_choice.py and .ci/clang run it.
+
+Also what is to work where a wheel was installed and nothing else of the tests is.
+"""
 
 import hashlib
 from dataclasses import is_dataclass
