@@ -1,9 +1,10 @@
 """Faults put into functions that are loaded: their code is exchanged in a fork.
 
-All tests are collected once, all modules imported.  For each fault the process forks, exchanges the code of the fault's functions, and runs the
-tests that pass its line: hundredths of a second more than the tests, not the seconds
-that a process of its own takes.  Only a statement within a function of a file without
-compiled loops can be exchanged so; what an import has worked out is in use already.
+All tests are collected once, all modules imported.  For each fault the process forks,
+exchanges the code of the fault's functions, and runs the tests that pass its line:
+hundredths of a second more than the tests, not the seconds that a process of its own
+takes.  Only a statement within a function of a file without compiled loops can be
+exchanged so; what an import has worked out is in use already.
 """
 
 import functools

@@ -4,7 +4,7 @@ A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py`
 ``figures.py``, ``scene.py``) are left out: what they show is tested where it is a
 number.  So is what compiles loops and loads them (``compiled.py``): it works out no
 number, and runs once, in processes of its own, which no fork of one that has loaded it
-can try again; and what runs on a GPU alone (``device.py``), where there is none.
+can try again.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
@@ -36,7 +36,6 @@ SWAPS: dict[type, type] = {
 LARGE = 10  # numbers above it become one
 LEFT_OUT = {
     "report.py", "plot.py", "figures.py", "scene.py", "scenes.py", "compiled.py",
-    "device.py",
 }  # fmt: skip
 
 

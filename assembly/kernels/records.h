@@ -1,9 +1,7 @@
 // What Python hands to the kernels, as addresses of arrays and how many rows they have.
 #pragma once
 
-#ifndef __CUDACC_RTC__
 #include <cstdint>
-#endif
 
 // A robot: assembly/linear/robot_structure.py's Structure, and how many there are.
 struct Robot {
@@ -21,14 +19,12 @@ struct Robot {
     int64_t n, closures, np, ny, ng, nu, cones, nq;
 };
 
-// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (n,)
-// whether a frame errs at any point, which is found out where nobody says it; (k, 2, n,
-// 6) loads on bodies and on joints, in the frames' axes, or none.
+// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (k, 2,
+// n, 6) loads on bodies and on joints, in the frames' axes, or none.
 struct Points {
     int64_t count;
     const double *T, *errors, *mismatch;
     int64_t own_errors;
-    const bool *erring;
     const double *loads;
 };
 

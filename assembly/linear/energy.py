@@ -23,7 +23,6 @@ from assembly.linear.assemblies import (
     solve_again,
 )
 from assembly.linear.closure import checked_size, linearise
-from assembly.linear.device import assemble_on_device
 from assembly.linear.fallback import (
     CannotAssemble,
     reference_assembly,
@@ -232,13 +231,11 @@ def _solve_compiled(
 
 
 def _fill(given: _Given, loads: NDArray | None) -> None:
-    """Every point, by what there is: a device, a compiler for C++, numba."""
+    """Every point: side by side where a compiler for C++ is, else by numba."""
     structure, T, errors, mismatch, out = given
     if loads is None and not np.count_nonzero(errors):
         return  # nothing has to move, and zeros are the answer
-    if loads is None and assemble_on_device(*given):
-        pass
-    elif not assemble_side_by_side(*given, loads):
+    if not assemble_side_by_side(*given, loads):
         return _fill_by_numba(given, loads)
     # what was not certified side by side; rounding is another
     left = out.outcome >= COMPILED

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import checked_size
-from assembly.linear.device import margins_on_device
 from assembly.linear.fallback import reference_margin
 from assembly.linear.lanes import margins_side_by_side
 from assembly.linear.robot_structure import Structure, structure_of
@@ -223,9 +222,8 @@ def _solve_all(
     structure: Structure, points: tuple[NDArray, NDArray, NDArray],
     out: tuple[NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
-    """On a device or side by side, and by numba what is left: it rounds otherwise."""
-    if not margins_on_device(structure, *points, out):
-        margins_side_by_side(structure, *points, out)
+    """Side by side, and by numba what is left: it rounds otherwise."""
+    margins_side_by_side(structure, *points, out)
     left = np.flatnonzero(out[2])
     if len(left):
         from assembly.linear.compiled_zone import all_margins

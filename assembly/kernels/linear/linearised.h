@@ -12,8 +12,8 @@
 // ========  =============  ============================================================
 #pragma once
 
-#include "../solvers/block.h"
 #include "../records.h"
+#include "../solvers/block.h"
 
 namespace LANE_SPACE {
 
@@ -67,8 +67,7 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
     for (int c = 0; c < nq; ++c) felt[s.free_frame[c]] = true;
     for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
     // a frame without errors at any point adds exact zeros
-    for (int j = 0; points.erring && j < n; ++j) erring[j] = points.erring[j];
-    const int64_t sets = points.erring ? 0 : points.own_errors ? points.count : 1;
+    const int64_t sets = points.own_errors ? points.count : 1;
     for (int64_t i = 0; i < sets * n; ++i)
         for (int axis = 0; axis < 6; ++axis)
             if (points.errors[6 * i + axis] != 0.0) erring[i % n] = true;

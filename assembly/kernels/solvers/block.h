@@ -20,7 +20,6 @@ struct Block {
     }
 };
 
-#ifndef ON_DEVICE
 // 0 .. count - 1.
 inline std::vector<int64_t> all_of(int64_t count) {
     std::vector<int64_t> all(count);
@@ -43,6 +42,5 @@ inline void in_blocks(const std::vector<int64_t> &points, Solve solve) {
         while (any(pending)) pending = solve(block, pending);
     }
 }
-#endif
 
 }  // namespace LANE_SPACE

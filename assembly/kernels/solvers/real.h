@@ -4,18 +4,14 @@
 // finished is frozen by masks.  So an answer does not depend on its neighbours.
 #pragma once
 
-#include "standard.h"
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <numeric>
+#include <utility>
+#include <vector>
 
-#ifdef ON_DEVICE  // or its simulation
-#include "arena.h"
-#include "one_lane.h"
-
-#define LANE_SPACE lanes_1
-namespace LANE_SPACE {
-
-inline Real real(double value) { return value; }
-inline Whole whole(int64_t value) { return value; }
-#else
 // One module holds code for two lanes, where few problems come at once, and for as many
 // as registers have: each in a namespace of its own.
 #if defined(FEW_LANES)
@@ -55,7 +51,6 @@ inline Real once(Real x) {
 #endif
     return x;
 }
-#endif
 
 inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
 inline Real larger(Real a, Real b) { return a > b ? a : b; }
