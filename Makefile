@@ -10,8 +10,8 @@ BIN := $(VENV)/bin
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 EMPTY := $(VENV)/empty-$(VERSION)
 READY := $(VENV)/ready-$(VERSION)
-KERNELS := CMakeLists.txt $(wildcard assembly/kernels/*.cpp assembly/kernels/*.h \
-    assembly/kernels/*/*.cpp assembly/kernels/*/*.h)
+CPP := CMakeLists.txt $(wildcard assembly/kernels/*.cpp assembly/kernels/*.h \
+    assembly/kernels/*/*.cpp assembly/kernels/*/*.h stiffness/mesh/*.cpp)
 
 .PHONY: study test test-slow check docs clean
 
@@ -43,10 +43,10 @@ $(EMPTY): pyproject.toml
 	@touch $@
 
 # C++ is compiled when the package is installed
-$(READY): $(EMPTY) $(KERNELS)
+$(READY): $(EMPTY) $(CPP)
 	$(BIN)/python -m pip install --quiet -e ".[dev]"
 	@touch $@
 
 clean:
 	rm -rf $(VENV) build dist
-	rm -f assembly/kernels/*.so
+	rm -f assembly/kernels/*.so stiffness/mesh/*.so

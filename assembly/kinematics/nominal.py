@@ -4,7 +4,7 @@ Many targets are followed at once, each along its straight line from the home po
 Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
 undetermined stays unchanged, and overconstrained robots are no special case.  The
 loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`, and
-:mod:`assembly.kinematics.compiled_continuation` where no compiler for C++ stands.
+:mod:`assembly.kinematics.compiled_continuation` by numba.
 """
 
 from dataclasses import dataclass

@@ -231,7 +231,7 @@ def _solve_compiled(
 
 
 def _fill(given: _Given, loads: NDArray | None) -> None:
-    """Every point: side by side where a compiler for C++ is, else by numba."""
+    """Every point: side by side, by numba where callers asked for it."""
     structure, T, errors, mismatch, out = given
     if loads is None and not np.count_nonzero(errors):
         return  # nothing has to move, and zeros are the answer

@@ -1,4 +1,1 @@
-"""C++ of the packages: compiled where a compiler stands, loaded once.
-
-Begin at ``libraries.py``.
-"""
+"""Where numba keeps what it compiled: ``libraries.py``."""
