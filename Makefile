@@ -44,7 +44,7 @@ $(EMPTY): pyproject.toml
 
 # C++ is compiled when the package is installed
 $(READY): $(EMPTY) $(CPP)
-	$(BIN)/python -m pip install --quiet -e ".[dev]"
+	$(BIN)/python -m pip install --quiet -e ".[all,dev]"
 	@touch $@
 
 clean:

@@ -36,7 +36,8 @@ from stiffness.fem.material import Material
 from stiffness.fem.quality import dihedral_angles, mesh_report
 from stiffness.mesh.curved_elements import curved_elements
 from stiffness.mesh.edge_grading import layered
-from stiffness.mesh.lagrange import lattice, quadrature, shape_functions
+from stiffness.mesh.lagrange import lattice, shape_functions
+from stiffness.mesh.quadrature import quadrature
 from stiffness.mesh.refine import refine
 from stiffness.mesh.solid import Solid
 from stiffness.surface.beam_surfaces import shape_beam, shape_surface

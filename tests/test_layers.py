@@ -31,7 +31,6 @@ PACKAGES = ("forcefit", "stiffness", "assembly", "validation")
 SIMULATION = "validation/multibody/simulation.py"
 OWNERS = {
     "pytetwild": ("stiffness/mesh/mesh_worker.py",),
-    "skfem": ("stiffness/mesh/lagrange.py",),
     "meshio": ("stiffness/surface/surface_worker.py",),
     "gmsh": ("stiffness/surface/step_file.py",),
     "clarabel": ("assembly/solvers/conic.py",),

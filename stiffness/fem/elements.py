@@ -9,9 +9,9 @@ w      quadrature weights times the Jacobian's determinant        (t, q)
 ====== ========================================================== ==========
 
 An element's m nodes are its lattice's (:mod:`stiffness.mesh.lagrange`): 20 in a cubic
-tetrahedron, 10 in a quadratic one.  The quadrature is scikit-fem's.  The stiffness is
-assembled from the scalar gradients, all elements at once, much faster than from a weak
-form: K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
+tetrahedron, 10 in a quadratic one.  The stiffness is assembled from the scalar
+gradients, all elements at once, much faster than from a weak form:
+K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).
 Straight tetrahedra are integrated exactly; curved ones two degrees beyond.
 """
 
@@ -30,9 +30,9 @@ from stiffness.mesh.lagrange import (
     face_nodes,
     lattice,
     numbered,
-    quadrature,
     shape_functions,
 )
+from stiffness.mesh.quadrature import quadrature
 from stiffness.mesh.solid import Solid
 
 ORDER = 3  # cubic: quadratic elements need several times the unknowns for 0.1 %

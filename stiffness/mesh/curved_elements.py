@@ -20,9 +20,9 @@ from stiffness.mesh.lagrange import (
     face_nodes,
     lattice,
     numbered,
-    quadrature,
     shape_functions,
 )
+from stiffness.mesh.quadrature import quadrature
 from stiffness.mesh.refine import refine
 from stiffness.mesh.solid import Solid, node_patches, on_shapes
 from stiffness.surface.primitives import Shape

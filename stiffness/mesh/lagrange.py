@@ -87,27 +87,6 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
     return values.prod(axis=0), dN
 
 
-@lru_cache(maxsize=16)
-def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """A rule on the reference element, exact to at least a degree.
-
-    Args:
-        degree: of polynomials, up to 6.
-        corners: 4 of a tetrahedron, 3 of a triangle.
-
-    Returns:
-        L (q, corners) and positive weights (q,).
-    """
-    from skfem.quadrature import get_quadrature
-    from skfem.refdom import RefTet, RefTri
-
-    # scikit-fem's rules of degree 3, and 4 in the tetrahedron, have negative weights;
-    # from 5 to 7 those of the tetrahedron are exact to one degree less than they say
-    least = degree if degree <= 2 else max(degree, 4) + (corners == 4)
-    points, weights = get_quadrature(RefTet if corners == 4 else RefTri, least)
-    return np.vstack([1 - points.sum(axis=0), points]).T, weights
-
-
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
     """Numbers of the lattices' points, shared by the elements that share them.
 

@@ -24,7 +24,8 @@ from stiffness.fem.error_indicator import (
 from stiffness.fem.material import Material
 from stiffness.link import inverted, scaled
 from stiffness.mesh.edge_grading import split_joining_edges
-from stiffness.mesh.lagrange import lattice, quadrature
+from stiffness.mesh.lagrange import lattice
+from stiffness.mesh.quadrature import quadrature
 from stiffness.surface.primitives import Cone
 from tests.solids_for_tests import Z, bar_solid, box_solid, constants, with_plane_sides
 

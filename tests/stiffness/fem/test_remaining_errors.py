@@ -14,7 +14,7 @@ from stiffness.fem.error_indicator import (
     error_matrices,
     traction_errors,
 )
-from stiffness.mesh.lagrange import quadrature
+from stiffness.mesh.quadrature import quadrature
 from tests.solids_for_tests import box_solid, constants
 
 E = 60e9

@@ -1,6 +1,6 @@
-"""Polynomials on tetrahedra: values on the lattice, derivatives, rules, numbers."""
+"""Polynomials on tetrahedra: values on the lattice, derivatives, numbers."""
 
-from math import comb, factorial, prod
+from math import comb, prod
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from stiffness.mesh.lagrange import (
     face_nodes,
     lattice,
     numbered,
-    quadrature,
     shape_functions,
 )
 from stiffness.mesh.solid import Solid
@@ -82,20 +81,6 @@ def test_derivatives_are_those_of_central_differences(rng, degree, corners):
         ahead, back = (shape_functions(degree, L + s * moved)[0] for s in (1, -1))
         difference = (ahead - back) / (2 * step)
         np.testing.assert_allclose(dN[:, :, k - 1], difference, atol=1e-8)
-
-
-@pytest.mark.parametrize("corners", CORNERS)
-@pytest.mark.parametrize("degree", range(1, 7))
-def test_rules_integrate_monomials_exactly(degree, corners):
-    """Integral of a product of L_c^p_c: d! product(p_c!) / (d + sum p_c)! times the
-    size, 1 / d! in d dimensions; and the weights are positive."""
-    L, weights = quadrature(degree, corners)
-    assert (weights > 0).all()
-    np.testing.assert_allclose(L.sum(axis=1), 1, rtol=1e-14)
-    for power in lattice(degree, corners):
-        exact = prod(factorial(p) for p in power) / factorial(corners - 1 + degree)
-        integral = weights @ (L**power).prod(axis=1)
-        assert integral == pytest.approx(exact, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", ORDERS)
