@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
+from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import Table, read_text
 
 _KNOWN = (
@@ -154,7 +155,8 @@ def loops_text(loops: LoopsFile) -> str:
 
 def _yaml(path: Path | str) -> dict[str, Any]:
     """Root mapping of a YAML file."""
-    import yaml
+    with naming_packages(f"{path}: YAML"):
+        import yaml
 
     text = read_text(path)
     try:

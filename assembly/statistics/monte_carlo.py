@@ -33,6 +33,7 @@ from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.sweep import journal_path
+from forcefit.inputs.packages import need
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -71,7 +72,9 @@ def run_draws(
     Raises:
         BadInput: the journal is another run's or locked by one, or a file cannot be
             written.
+        ModuleNotFoundError: xarray is missing.
     """
+    need("xarray")
     with ExitStack() as own:
         return _run_draws(
             experiment, count, path, workers, progress, importance, held or own

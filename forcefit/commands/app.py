@@ -18,6 +18,7 @@ from forcefit.commands.example import example
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
 from forcefit.inputs.errors import BadInput, one_line, quoted
+from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.writing import write_json
 
 app = typer.Typer(
@@ -100,7 +101,8 @@ def main() -> None:
     report_loading()
     with _interrupts() as interrupts:
         try:
-            status = app(prog_name="forcefit", standalone_mode=False)
+            with naming_packages():
+                status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
             sys.exit(_status_after(error, interrupted=bool(interrupts)))
     sys.exit(status if isinstance(status, int) else 0)

@@ -4,7 +4,7 @@ import logging
 import sys
 import time
 from collections.abc import Generator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from threading import Timer
 from typing import Any
 
@@ -16,10 +16,13 @@ _DELAY = 2.0  # [s] before the first line of progress
 def one_thread() -> AbstractContextManager:
     """Linear algebra on one thread: a posture's matrices are too small for more.
 
-    Idle threads wait actively and would slow down the working one.
+    Idle threads wait actively and would slow down the working one.  Where
+    ``threadpoolctl`` is missing, that is what they do.
     """
-    from threadpoolctl import threadpool_limits
-
+    try:
+        from threadpoolctl import threadpool_limits
+    except ModuleNotFoundError:
+        return nullcontext()
     return threadpool_limits(1)
 
 

@@ -27,6 +27,7 @@ from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
 from forcefit.commands.sweep import CsvOption
 from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.packages import need
 from forcefit.inputs.writing import (
     PICTURE,
     check_writable,
@@ -280,6 +281,8 @@ def tolerances(
     _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure or csv):
         raise BadInput("tolerances: --output, --figure and --csv need a --plan")
+    if output or figure or csv:
+        need("xarray")
     if output is not None:
         check_dataset(output, "tolerances")
     if figure is not None:

@@ -23,6 +23,7 @@ from forcefit.commands.options import (
 )
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, nearest
+from forcefit.inputs.packages import need
 from forcefit.inputs.writing import (
     PICTURE,
     TABLE,
@@ -221,6 +222,7 @@ def _solver(workers: int | None, scheduler: str | None) -> "Solver":
         return solve_here
     from assembly.sweeps.cluster import cluster_solver
 
+    need("distributed")
     return cluster_solver(workers, scheduler)
 
 

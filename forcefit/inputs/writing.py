@@ -19,6 +19,7 @@ from typing import Any
 
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.locking import locked_file
+from forcefit.inputs.packages import need
 
 
 @dataclass(frozen=True)
@@ -29,23 +30,29 @@ class Kind:
         name: for messages.
         endings: that the names of its files may have.
         begins: possible first bytes of its files; letters of either case.
+        packages: that write it, beyond what is always there.
     """
 
     name: str
     endings: tuple[str, ...]
     begins: tuple[bytes, ...]
+    packages: tuple[str, ...] = ()
 
 
 JSON = Kind("a JSON file", (".json",), (b"{",))
 PICTURE = Kind(
-    "a picture", (".png", ".svg", ".pdf"), (b"\x89png\r\n", b"<?xml", b"<svg", b"%pdf-")
-)
+    "a picture", (".png", ".svg", ".pdf"),
+    (b"\x89png\r\n", b"<?xml", b"<svg", b"%pdf-"), ("matplotlib",),
+)  # fmt: skip
 PIXELS = Kind(
     "a picture", (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"),
-    (b"\x89png\r\n", b"\xff\xd8\xff", b"bm", b"ii*\0", b"mm\0*"),
+    (b"\x89png\r\n", b"\xff\xd8\xff", b"bm", b"ii*\0", b"mm\0*"), ("matplotlib",),
 )  # fmt: skip
 PAGE = Kind("an HTML page", (".html", ".htm"), (b"<!doctype html",))
-NETCDF = Kind("a NetCDF file of forcefit", (".nc",), (b"\x89hdf\r\n\x1a\n",))
+NETCDF = Kind(
+    "a NetCDF file of forcefit", (".nc",), (b"\x89hdf\r\n\x1a\n",),
+    ("xarray", "h5netcdf", "h5py"),
+)  # fmt: skip
 TABLE = Kind("a CSV table that begins with id", (".csv",), (b"id,",))
 ROBOT_MARK = "# Written by forcefit."
 ROBOT = Kind(
@@ -63,8 +70,11 @@ def check_writable(path: Path | str, kind: Kind | None = None) -> None:
     Raises:
         BadInput: its ending is not of the kind; its folder is absent or not writable;
             the existing file is not regular, not writable, or of another kind.
+        ModuleNotFoundError: a package that writes this kind is missing.
     """
     path = Path(path)
+    if kind is not None:
+        need(*kind.packages)
     if kind is not None and path.suffix.lower() not in kind.endings:
         ending = f"the ending {quoted(path.suffix)}" if path.suffix else "no ending"
         expected = " or ".join(kind.endings)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.cache_folder import cache_folder
+from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
@@ -109,6 +110,7 @@ def _tetrahedralize(
     surface: Surface, edge: float, envelope: float, time_limit: float
 ) -> tuple[NDArray, NDArray]:
     """Run the mesher in a process of its own."""
+    need("pytetwild")
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # of a full circle
@@ -43,15 +44,12 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
 def _gmsh_model(path: Path) -> Generator[Any, None, None]:
     """Gmsh's model of a STEP file, in metres."""
     try:
-        import gmsh
-    except (ImportError, OSError) as error:
-        reason = "" if isinstance(error, ImportError) else f" ({error})"
-        raise BadInput(
-            f"{path}: STEP needs the package gmsh{reason}; install forcefit[gmsh], or "
-            "export the surface as STL"
-        ) from None
-    try:
+        with naming_packages(f"{path}: STEP", "export the surface as STL"):
+            import gmsh
+
         gmsh.initialize(interruptible=False)
+    except BadInput:
+        raise
     except Exception as error:  # its Python file without its library
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"

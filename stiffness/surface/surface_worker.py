@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput
 from stiffness.surface.obj_file import read_obj
 from stiffness.surface.step_file import read_solids, read_step
@@ -32,24 +33,37 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
     """
     _limit_memory()
     try:
-        if wanted == "solids":
-            names, volumes, boxes = read_solids(path)
-            np.savez(made, names=names, volumes=volumes, boxes=boxes)
-            return
-        if path.suffix.lower() in {".step", ".stp"}:
-            step = read_step(path, solid)
-            np.savez(
-                made, points=step.points, faces=step.triangles, sides=step.sides,
-                names=np.array(step.names, dtype=str),
-                overlaps=np.array(step.overlaps, dtype=str),
-            )  # fmt: skip
-            return
-        read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
-        points, faces = read(path)
+        with naming_packages(f"{path}: {path.suffix[1:].upper()}"):
+            arrays = _solids(path) if wanted == "solids" else _triangles(path, solid)
     except BadInput as error:
-        np.savez(made, refused=str(error))
-        return
-    np.savez(made, points=np.asarray(points, dtype=float), faces=np.asarray(faces))
+        arrays = {"refused": np.array(str(error))}
+    np.savez(made, **arrays)
+
+
+def _solids(path: Path) -> dict[str, Any]:
+    """Names, volumes and boxes of a STEP file's solids."""
+    names, volumes, boxes = read_solids(path)
+    return {
+        "names": np.array(names, dtype=str),
+        "volumes": np.array(volumes),
+        "boxes": np.array(boxes),
+    }
+
+
+def _triangles(path: Path, solid: str) -> dict[str, Any]:
+    """Points and triangles, of STEP also what is known of its faces."""
+    if path.suffix.lower() in {".step", ".stp"}:
+        step = read_step(path, solid)
+        return {
+            "points": step.points,
+            "faces": step.triangles,
+            "sides": step.sides,
+            "names": np.array(step.names, dtype=str),
+            "overlaps": np.array(step.overlaps, dtype=str),
+        }
+    read = {".msh": _msh, ".obj": _obj}.get(path.suffix.lower(), _with_vtk)
+    points, faces = read(path)
+    return {"points": np.asarray(points, dtype=float), "faces": np.asarray(faces)}
 
 
 def _limit_memory() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from forcefit.inputs.errors import BadInput, one_line
+from forcefit.inputs.packages import naming_packages
 from validation.exchange.orientation import from_quaternion
 from validation.exchange.reading import LARGEST, Reading
 
@@ -41,14 +42,10 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
         BadInput: ``rosbags`` is not installed, the bag cannot be read, or it has no
             messages of these kinds.
     """
-    try:
+    with naming_packages(f"{path}: a bag", "export its points as a table"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise BadInput(
-            f"{path}: a bag needs the package rosbags; install forcefit[ros], or "
-            "export its points as a table"
-        ) from None
+
     readings = []
     try:
         store = get_typestore(Stores.LATEST)

@@ -24,6 +24,7 @@ from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of
 from assembly.sweeps.sweep import sweep_poses
 from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.crosscheck import Crosscheck, attempt, crosscheck
 from validation.crosscheck.verdict import verdict
@@ -39,6 +40,12 @@ from validation.study.study_file import Study
 
 Progress = Callable[[str, int, int], None]
 THEORIES = ("euler", "timoshenko")
+_PACKAGES = {  # that a check asks, and what keeps its results
+    "stiffness": ("pyvista", "pytetwild"),
+    "reference": ("cvxpy",),
+    "maps": ("xarray", "h5netcdf", "h5py"),
+    "crosscheck": ("exudyn",),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +152,12 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
     Raises:
         BadInput: the pose is out of reach, or a surface is not usable.
+        ModuleNotFoundError: a package that a check needs is missing.
     """
     wanted = set(study.checks)
-    place_robot(study.robot, pose=study.pose)  # out of reach: before the long work
+    # before the long work: what is missing, and what is out of reach
+    need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
+    place_robot(study.robot, pose=study.pose)
     stiffness, robot = None, study.robot
     if "stiffness" in wanted or study.source == "fea":
         stiffness, robot = _compare_links(study, progress)

@@ -1,0 +1,149 @@
+"""What is installed with forcefit: extras, the least there must be, and namesakes."""
+
+import re
+import tomllib
+
+import pytest
+
+import forcefit as ff
+from forcefit.inputs.errors import BadInput
+from forcefit.inputs.packages import naming_packages
+from tests.packages_for_tests import ROOT, modules_of, run_without
+
+LEAST = ("numpy", "scipy", "clarabel", "typer", "rich", "numba")
+OURS = ("forcefit", "assembly", "stiffness", "validation")
+POSE = ("--pose", "tx=0.1,tz=-0.5")
+GRID = ("--grid", "tx=-0.1:0.1:0.1,tz=-0.5")
+MSH = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+LOOPS = "closed_loop: []\n"
+URDF = '<robot name="r"><link name="base"/></robot>\n'
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Files that a package reads, which none here gets as far as reading."""
+    texts = {
+        "a.msh": MSH,
+        "a.step": "ISO-10303-21;\n",
+        "a.yaml": LOOPS,
+        "a.urdf": URDF,
+        "a.nc": "",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("hidden", "distribution", "cure", "words"),
+    [
+        ("xarray", "xarray", "forcefit[sweeps]",
+         ("assembly", "sweep", "irsbot2", *GRID, "-o", "b.nc")),
+        ("h5netcdf", "h5netcdf", "forcefit[sweeps]",
+         ("assembly", "sweep", "irsbot2", *GRID, "-o", "b.nc")),
+        ("h5py", "h5py", "forcefit[sweeps]",
+         ("assembly", "tolerances", "irsbot2", *GRID, "--plan",
+          ROOT / "examples/tolerance_allocation/mostly.toml", "-o", "b.nc")),
+        ("distributed", "distributed", "forcefit[sweeps]",
+         ("assembly", "sweep", "irsbot2", *GRID, "-o", "b.nc", "--workers", "2")),
+        ("xarray", "xarray", "forcefit[sweeps]",
+         ("assembly", "statistics", "irsbot2", *POSE, "--draws", "10", "--errors",
+          ROOT / "examples/irsbot2_errors.toml")),
+        ("xarray", "xarray", "forcefit[sweeps]",
+         ("assembly", "table", "a.nc", "-o", "b.csv")),
+        ("matplotlib", "matplotlib", "forcefit[report]",
+         ("assembly", "plot", "a.nc", "-o", "b.png")),
+        ("matplotlib", "matplotlib", "forcefit[report]",
+         ("assembly", "deflection", "irsbot2", *POSE, "--along", "fz=0:-10:10",
+          "-o", "b.png")),
+        ("h5netcdf", "h5netcdf", "forcefit[sweeps]",
+         ("study", ROOT / "examples/irsbot2.toml", "-o", "b")),
+        ("exudyn", "exudyn", "exudyn",
+         ("study", ROOT / "examples/irsbot2.toml", "-o", "b")),
+        ("cvxpy", "cvxpy", "cvxpy",
+         ("study", ROOT / "examples/irsbot2.toml", "-o", "b")),
+        ("pyvista", "pyvista", "pyvista",
+         ("assembly", "show", "irsbot2", *POSE, "--output", "b.png")),
+        ("exudyn", "exudyn", "exudyn",
+         ("validation", "crosscheck", "irsbot2", *POSE, "--errors",
+          ROOT / "examples/irsbot2_errors.toml")),
+    ],
+)  # fmt: skip
+def test_a_command_without_its_package_says_what_to_install(
+    files, hidden, distribution, cure, words
+):
+    """And it says so before the work: nothing is written."""
+    before = sorted(files.iterdir())
+    status, out, err = run_without(files, hidden, *words)
+    said = err.strip().splitlines()[-1]
+    assert said == (
+        f"forcefit: this command needs the package {distribution}; install {cure}"
+    )
+    assert (status, out) == (2, "")
+    written = {path.name for path in set(files.iterdir()) - set(before)}
+    assert written <= {"sitecustomize.py", "__pycache__"}
+
+
+FEA = ("--base", "z=0", "--tip", "z=1", "--young", "1e9", "--poisson", "0.3")
+
+
+@pytest.mark.parametrize(
+    ("hidden", "said", "words"),
+    [
+        ("meshio", "a.msh: MSH needs the package meshio; install forcefit[msh]",
+         ("stiffness", "fea", "a.msh", *FEA)),
+        ("gmsh", "a.step: STEP needs the package gmsh; install forcefit[gmsh], or "
+         "export the surface as STL", ("stiffness", "fea", "a.step", *FEA)),
+        ("yaml", "a.yaml: YAML needs the package pyyaml; install forcefit[yaml]",
+         ("convert", "a.urdf", "--loops", "a.yaml", "-o", "b.toml")),
+    ],
+)  # fmt: skip
+def test_a_file_without_its_reader_says_what_to_install(files, hidden, said, words):
+    status, out, err = run_without(files, hidden, *words)
+    assert err.strip().splitlines()[-1] == f"forcefit: {said}"
+    assert (status, out) == (2, "")
+
+
+def test_another_missing_module_is_an_error_of_the_program():
+    """It is not the user who can cure it."""
+    with pytest.raises(ModuleNotFoundError), naming_packages():
+        raise ModuleNotFoundError("No module named 'forcefit.x'", name="forcefit.x")
+
+
+def test_every_package_of_an_extra_is_known():
+    """A package that pyproject.toml adds to an extra is named with that extra."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    for extra in set(extras) - {"all", "dev", "docs", "examples", "benchmarks"}:
+        for line in extras[extra]:
+            package = re.split(r"[<>=; ]", line)[0]
+            module = {"pyyaml": "yaml"}.get(package, package)
+            with pytest.raises(
+                BadInput, match=rf"{package}; install forcefit\[{extra}\]"
+            ):
+                with naming_packages():
+                    raise ModuleNotFoundError(name=module)
+        assert re.search(rf"[\[,]{extra}[\],]", extras["all"][0])
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("assembly", "solve", "robot.toml", *POSE, "--json", "{}.json"),
+        ("assembly", "error", "robot.toml", *POSE),
+        ("stiffness", "beam", "--length", "1", "--radius", "0.1", *FEA[4:]),
+    ],
+)
+def test_one_posture_needs_five_packages(tmp_path, words):
+    """Those of LEAST and what they require; the answers are the same as with all."""
+    ff.write_robot(ff.load_robot("irsbot2"), tmp_path / "robot.toml")
+    shown = modules_of(*LEAST) | {*OURS}
+    assert not {"xarray", "cvxpy", "pyvista", "exudyn", "threadpoolctl"} & shown
+    answers = [
+        run_without(
+            tmp_path, "", *(word.format(len(each)) for word in words), shown=each
+        )
+        for each in ((), shown)
+    ]
+    assert answers[0] == answers[1]
+    assert answers[0][0] == 0
