@@ -2,3 +2,5 @@
 
 Begin at ``model/robot.py``, then ``kinematics/posture.py`` and ``linear/energy.py``.
 """
+
+DISTRIBUTION = "forcefit"  # which `import forcefit` looks for

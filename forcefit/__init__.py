@@ -5,11 +5,46 @@ when it is first asked for.  Files come in through :mod:`forcefit.inputs`; the c
 are :mod:`forcefit.commands`.
 """
 
+import os.path
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     __version__: str
+
+_MARK = 'DISTRIBUTION = "forcefit"'  # in each package's __init__.py
+_BESIDE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+
+
+def _refuse_namesakes() -> None:
+    """Refuse to begin where one of the packages is another distribution's.
+
+    Their names are words that others use too: what is first on the path is imported,
+    and in one folder the last one installed has written over the first.
+
+    Raises:
+        ImportError: it says where the other one is.
+    """
+    for name in ("stiffness", "assembly", "validation"):
+        spec = find_spec(name)
+        found = os.path.realpath(spec.origin) if spec and spec.origin else "nothing"
+        if found != os.path.join(_BESIDE, name, "__init__.py") or not _is_ours(found):
+            raise ImportError(
+                f"forcefit: found {found}, expected forcefit's own package {name!r} in "
+                f"{_BESIDE}; remove what has its name, or install forcefit in an "
+                "environment of its own",
+                name=name, path=found,
+            )  # fmt: skip
+
+
+def _is_ours(file: str) -> bool:
+    """Whether a package's first file is of forcefit."""
+    with open(file, encoding="utf-8", errors="replace") as text:
+        return _MARK in text.read()
+
+
+_refuse_namesakes()
 
 # where each public name is defined: the whole of the interface
 _OWNERS = {

@@ -3,3 +3,5 @@
 Begin at ``link.py``, what a link's stiffness is; then ``beam/beam.py`` and
 ``fem/fea.py``, the two ways to it.
 """
+
+DISTRIBUTION = "forcefit"  # which `import forcefit` looks for

@@ -2,3 +2,5 @@
 
 Begin at ``crosscheck/crosscheck.py`` and at ``diagnosis/diagnose.py``.
 """
+
+DISTRIBUTION = "forcefit"  # which `import forcefit` looks for

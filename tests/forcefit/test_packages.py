@@ -1,6 +1,10 @@
 """What is installed with forcefit: extras, the least there must be, and namesakes."""
 
+import os
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -147,3 +151,44 @@ def test_one_posture_needs_five_packages(tmp_path, words):
     ]
     assert answers[0] == answers[1]
     assert answers[0][0] == 0
+
+
+def imported(folders, code="import forcefit"):
+    """Exit status and last line on stderr of a fresh Python that runs some code."""
+    path = os.pathsep.join(map(str, folders))
+    ran = subprocess.run(
+        [sys.executable, "-P", "-c", code], env=os.environ | {"PYTHONPATH": path},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return ran.returncode, (ran.stderr.strip().splitlines() or [""])[-1]
+
+
+@pytest.mark.parametrize("name", OURS[1:])
+@pytest.mark.parametrize("file", ["{}.py", "{}/__init__.py"])
+def test_a_namesake_before_ours_on_the_path_is_named(tmp_path, name, file):
+    other = tmp_path / file.format(name)
+    other.parent.mkdir(exist_ok=True)
+    other.write_text("raise SystemExit('another program was run')\n")
+    status, said = imported([tmp_path, ROOT])
+    assert status == 1
+    assert said.startswith(f"ImportError: forcefit: found {other}, expected forcefit's")
+    assert f"package '{name}' in {ROOT};" in said
+
+
+@pytest.mark.parametrize("name", OURS[1:])
+def test_a_namesake_installed_over_ours_is_named(tmp_path, name):
+    """Two wheels in one folder: the last one's ``__init__.py`` stands there."""
+    for one in OURS:
+        (tmp_path / one).mkdir()
+        shutil.copy(ROOT / one / "__init__.py", tmp_path / one)
+    assert imported([tmp_path]) == (0, "")
+    (tmp_path / name / "__init__.py").write_text("def validate(): ...\n")
+    status, said = imported([tmp_path])
+    assert status == 1
+    assert f"found {tmp_path / name / '__init__.py'}, expected forcefit's own" in said
+
+
+def test_a_folder_of_the_same_name_hides_nothing(tmp_path):
+    """Without ``__init__.py`` it is no package while there is one further on."""
+    (tmp_path / "assembly").mkdir()
+    assert imported([tmp_path, ROOT], "import forcefit, assembly.model") == (0, "")
