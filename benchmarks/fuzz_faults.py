@@ -64,7 +64,7 @@ def may_change(name: str, after: dict[str, bytes]) -> bool:
     """
     if name.endswith("/"):
         return any(other.startswith(name) for other in after)
-    journal = name.endswith(".journal")
+    journal = name.endswith((".journal", ".journal.lock"))
     return journal or (name in after and is_whole(name, after[name]))
 
 

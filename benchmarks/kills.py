@@ -167,7 +167,9 @@ def undisturbed(command: str) -> Case:
     case.seconds = time.monotonic() - began
     assert status == 0, f"{command}: {status}"
     case.files = {p.name: p.read_bytes() for p in Path().glob("out.*")}
-    assert not [name for name in case.files if name.endswith((".part", ".journal"))]
+    assert not [
+        name for name in case.files if name.endswith((".part", ".journal", ".lock"))
+    ]
     path = Path("out.nc.journal")
     if "five_bar" in command and "tolerances" not in command:
         child = start(case.words)
@@ -220,7 +222,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
-        before = set(Path().glob("*.part"))  # of one that was killed
+        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed one
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)
@@ -278,7 +280,7 @@ def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
     """Files that are not whole; politely stopped, nothing may be beside one."""
     different = 0
     for path in Path().glob("out.*"):
-        if path.suffix == ".part":
+        if path.suffix in {".part", ".lock"}:
             left = status in {2, 130} and path not in before
             counts["left beside a file"] += left
         elif path.suffix != ".journal":

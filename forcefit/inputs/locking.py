@@ -1,23 +1,24 @@
 """Files that one program at a time may write.
 
-The lock is the operating system's (``flock``): it ends with the program that holds it.
-Where there is none (Windows, some network disks) nothing is locked.
+The lock is the operating system's, on a file ``FILE.lock`` beside the file; it ends
+with the program that holds it.  A killed one leaves ``FILE.lock``, which the next takes
+away.
 """
 
-import os
+import errno
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+_NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}  # some network disks
+_POLL = 0.01  # [s] between looks at a file that another program has locked
 
 
 @contextmanager
 def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
     """Lock a file against other programs.
+
+    Where the package filelock is missing, or a disk has no locks, nothing is locked.
 
     Args:
         path: of the file, created if it is absent.  The program with the lock may
@@ -31,34 +32,33 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
         BlockingIOError: another program has locked it, and ``wait`` is False.
         OSError: it cannot be opened.
     """
-    if fcntl is None:  # and no open file can be renamed there
+    with _lock(path.with_name(path.name + ".lock"), wait):
         path.touch()
         yield
-        return
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            _lock(handle, wait)
-            if _stands_at(handle, path):
-                yield
-                return
-            # renamed or removed by the other program: there may be a new file
-        finally:
-            os.close(handle)
 
 
-def _lock(handle: int, wait: bool) -> None:
-    """Lock an open file, if its file system supports locks."""
+@contextmanager
+def _lock(beside: Path, wait: bool) -> Generator[None, None, None]:
+    """Hold the lock on a file that stands beside another, and is removed."""
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        raise
-    except OSError:  # a disk without locks
+        from filelock import FileLock, Timeout
+    except ModuleNotFoundError:  # the least that forcefit is installed with
+        yield
         return
-
-
-def _stands_at(handle: int, path: Path) -> bool:
-    """Whether an open file is still the one at its path."""
-    with suppress(FileNotFoundError):
-        return os.path.samestat(os.fstat(handle), path.stat())
-    return False
+    lock = FileLock(beside, thread_local=False, poll_interval=_POLL)
+    try:
+        try:
+            lock.acquire(timeout=-1 if wait else 0)
+        except Timeout:
+            raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(beside)) from None
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise
+        yield
+    finally:
+        # while it is held: who waits for it sees that it is gone, and makes another;
+        # where no open file can be removed (Windows), releasing it does that
+        if lock.is_locked:
+            with suppress(OSError):
+                beside.unlink()
+            lock.release()

@@ -149,7 +149,7 @@ def whole_file(path: Path | str) -> Generator[Path, None, None]:
         with locked_file(part):
             try:
                 yield part
-                with part.open("rb") as file:
+                with part.open("r+b") as file:  # Windows syncs what may be written
                     os.fsync(file.fileno())
                 if real.exists():
                     shutil.copymode(real, part)
@@ -196,6 +196,8 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
     try:
         part.mkdir()
         yield part
+        if folder.is_dir():  # empty; Windows replaces no folder
+            folder.rmdir()
         part.replace(folder)
     except OSError as error:
         raise BadInput(unwritable(folder, error)) from None

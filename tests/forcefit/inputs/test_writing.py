@@ -247,6 +247,7 @@ def test_what_a_killed_program_left_is_replaced(tmp_path):
             os.kill(os.getpid(), signal.SIGKILL)
             time.sleep(60)
     os.waitpid(child, 0)
-    assert [p.name for p in tmp_path.iterdir()] == ["x.txt.part"]
+    left = sorted(p.name for p in tmp_path.iterdir())
+    assert left == ["x.txt.part", "x.txt.part.lock"]
     write_text("whole", path)
     assert [p.read_text() for p in tmp_path.iterdir()] == ["whole"]

@@ -1,0 +1,88 @@
+"""Locks on files, and systems that lack what POSIX has."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from forcefit.inputs.locking import locked_file
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_a_locked_file_is_refused_until_it_is_let_go(tmp_path):
+    """In the same process too: a run that begins another of the same file."""
+    path = tmp_path / "map.nc.journal"
+    with locked_file(path):
+        with pytest.raises(BlockingIOError), locked_file(path, wait=False):
+            pass
+        assert path.exists()
+    with locked_file(path, wait=False):
+        path.unlink()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_that_a_killed_program_left_stops_nobody(tmp_path):
+    path = tmp_path / "map.nc.journal"
+    held = f"""
+import os
+from pathlib import Path
+from forcefit.inputs.locking import locked_file
+with locked_file(Path({str(path)!r})):
+    os._exit(9)
+"""
+    search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+    ran = subprocess.run([sys.executable, "-c", held], env=os.environ | search)
+    assert ran.returncode == 9
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        path.name,
+        f"{path.name}.lock",
+    ]
+    with locked_file(path, wait=False):
+        pass
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+WITHOUT_POSIX = """
+import os, sys, warnings
+for module in ("fcntl", "resource", "pwd", "grp", "termios", "readline"):
+    sys.modules[module] = None
+for name in ("fork", "forkpty", "getuid", "killpg", "mkfifo", "sysconf"):
+    delattr(os, name)
+warnings.simplefilter("ignore")  # filelock's: there is no lock of the system
+"""
+COMMAND = """
+from forcefit.commands.app import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(
+            "assembly sweep irsbot2 --grid tx=0:0.1:0.1,tz=-0.5 -o {}.nc --csv {}.csv",
+            marks=pytest.mark.slow,
+        ),
+        "assembly solve irsbot2 --pose tx=0.1,tz=-0.5 --json {}.json",
+    ],
+)
+def test_a_command_needs_nothing_that_only_posix_has(tmp_path, words):
+    """Modules and functions that Windows lacks: the same answer without them.
+
+    Only what runs in the command's own process is tried.
+    """
+    search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+    answers = []
+    for name, before in (("a", WITHOUT_POSIX), ("b", "")):
+        ran = subprocess.run(
+            [sys.executable, "-c", before + COMMAND, *words.format(name, name).split()],
+            cwd=tmp_path, env=os.environ | search, capture_output=True, text=True,
+        )  # fmt: skip
+        answers.append((ran.returncode, ran.stdout.replace(f"{name}.", "*.")))
+    assert answers[0] == answers[1]
+    assert answers[0][0] == 0
+    written = [p.suffix for p in tmp_path.iterdir() if p.stem in {"a", "b"}]
+    assert all(written.count(suffix) == 2 for suffix in written)
