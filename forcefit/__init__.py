@@ -6,10 +6,9 @@ are :mod:`forcefit.commands`.
 """
 
 import os.path
-from importlib import import_module
-from importlib.util import find_spec
-from typing import TYPE_CHECKING
+import sys
 
+TYPE_CHECKING = False  # importing typing takes longer than all that is done here
 if TYPE_CHECKING:
     __version__: str
 
@@ -27,8 +26,7 @@ def _refuse_namesakes() -> None:
         ImportError: it says where the other one is.
     """
     for name in ("stiffness", "assembly", "validation"):
-        spec = find_spec(name)
-        found = os.path.realpath(spec.origin) if spec and spec.origin else "nothing"
+        found = _place_of(name)
         if found != os.path.join(_BESIDE, name, "__init__.py") or not _is_ours(found):
             raise ImportError(
                 f"forcefit: found {found}, expected forcefit's own package {name!r} in "
@@ -36,6 +34,22 @@ def _refuse_namesakes() -> None:
                 "environment of its own",
                 name=name, path=found,
             )  # fmt: skip
+
+
+def _place_of(name: str) -> str:
+    """First file of the package that would be imported, or ``"nothing"``.
+
+    Args:
+        name: of the package.
+
+    Returns:
+        The path; ``importlib.util``, which could say it, takes long to import.
+    """
+    for finder in sys.meta_path:
+        spec = finder.find_spec(name, None)
+        if spec is not None:
+            return os.path.realpath(spec.origin) if spec.origin else "nothing"
+    return "nothing"
 
 
 def _is_ours(file: str) -> bool:
@@ -106,6 +120,8 @@ def __getattr__(name: str) -> object:
         return _version()
     if name not in _OWNER_OF:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(_OWNER_OF[name]), name)
 
 

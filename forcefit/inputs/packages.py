@@ -6,7 +6,6 @@ said in one line by :func:`naming_packages`, which the command line wraps around
 
 from collections.abc import Generator
 from contextlib import contextmanager
-from importlib.util import find_spec
 
 from forcefit.inputs.errors import BadInput
 
@@ -74,6 +73,8 @@ def need(*packages: str) -> None:
     Raises:
         ModuleNotFoundError: the first of them that is missing.
     """
+    from importlib.util import find_spec
+
     for package in packages:
         if find_spec(package) is None:
             raise ModuleNotFoundError(f"No module named {package!r}", name=package)
