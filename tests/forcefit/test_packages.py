@@ -1,5 +1,6 @@
 """What is installed with forcefit: extras, the least there must be, and namesakes."""
 
+import json
 import os
 import re
 import shutil
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 
+import numpy as np
 import pytest
 
 import forcefit as ff
@@ -106,6 +108,31 @@ def test_a_file_without_its_reader_says_what_to_install(files, hidden, said, wor
     status, out, err = run_without(files, hidden, *words)
     assert err.strip().splitlines()[-1] == f"forcefit: {said}"
     assert (status, out) == (2, "")
+
+
+def test_without_mujoco_a_conversion_says_that_nothing_was_compared(tmp_path):
+    """It is a second reader; the conversion itself does not need it."""
+    status, out, err = run_without(tmp_path, "mujoco", "convert", "arm6", "-o", "b.xml")
+    assert (status, err) == (0, "")
+    assert "b.xml was compared with no other program: MuJoCo is not installed" in out
+    assert (tmp_path / "b.xml").is_file()
+
+
+@pytest.mark.slow
+def test_without_mkl_finite_elements_give_the_same(tmp_path):
+    """SciPy's factorisation of the same mesh: only rounding is another."""
+    surface = ROOT / "meshes/distal_plain.stl"
+    held = ("--base", "z=0", "--tip", "z=0.452", *FEA[4:], "--accuracy", "0.05")
+    found = []
+    for hidden in ("", "pypardiso"):
+        words = ("stiffness", "fea", surface, *held, "--json", "-")
+        status, out, err = run_without(tmp_path, hidden, *words)
+        assert status == 0, err
+        found.append(json.loads(out))
+    assert found[1]["mesh"]["solver"] == "SuperLU"
+    one, other = (np.array(each["stiffness"]) for each in found)
+    scale = np.sqrt(np.outer(one.diagonal(), one.diagonal()))
+    assert np.abs((other - one) / scale).max() < 1e-9
 
 
 def test_another_missing_module_is_an_error_of_the_program():
