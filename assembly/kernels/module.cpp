@@ -4,6 +4,7 @@
 
 NB_MODULE(MODULE, m) {
     m.attr("lanes") = LANE_SPACE::LANES;
+    m.attr("sources") = SOURCES;  // a digest of what it was made from
     bind_linear(m);
     bind_kinematics(m);
     bind_solvers(m);

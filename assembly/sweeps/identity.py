@@ -18,6 +18,7 @@ import assembly
 import forcefit.inputs
 import stiffness
 from assembly.files.robot_file import robot_table
+from assembly.kernels.choice import kernels
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_solution
 from assembly.model.robot import LibraryLink, MeshLink, Robot
@@ -38,6 +39,7 @@ def program_hash() -> str:
             source = path.read_bytes().replace(b"\r\n", b"\n")
             name = path.relative_to(root.parent).as_posix()
             digest.update(f"{name} {len(source)}\n".encode() + source)
+    digest.update(kernels.sources.encode())
     versions = [f"{name} {version(name)}" for name in ("forcefit", *_LIBRARIES)]
     digest.update("\n".join(versions).encode())
     return digest.hexdigest()
