@@ -3,6 +3,7 @@
 #include "solvers/real.h"
 
 NB_MODULE(MODULE, m) {
+    nanobind::set_leak_warnings(false);  // robots stay known until the program ends
     m.attr("lanes") = LANE_SPACE::LANES;
     m.attr("sources") = SOURCES;  // a digest of what it was made from
     bind_linear(m);
