@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
+from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import (
     VirtualJoints,
@@ -82,8 +83,6 @@ class PostureMargins:
         Raises:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
-        from assembly.batch.compiled_draws import least_margins
-
         errors = np.asarray(errors, dtype=float)
         count, n = len(errors), len(self.posture.robot.frames)
         if errors.shape != (count, n, 6) or not np.isfinite(errors).all():
@@ -94,7 +93,8 @@ class PostureMargins:
         margin, bound = np.zeros(count), np.zeros(count)
         q, unit = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
         if len(self.B):
-            least_margins(self.B, self.starts, e @ self.K.T, margin, bound, q)
+            right = np.ascontiguousarray(e @ self.K.T)
+            kernels.least_margins(self.B, self.starts, right, margin, bound, q)
         infeasible = np.abs(e @ self.infeasible.T).max(axis=1, initial=0.0)
         no_factor = infeasible > _CLEARLY_INFEASIBLE
         margin[no_factor] = bound[no_factor] = np.inf

@@ -7,3 +7,4 @@
 void bind_linear(nanobind::module_ &m);
 void bind_kinematics(nanobind::module_ &m);
 void bind_solvers(nanobind::module_ &m);
+void bind_statistics(nanobind::module_ &m);

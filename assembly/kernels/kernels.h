@@ -30,7 +30,8 @@ void interior_point(const ConeProblem &given, const Limits &limits, double *u, d
 void newton(const ConeProblem &given, const Limits &limits, double *u, double *y);
 
 // Overwrites lower and upper bound (2,), and the screw (6,) that attains the lower; how
-// many support functions it took, or -1 where the bounds are not as close as asked.
+// many support functions it took: where these were too many the bounds are wider than
+// asked.
 int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
 
 // Follows every target along its straight line.
@@ -39,3 +40,18 @@ void follow_all(const Tree &tree, const Targets &targets, Tracks &out);
 // Least energies (22) of `count` draws, rows of h (count, r).
 void least_energies(
     const Reduced &reduced, const double *h, int64_t count, DrawEnergies &out);
+
+// Least margins (21) of draws.
+void least_margins(const SharedRows &given, DrawMargins &out);
+
+// Farthest points of a set along directions.
+void farthest_points(const Directions &asked, FarthestPoints &out);
+
+// Points (chains, nu) close to the boundary, from u (nu,) in random directions.
+void start_chains(
+    const Ellipsoid &given, const double *u, bitgen *random, int64_t chains, double *walks);
+
+// A billiard walk from u (nu,), which is overwritten; its platform screws (kept, 6).
+void billiard_walk(
+    const Ellipsoid &given, const Trajectories &asked, bitgen *random, double *u,
+    double *trace);

@@ -9,4 +9,5 @@ NB_MODULE(MODULE, m) {
     bind_linear(m);
     bind_kinematics(m);
     bind_solvers(m);
+    bind_statistics(m);
 }

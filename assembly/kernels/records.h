@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 
 // A robot: assembly/linear/robot_structure.py's Structure, and how many there are.
 struct Robot {
@@ -93,6 +94,25 @@ struct AskedBody {
     const int64_t *starts;                      // (cones + 1,)
     const double *centre, *map, *rows, *start;  // (6,), (6, nv), (p, nv), (nv,)
     double tolerance;
+    // where a support function is not found here: of a direction (3,) its certified
+    // height, the screw (6,) that attains it, and the gradient X^T d - H^T n (nv,)
+    std::function<void(const double *, double *, double *, double *)> support;
+};
+
+// A set {|u_k| <= 1 for each cone k, H u = e}, whose right sides e may differ, and what is
+// asked of it: count directions d of length 1, each with what may be left of d.u.
+struct Directions {
+    int64_t count, p, cones;
+    const int64_t *starts;                                  // (cones + 1,)
+    const double *rows, *directions, *right, *tolerance;  // (p, nu), (count, nu),
+                                                          // (count, p), (count,)
+};
+
+// The farthest points, one row a direction: u (count, nu), the multipliers (count, p) of
+// H u = e, and whether the method came as close as asked.
+struct FarthestPoints {
+    double *points, *multipliers;
+    int64_t *solved;
 };
 
 // A robot's frames, in the order of their parents: fixed (n, 4, 4) transforms, kinds of
@@ -138,3 +158,33 @@ struct DrawEnergies {
     double *u, *y, *energy, *bound;
     int64_t *outcome;
 };
+
+// Rows B (p, nu), orthonormal, that draws at a posture share in (21), with a right side w
+// (count, p) for each.
+struct SharedRows {
+    int64_t count, p, cones;
+    const int64_t *starts;  // (cones + 1,)
+    const double *rows, *right;
+};
+
+// One row a draw: the margin, NaN where its certificate falls short; its certified lower
+// bound; multipliers (count, p) that prove it, multipliers.w = bound.
+struct DrawMargins {
+    double *margin, *bound, *multipliers;
+};
+
+// Unit cones of positions u (nu,), and in columns (nu, n) the axes M of Dikin's ellipsoid
+// there, with M M^T.
+struct Ellipsoid {
+    int64_t nu, n, cones;
+    const double *axes, *gram;
+    const int64_t *starts;  // (cones + 1,)
+};
+
+// Trajectories of a walk, `every` of them between two platform screws that are kept.
+struct Trajectories {
+    int64_t kept, every;
+    const double *to_screw;  // (6, nu)
+};
+
+struct bitgen;  // NumPy's generator of random bits

@@ -15,7 +15,7 @@ bound of the motion, the sum over the cones of |A_q^+ A_v|, passes it.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,9 +48,6 @@ from assembly.solvers.conic import (
 )
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
-
-if TYPE_CHECKING:
-    from assembly.solvers.support import ConvexBody
 
 READINGS = ("frozen", "free", "budget")
 # by which squares of cones may be exceeded: solutions are hardly better, and a cone
@@ -201,33 +198,17 @@ class ReachableSet:
         """
         if self.unbounded(part):
             return (np.inf, np.inf), self.centre, 0
-        solved = one_problem.farthest(
-            self.centre, self.map, self.rows, self.start, self.starts, part, tolerance
-        )
-        if solved is not None:
-            (low, high), screw, supports = solved
-            return (float(low), float(high)), screw, supports
-        from assembly.solvers.farthest import NEEDED, begin_search, search_on
+        half = np.eye(6)[part : part + 3]
 
-        body = self.body
-        search, nothing = begin_search(body, part, tolerance), np.zeros(0)
-        state = search_on(body, search, 0.0, nothing, nothing)
-        while state == NEEDED:
-            s = self.support(search.direction @ np.eye(6)[part : part + 3])
-            state = search_on(body, search, s.height, s.screw, s.gradient)
-        low, high = search.bounds.tolist()
-        return (low, high), search.best, int(search.counts[1])
+        def along(direction: NDArray) -> tuple[float, NDArray, NDArray]:
+            found = self.support(direction @ half)
+            return found.height, found.screw, found.gradient
 
-    @property
-    def body(self) -> "ConvexBody":
-        """The set as the compiled search reads it."""
-        from assembly.solvers.support import ConvexBody
-
-        centre, X, H, start = (
-            np.require(a, requirements=["C", "W"])
-            for a in (self.centre, self.map, self.rows, self.start)
-        )
-        return ConvexBody(centre, X, H, start, self.starts)
+        (low, high), screw, supports = one_problem.farthest(
+            self.centre, self.map, self.rows, self.start, self.starts, part, tolerance,
+            along,
+        )  # fmt: skip
+        return (float(low), float(high)), screw, supports
 
     @property
     def starts(self) -> NDArray:

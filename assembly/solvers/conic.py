@@ -2,8 +2,8 @@
 
 There are two problems: the least energy of a reduced problem (22), and the least factor
 on the clearances of problem (21).  Both are scaled here to size 1.  The first is solved
-by the compiled method of :mod:`assembly.solvers.interior`, with Clarabel as its
-fallback; each solution is refined by :mod:`assembly.solvers.dual_newton`.  The
+by the compiled interior-point method, with Clarabel as its fallback; each solution is
+refined by Newton's method on the dual (:mod:`assembly.solvers.one_problem`).  The
 certified gap, which does not depend on the solvers, decides which solution is kept.
 
 Sources:
@@ -161,23 +161,11 @@ def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
     """The interior-point method of this package; its solution must satisfy H."""
-    starts = cone_starts(group)
-    solution = one_problem.interior_point((G, h, d, H, k), starts, _GAP_WITHIN)
-    if solution is None:
-        from assembly.solvers.cone_solvers import interior_point
-
-        rows = _writable(G, h, d, H, k)
-        solution = interior_point(*rows, starts, _GAP_WITHIN)[:2]
-    u, n = solution
+    u, n = one_problem.interior_point((G, h, d, H, k), cone_starts(group), _GAP_WITHIN)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
         return None, -n, "no feasible point found"
     return u, -n, "Solved"
-
-
-def _writable(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Arrays as compiled loops take them."""
-    return tuple(np.require(array, requirements=["C", "W"]) for array in arrays)
 
 
 def cone_starts(group: NDArray) -> NDArray:
@@ -232,13 +220,7 @@ def _certified(
     relative = _STOP * GAP
     absolute = _STOP * GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     limits = one_problem.SolverLimits(relative, absolute, _FIRST_SIGMA, _STEPS)
-    if not one_problem.newton((G, h, d, H, k), starts, limits, u, y):
-        from assembly.solvers.cone_solvers import newton
-        from assembly.solvers.dual_newton import Dual
-
-        Gt, right, d = _writable(np.vstack([G, H]).T, np.concatenate([h, -k]), d)
-        dual = Dual(Gt, right, d, len(h), starts, relative, absolute)
-        newton(dual, _STEPS, _FIRST_SIGMA, u, y)
+    one_problem.newton((G, h, d, H, k), starts, limits, u, y)
     u = into_cones(u, group)
     if np.isfinite(u).all() and np.isfinite(y).all():
         if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:

@@ -1,19 +1,19 @@
-"""One cone programme, and one body's farthest screw, compiled.
+"""Cone programmes with cones of any size, and a body's farthest screw, compiled.
 
-The same equations and thresholds as :mod:`assembly.solvers.interior`,
-:mod:`assembly.solvers.dual_newton`, and :mod:`assembly.solvers.farthest`, for cones of
-any size.
+One problem at a time; :func:`farthest_points` has many of one set side by side.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kernels.choice import kernels
-from forcefit.native.libraries import numba_alone
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
+# of a direction: certified height, (6,) screw that (nearly) attains it, (nv,) gradient
+Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
 class SolverLimits(NamedTuple):
@@ -34,7 +34,7 @@ class SolverLimits(NamedTuple):
 
 def interior_point(
     problem: Problem, starts: NDArray, tolerance: float
-) -> tuple[NDArray, NDArray] | None:
+) -> tuple[NDArray, NDArray]:
     """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_k| <= 1 for each cone.
 
     Args:
@@ -43,11 +43,8 @@ def interior_point(
         tolerance: gap asked for.
 
     Returns:
-        u (nu,) and the multipliers (p,) of H, as far as the method came; None where
-        callers asked for numba.
+        u (nu,) and the multipliers (p,) of H, as far as the method came.
     """
-    if numba_alone():
-        return None
     _, h, d, _, k = problem
     u, y = np.zeros(len(d)), np.zeros(len(h) + len(k))
     kernels.interior_point(*_contiguous(*problem), _integers(starts), tolerance, u, y)
@@ -56,7 +53,7 @@ def interior_point(
 
 def newton(
     problem: Problem, starts: NDArray, limits: SolverLimits, u: NDArray, y: NDArray
-) -> bool:
+) -> None:
     """The same by Newton's method on the dual.
 
     Args:
@@ -66,20 +63,42 @@ def newton(
         u: (nu,) first guess within the cones; overwritten with the solution.
         y: (r + p,) overwritten with the multipliers of G's rows, and of H's, which are
             a first guess too.
+    """
+    kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
+
+
+def farthest_points(
+    rows: NDArray, starts: NDArray, directions: NDArray, right: NDArray,
+    tolerance: NDArray,
+) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
+    """Maximise d.u over {rows u = right, |u_k| <= 1 for each cone} for many d.
+
+    Args:
+        rows: (p, nu) of full row rank.
+        starts: (cones + 1,) first column of each cone, and nu.
+        directions: (k, nu) d, of length 1.
+        right: (k, p).
+        tolerance: (k,) of d.u.
 
     Returns:
-        Whether it did; not where callers asked for numba.
+        u (k, nu) and the multipliers n (k, p) of the rows, as far as the method came:
+        d.u <= n.right + sum |(d - rows^T n)_c|; (k,) bool, whether both are as close
+        as asked and the rows hold to rounding.
     """
-    if numba_alone():
-        return False
-    kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
-    return True
+    count, (p, nu) = len(directions), rows.shape
+    points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
+    solved = np.zeros(count, dtype=np.int64)
+    rows, *asked = _contiguous(rows, directions, right, tolerance)
+    kernels.farthest_points(
+        rows, _integers(starts), *asked, points, multipliers, solved
+    )
+    return points, multipliers, solved > 0
 
 
 def farthest(
     centre: NDArray, X: NDArray, H: NDArray, start: NDArray, starts: NDArray,
-    half: int, tolerance: float,
-) -> tuple[NDArray, NDArray, int] | None:  # fmt: skip
+    half: int, tolerance: float, support: Support,
+) -> tuple[NDArray, NDArray, int]:  # fmt: skip
     """Bracket the largest size of half a screw in {centre + X (v - start)}.
 
     Args:
@@ -90,20 +109,27 @@ def farthest(
         starts: (cones + 1,) first column of each cone, and nv.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] asked of upper minus lower bound.
+        support: of a direction (3,) of that half, its gradient X^T d less what the
+            rows' multipliers take; asked where the compiled method does not come close
+            enough.
 
     Returns:
         (2,) lower and upper bound, (6,) the screw that attains the lower, and how many
-        support functions it took; None where callers asked for numba, or bounds did
-        not come as close.
+        support functions it took: no more than 400, with which the bounds may be wider
+        than asked.
     """
-    if numba_alone():
-        return None
+
+    def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:
+        height, *rows = support(np.array(direction))
+        attains, gradient = _contiguous(*rows)
+        return height, attains, gradient
+
     bounds, screw = np.zeros(2), np.zeros(6)
     supports = kernels.farthest(
-        *_contiguous(centre, X, H, start), _integers(starts), half, tolerance, bounds,
-        screw,
+        *_contiguous(centre, X, H, start), _integers(starts), half, tolerance, asked,
+        bounds, screw,
     )  # fmt: skip
-    return None if supports < 0 else (bounds, screw, supports)
+    return bounds, screw, supports
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:

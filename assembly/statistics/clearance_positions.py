@@ -162,10 +162,9 @@ def _at_contact(
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
     directions = wrenches @ prepared.screws[:, : clearances.shape[1]]
-    positions, ends = np.ascontiguousarray(clearances), np.empty_like(clearances)
-    move_to_contact(rows, prepared.starts, free, positions, directions, ends)
+    ends = move_to_contact(rows, prepared.starts, free, clearances, directions)
     for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
-        ends[k] = _contact_fallback(prepared, rows, free, positions[k], directions[k])
+        ends[k] = _contact_fallback(prepared, rows, free, clearances[k], directions[k])
     return ends
 
 

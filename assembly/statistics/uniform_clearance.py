@@ -45,7 +45,7 @@ def sample_uniform_position(
     Returns:
         Whether the chains mixed; u is unchanged where the set has empty interior.
     """
-    from assembly.statistics.billiard_walk import Positions, start_chains, walk
+    from assembly.statistics.billiard_walk import Positions
 
     if Z.shape[1] == 0:
         return True
@@ -53,14 +53,14 @@ def sample_uniform_position(
     if ellipsoid is None:
         return False
     centre, M = ellipsoid
-    positions = Positions(M, M @ M.T, starts, to_screw)
+    positions = Positions(M, starts, to_screw)
     walks = np.empty((CHAINS, len(u)))
-    start_chains(M, starts, centre, rng, walks)
+    positions.start_chains(centre, rng, walks)
     trace = np.empty((CHAINS, KEPT, 6))
     mixed = False
     for k in range(doublings):
         for c in range(CHAINS):
-            walk(positions, walks[c], 2**k, rng, trace[c])
+            positions.walk(walks[c], 2**k, rng, trace[c])
         mixed = is_mixed(trace)
         if mixed:
             break

@@ -12,8 +12,6 @@ Under a load the same holds for energy minus work: only clearances that no load 
 are free.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,15 +21,13 @@ from assembly.linear.energy import CannotAssemble
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
+from assembly.solvers.one_problem import farthest_points
 from assembly.statistics.clearance_positions import (
     clearance_constraints,
     free_starts,
     loaded_clearances,
 )
 from assembly.statistics.quantities import POSE_ERRORS
-
-if TYPE_CHECKING:
-    from assembly.solvers.support import ConvexBody
 
 READING = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
@@ -129,35 +125,38 @@ def worst_error_slopes(
         (k, 6) slopes of the largest error with the platform's screw, and (k, nu)
         multipliers of the bounds of the clearances that carry no load.
     """
-    from assembly.solvers.support import gradient_along
-
     part = 3 * POSE_ERRORS.index(key)
     size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    for i in range(len(screws)):
-        free = ~loaded[i]
+    # [rad or m] by clearances; those that press on their cones' bounds stay
+    along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
+    patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
+    for k, pattern in enumerate(patterns):
+        free, own = ~pattern, np.flatnonzero(pattern_of.ravel() == k)
         if free.any():
-            body = _remaining_screws(prepared, draws, i, free)
-            direction = by_screw[i, part : part + 3].copy()
-            by_clearance[i, free] = gradient_along(
-                body, part, direction, _SUPPORT_PRECISION
-            )
+            by_clearance[np.ix_(own, free)] = _pressing(
+                prepared, free, along[np.ix_(own, free)],
+                draws.clearances[np.ix_(own, free)],
+            )  # fmt: skip
     return by_screw, by_clearance
 
 
-def _remaining_screws(
-    prepared: OnePosture, draws: Draws, i: int, free: NDArray
-) -> "ConvexBody":
-    """The set of possible platform screws of draw i."""
-    from assembly.solvers.support import ConvexBody
-
-    nu = len(free)
+def _pressing(
+    prepared: OnePosture, free: NDArray, along: NDArray, clearances: NDArray
+) -> NDArray:
+    """(k, ..) directions (k, ..) of free clearances, less what equations take."""
     rows = clearance_constraints(prepared, ~free)[:, free]
-    return ConvexBody(
-        draws.platform_screw[i].copy(),
-        np.ascontiguousarray(prepared.screws[:, :nu][:, free]),
-        np.ascontiguousarray(rows),
-        draws.clearances[i, free].copy(), free_starts(prepared, free),
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    moving = size[:, 0] > 0.0
+    if not len(rows) or not moving.any():
+        return along
+    size = size[moving]
+    _, multipliers, _ = farthest_points(
+        rows, free_starts(prepared, free), along[moving] / size,
+        clearances[moving] @ rows.T, _SUPPORT_PRECISION / size[:, 0],
     )  # fmt: skip
+    pressing = along.copy()
+    pressing[moving] -= multipliers * size @ rows
+    return pressing

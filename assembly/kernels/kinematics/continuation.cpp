@@ -1,4 +1,4 @@
-// Continuation to several targets side by side: compiled_continuation.py in lanes.
+// Continuation to several targets side by side.
 //
 // Each lane follows a target of its own, and takes the next one where its own ends.  A
 // round is one iteration of Newton's method in every lane; what comes of it each lane
@@ -8,11 +8,22 @@
 
 using namespace LANE_SPACE;
 
-// assembly/kinematics/compiled_continuation.py, which says what they are
-constexpr double SOLVED = 1e-10, ROUNDED = 1e-5, NEAR = 1e-4, JUMP = 0.4, FAR = 1.0;
-constexpr double LONG = 0.7, SHORT = 0.03, FIRST_STEP = 0.125, CURVED = 0.25;
-constexpr double LEAST = 1e-13, SPREAD = 1e-9, SMALLEST_STEP = 1e-5;
-constexpr int NEWTON = 12;
+constexpr double SOLVED = 1e-10;  // scaled residual of a configuration that is solved
+constexpr double ROUNDED = 1e-5;  // accepted where it cannot be made smaller
+constexpr double NEAR = 1e-4;     // accepted on the way
+constexpr double JUMP = 0.4;  // [rad or lengths] most in a step: keeps the assembly mode
+constexpr double FAR = 1.0;   // the same where the tangent is a guide to the whole step
+constexpr double LONG = 0.7;  // of it: the step that is tried, by the tangent
+constexpr double SHORT = 0.03;  // of the way: where long steps lead nowhere
+// there, and where the target does not determine all joints
+constexpr double FIRST_STEP = 0.125;
+constexpr double CURVED = 0.25;  // of the tangent's step: largest correction of it
+// damping, of the normal matrix' trace, where all joints are determined; where some are
+// not, rounding moves those by its own size over the damping, and with less they would
+// stand elsewhere on every processor
+constexpr double LEAST = 1e-13, SPREAD = 1e-9;
+constexpr double SMALLEST_STEP = 1e-5;
+constexpr int NEWTON = 12;  // iterations; quadratic convergence needs about 4
 constexpr double ENDLESS = HUGE_VAL;
 
 namespace {

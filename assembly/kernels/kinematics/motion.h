@@ -1,5 +1,5 @@
 // What a robot leaves open of its closures and of its platform's pose, in every lane, and
-// the step of Newton's method that closes it: compiled_continuation.py in lanes.
+// the step of Newton's method that closes it.
 #pragma once
 
 #include "../records.h"

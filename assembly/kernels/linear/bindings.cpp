@@ -169,6 +169,22 @@ void call_least_energies(
     least_energies(own, rows, k.value, out);
 }
 
+void call_least_margins(
+    nb::handle B, nb::handle cones, nb::handle right, nb::handle margin,
+    nb::handle bound, nb::handle multipliers) {
+    Size p, nu, ends, k;
+    SharedRows own;
+    own.rows = reals(B, "B", p, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.right = reals(right, "right", k, p);
+    own.count = k.value, own.p = p.value, own.cones = ends.value - 1;
+    DrawMargins out = {
+        address<double>(margin, "margin", k), address<double>(bound, "bound", k),
+        address<double>(multipliers, "multipliers", k, p)};
+    const nb::gil_scoped_release others;
+    least_margins(own, out);
+}
+
 }  // namespace
 
 void bind_linear(nb::module_ &m) {
@@ -204,4 +220,8 @@ void bind_linear(nb::module_ &m) {
         nb::arg("gram"), nb::arg("d").none(), nb::arg("slip"), nb::arg("slack"),
         nb::arg("stored"), nb::arg("h"), nb::arg("u"), nb::arg("y"), nb::arg("energy"),
         nb::arg("bound"), nb::arg("outcome"));
+    m.def(
+        "least_margins", &call_least_margins,
+        nb::arg("B"), nb::arg("starts"), nb::arg("right"), nb::arg("margin"),
+        nb::arg("bound"), nb::arg("multipliers"));
 }

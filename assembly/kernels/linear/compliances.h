@@ -1,5 +1,12 @@
-// The classical compliance at several postures side by side: compiled_compliance.py in
-// lanes.
+// The classical compliance at several postures side by side.  For a unit wrench e on the
+// platform the closures carry lambda = lambda_e + Z^T mu: the first lets no free motion
+// work, the second makes the springs' energy
+//
+//     |y|^2 / 2,   y = B e + Y^T mu,    Y = Z A_y,   B e = the springs under e and lambda_e
+//
+// least.  Every spring's y under the six unit wrenches is its part of the compliance, C =
+// sum of y y^T (Castigliano).  As exact as problem (22): no compliances are added before
+// anything is eliminated.
 #pragma once
 
 #include "reduction.h"
@@ -7,7 +14,7 @@
 namespace LANE_SPACE {
 
 enum { COMPLIANT, LOOSE, UNCLEAR };
-constexpr double STILL = 1e-9;
+constexpr double STILL = 1e-9;  // of a unit wrench's work on a free motion: none
 
 // Blocks of points of one robot, one after the other.
 class Compliance : public Reduction {

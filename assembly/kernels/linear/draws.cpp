@@ -1,6 +1,5 @@
-// Problem (22) for many right sides h at one posture, several side by side:
-// compiled_draws.py's least_energies in lanes.  The certificate is from matrices made
-// once of the columns before any elimination.
+// Problem (22) for many right sides h at one posture, several side by side.  The
+// certificate is from matrices made once of the columns before any elimination.
 //
 // ========  ========  =================================================================
 // G, h      (r, nu)   strains by clearances, shared, and by each draw's errors
@@ -15,7 +14,7 @@
 
 using namespace LANE_SPACE;
 
-// assembly/solvers/conic.py and assembly/batch/compiled_draws.py
+// assembly/solvers/conic.py; the solvers stop at a fraction of the accepted gap
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12, STOP = 1e-2, INWARDS = 0.8;
 constexpr int PROJECTIONS = 30;
 enum { SOLVED, UNCERTIFIED };

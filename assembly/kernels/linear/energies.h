@@ -1,5 +1,9 @@
 // Problem (22) at several postures side by side, from the frames' poses to the certified
-// answer: compiled_energy.py in lanes.
+// answer.
+//
+// Points that this does not cover go to the reference, with a code for the reason.  A point
+// counts as solved only if its certificate, computed from the wrenches on the problem
+// before any elimination, proves the gap asked for.
 #pragma once
 
 #include "loads.h"
@@ -10,9 +14,9 @@ namespace LANE_SPACE {
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
 // assembly/linear/thresholds.py
 constexpr double OPEN = 1e-11;
-// assembly/linear/compiled_energy.py
+// assembly/linear/assemblies.py
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN };
-constexpr double STOP = 3e-3;
+constexpr double STOP = 3e-3;  // the solvers stop at this fraction of the accepted gap
 
 // Solves blocks of points of one robot, one after the other.
 class Energies : public Loaded {

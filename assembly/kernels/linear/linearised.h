@@ -1,5 +1,5 @@
 // The linear model of a robot, (16)-(20), at several postures side by side: what moves the
-// platform and what the closures say of it; compiled_structure.py in lanes.
+// platform and what the closures say of it.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning

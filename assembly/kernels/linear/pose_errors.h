@@ -1,5 +1,7 @@
 // Problem (27), readings frozen and free, at several postures side by side, from the
-// frames' poses to the certified bounds: compiled_reach.py in lanes.
+// frames' poses to the certified bounds: deformations stay, unloaded clearances move,
+// passive joints follow.  Points with a numerically ambiguous rank, or where a passive
+// joint could pass the bound of its motion, go to the reference.
 #pragma once
 
 #include <map>
@@ -9,8 +11,8 @@
 
 namespace LANE_SPACE {
 
-// assembly/linear/thresholds.py and assembly/linear/compiled_reach.py
-constexpr double UNBOUNDED = 1e-8, APART = 100.0;
+constexpr double UNBOUNDED = 1e-8;  // assembly/linear/thresholds.py
+constexpr double APART = 100.0;     // by which load and slack of a cone must differ
 
 // Columns are filled up to a multiple of this many cones, so that bodies share lanes.
 constexpr int FILLED = 2;

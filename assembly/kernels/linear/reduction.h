@@ -1,5 +1,10 @@
 // Free motions and springs eliminated at several postures side by side, what is left for
-// the solvers, and the way back: compiled_reduction.py in lanes.
+// the solvers, and the way back: assembly/linear/reduction.py in another order.
+//
+// Vectors are stored as rows, one Householder triangulation with pivoting serves the free
+// motions, the springs and the least motions, and springs that enter the same closures are
+// first combined into six.  Springs enter by the square roots of their compliances
+// throughout.
 //
 // ========  =============  ============================================================
 // symbol    shape          meaning

@@ -46,7 +46,8 @@ void call_newton(
 
 int64_t call_farthest(
     nb::handle centre, nb::handle X, nb::handle H, nb::handle start, nb::handle cones,
-    int64_t half, double tolerance, nb::handle bounds, nb::handle screw) {
+    int64_t half, double tolerance, const nb::callable &support, nb::handle bounds,
+    nb::handle screw) {
     Size p, nv, ends;
     AskedBody own;
     if (half != 0 && half != 3) throw nb::value_error("half: expected 0 or 3");
@@ -59,8 +60,37 @@ int64_t call_farthest(
     own.tolerance = tolerance;
     double *low_and_high = address<double>(bounds, "bounds", 2);
     double *best = address<double>(screw, "screw", 6);
+    own.support = [&](const double *direction, double *height, double *attains, double *w) {
+        const nb::gil_scoped_acquire ours;
+        const nb::tuple found = nb::cast<nb::tuple>(
+            support(nb::make_tuple(direction[0], direction[1], direction[2])));
+        *height = nb::cast<double>(found[0]);
+        const double *from = reals(found[1], "screw", 6);
+        std::copy(from, from + 6, attains);
+        from = reals(found[2], "gradient", nv);
+        std::copy(from, from + nv.value, w);
+    };
     const nb::gil_scoped_release others;
     return farthest(own, low_and_high, best);
+}
+
+void call_farthest_points(
+    nb::handle H, nb::handle cones, nb::handle d, nb::handle right, nb::handle tolerance,
+    nb::handle points, nb::handle multipliers, nb::handle solved) {
+    Size k, p, nu, ends;
+    Directions own;
+    own.rows = reals(H, "H", p, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.directions = reals(d, "d", k, nu);
+    own.right = reals(right, "right", k, p);
+    own.tolerance = reals(tolerance, "tolerance", k);
+    own.count = k.value, own.p = p.value, own.cones = ends.value - 1;
+    FarthestPoints out = {
+        address<double>(points, "points", k, nu),
+        address<double>(multipliers, "multipliers", k, p),
+        address<int64_t>(solved, "solved", k)};
+    const nb::gil_scoped_release others;
+    farthest_points(own, out);
 }
 
 }  // namespace
@@ -78,6 +108,11 @@ void bind_solvers(nb::module_ &m) {
     m.def(
         "farthest", &call_farthest,
         nb::arg("centre"), nb::arg("X"), nb::arg("H"), nb::arg("start"),
-        nb::arg("starts"), nb::arg("half"), nb::arg("tolerance"), nb::arg("bounds"),
-        nb::arg("screw"));
+        nb::arg("starts"), nb::arg("half"), nb::arg("tolerance"), nb::arg("support"),
+        nb::arg("bounds"), nb::arg("screw"));
+    m.def(
+        "farthest_points", &call_farthest_points,
+        nb::arg("H"), nb::arg("starts"), nb::arg("d"), nb::arg("right"),
+        nb::arg("tolerance"), nb::arg("points"), nb::arg("multipliers"),
+        nb::arg("solved"));
 }

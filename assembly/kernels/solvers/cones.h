@@ -1,10 +1,13 @@
-// Small cone programmes side by side, assembly/solvers/interior.py and dual_newton.py
-// in lanes:
+// Small cone programmes side by side:
 //
 //     minimise  |G u + h|^2 / 2 - d.u   subject to  H u = e,  |u_k| <= 1, each cone k
 //
-// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector, and by Newton's
-// method on the dual, smoothed about u_old by sigma; n, last of y, are H's multipliers:
+// by Nesterov and Todd's scaling with Mehrotra's predictor and corrector.  The start, u = 0
+// with its multipliers, satisfies everything but H u = e, and so do all iterates: the gap
+// is the sum of s.z over the cones, s = (1, u).  Each step solves one symmetric system of
+// the size of G's and H's rows together, about 10 by 10, whatever the number of
+// clearances.  And by Newton's method on the dual (dual_newton.h); n, last of y, are H's
+// multipliers:
 //
 //     maximise  y.h - |y|^2 / 2 - n.e - sum_k |(G^T y + H^T n - d)_k|
 //
@@ -18,7 +21,9 @@
 // S         M D M^T + diag(1 .. 1, 0 .. 0)
 // ========  ===========================================================================
 //
-// Sources: those of the two Python files; the lanes solve the same equations.
+// Sources: Nesterov, Todd (1997), Self-scaled barriers and interior-point methods for
+// convex programming; Andersen, Roos, Terlaky (2003), On implementing a primal-dual
+// interior-point method for conic quadratic optimization (steps and starting point).
 #pragma once
 
 #include "programme.h"
@@ -26,14 +31,14 @@
 namespace LANE_SPACE {
 
 constexpr int ITERATIONS = 60;      // most of the interior-point method
-constexpr double START = 0.03;      // heads of z begin this far inside (numba: 1)
+constexpr double START = 0.03;      // heads of z begin this far inside
 constexpr double BACK_OFF = 0.99;   // of the step to the nearest boundary of a cone
 constexpr int HALVINGS = 12;        // of a step of Newton's
 constexpr double SIGMA_GROWTH = 10.0, INNER_SHARE = 0.1;
 constexpr double ON_ROWS = 1e-13;   // accepted of H u = e
 
-// of assembly/linear/compiled_energy.py's small_answer: gap from which Newton's method
-// finishes, of the energy and of that without clearance; its steps; its first sigma
+// gap from which Newton's method finishes, of the energy and of that without clearance;
+// its steps; its first sigma
 constexpr double NEAR = 1e-8, NEAR_WITHOUT_CLEARANCE = 1e-9, FIRST_SIGMA = 1e6;
 constexpr int STEPS_ALONE = 6, STEPS = 20, STEPS_LAST = 150;
 

@@ -1,5 +1,21 @@
-// Newton's method on the dual of small cone programmes, assembly/solvers/dual_newton.py in
-// lanes, and after the interior point; symbols as in cones.h.
+// Newton's method on the dual of small cone programmes, alone and after the interior point;
+// symbols as in cones.h.  The dual,
+//
+//     maximise  y.h - |y|^2 / 2 - sum_k |G_k^T y - d_k|,
+//
+// is smooth wherever every cone constraint is active: a few steps suffice.  Where one is
+// inactive it has a kink, -|z|, which is replaced by
+//
+//     min over |u| <= 1 of  u.z + |u - u_old|^2 / (2 sigma),
+//
+// the kink smoothed about u_old.  The u of each solution is the next u_old, and sigma
+// grows; this converges to the maximum of the dual for any sigma.  With u the gap is known
+// exactly at every step: |G u + h - y|^2 / 2 + sum_k (|z_k| + z_k.u_k).  Rows H u = e
+// that no spring enters are further rows of G, h = -e, with no |y|^2 / 2.
+//
+// Sources: Rockafellar (1976), Augmented Lagrangians and applications of the proximal
+// point algorithm in convex programming; Li, Sun, Toh (2018), A highly efficient
+// semismooth Newton augmented Lagrangian method for solving lasso problems.
 #pragma once
 
 #include "cones.h"

@@ -1,11 +1,18 @@
 // The farthest points of convex bodies of platform screws, bracketed: problem (27) by
-// outer approximation, support.py and farthest.py in lanes.
+// outer approximation (search.h).
+//
+// A body's support function along d is a small cone programme; the multipliers n of its
+// rows, whatever they are, prove an upper bound,
+//
+//     d.(centre - X start) + n.H start + sum_k |(X^T d - H^T n)_k|,
+//
+// and its point is projected into the body: both hold whatever the solver returned.
 //
 // Each lane searches one body in one half of the screw, and takes the next where its own
 // ends.
-//
-// Sources: those of farthest.py.
 #pragma once
+
+#include <functional>
 
 #include "search.h"
 
@@ -20,9 +27,14 @@ constexpr double ROUNDING = 1e-14;   // by which a cone may be exceeded
 // Searches bodies with cones as the first one, of at most p rows.
 class Farthest {
 public:
-    Farthest(const Body &first, int p)
+    // Where a support function is not found here: of a direction its certified height, the
+    // screw that attains it and the gradient X^T d - H^T n.
+    typedef std::function<void(const Point &, double *, double *, double *)> Support;
+
+    Farthest(const Body &first, int p, Support other = {})
         : cones(first.cones), body(cones, p), whole_map(6, cones.nu), q(cones, p),
-          solver(cones, p), majorant(cones.nu, p), gradient(cones.nu), v(cones.nu) {}
+          solver(cones, p), majorant(cones.nu, p), other(std::move(other)),
+          gradient(cones.nu), v(cones.nu) {}
 
     // Does all tasks; settle(search, solved) is called at the end of each.
     template <typename Settle> void search(const std::vector<Task> &tasks, Settle settle) {
@@ -45,15 +57,21 @@ public:
                 }
             if (!any(busy)) return;
             support(busy);
+            Whole again = busy & symmetric, found = {};
+            for (int l = 0; l < LANES; ++l)
+                if (busy[l]) {
+                    found[l] = close(l) ? -1 : 0;
+                    if (found[l]) continue;
+                    again[l] = 0;  // of another's support no opposite follows
+                    found[l] = ask(l) ? -1 : 0;
+                }
             double least[LANES];
             majorant.bound(body, gradient, busy, least);
-            Whole again = busy & symmetric;
             for (int l = 0; l < LANES; ++l) {
                 if (!busy[l]) continue;
                 Search &own = searches[l];
                 const double reached = along(own.direction, screw, l);
-                // written so that NaN fails
-                if (!(height[l] - reached <= POOR * own.tolerance)) {
+                if (!found[l]) {
                     settle(own, false);
                     busy[l] = again[l] = 0;
                     continue;
@@ -85,6 +103,7 @@ private:
     Programme q;
     Solver solver;
     Majorant majorant;
+    const Support other;
     Search searches[LANES];
     Whole symmetric = {};   // v -> -v leaves the rows satisfied
     Real centre[6], tolerances = {};
@@ -95,6 +114,24 @@ private:
     double along(const Point &d, const Real *of, int l) const {
         const Real *own = of + searches[l].half;
         return d[0] * own[0][l] + d[1] * own[1][l] + d[2] * own[2][l];
+    }
+
+    // Whether the screw of a lane nearly attains its height; written so that NaN does not.
+    bool close(int l) const {
+        const double reached = along(searches[l].direction, screw, l);
+        return height[l] - reached <= POOR * searches[l].tolerance;
+    }
+
+    // A lane's support from somewhere else; whether there is one.
+    bool ask(int l) {
+        if (!other) return false;
+        double own_height, attains[6];
+        std::vector<double> w(cones.nu);
+        other(searches[l].direction, &own_height, attains, w.data());
+        height[l] = own_height;
+        for (int a = 0; a < 6; ++a) screw[a][l] = attains[a];
+        for (int j = 0; j < cones.nu; ++j) gradient[j][l] = w[j];
+        return true;
     }
 
     // A support of a lane's body, its screw and its plane.

@@ -1,7 +1,8 @@
-// Householder triangulation with pivoting, assembly/solvers/householder.py in lanes:
-// rows F[order] = L Q^T with L lower triangular, Q a product of reflectors.
+// Householder triangulation with pivoting, the transpose of a QR factorisation with
+// column pivoting: rows F[order] = L Q^T with L lower triangular, Q a product of reflectors.
 //
-// Sources: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4.
+// Sources: Golub, Van Loan, Matrix Computations, 4th ed., sections 5.2-5.4 (Householder
+// QR with column pivoting, complete orthogonal factorisation).
 #pragma once
 
 #include "real.h"

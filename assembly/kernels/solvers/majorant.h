@@ -1,7 +1,18 @@
-// A quadratic above the support function, and its largest value on the unit sphere:
-// majorant.py, the quadratic in lanes.
+// A second upper bound for (27), exact where outer approximation is slow: a round body
+// takes that about 1 / gap cuts, since all directions are nearly as good.  The support
+// function is the least, over n, of linear terms + sum_k |w_k|, w = X^T d - H^T n.  For
+// any sizes s_k > 0,
 //
-// Sources: those of majorant.py.
+//     |w_k|  <=  |w_k|^2 / (2 s_k)  +  s_k / 2,
+//
+// equal where s_k = |w_k|.  With s taken from one direction, the minimum over n is a
+// quadratic in d, above the support function everywhere and equal to it there; its largest
+// value on the unit sphere is known by an eigenvalue problem.  Where the direction is the
+// farthest point's, the bound usually closes at once: a disc's or an ellipsoid's always.
+//
+// Sources: Conn, Gould, Toint (2000), Trust-Region Methods, section 7.3, for the largest
+// value of a quadratic on a sphere; Golub, Van Loan, Matrix Computations, 4th ed., section
+// 8.5 (Jacobi's method).
 #pragma once
 
 #include "cones.h"

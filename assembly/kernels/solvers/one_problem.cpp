@@ -1,5 +1,5 @@
-// One cone programme, and one body's farthest screw, with cones of any size: interior.py
-// and farthest.py for callers with a single problem.
+// One cone programme, and one body's farthest screw, with cones of any size: for callers
+// with a single problem.
 #define FEW_LANES
 #include "../kernels.h"
 #include "block.h"
@@ -64,12 +64,18 @@ int64_t farthest(const AskedBody &asked, double *bounds, double *screw) {
     ordered(asked.map, 6, body.X);
     ordered(asked.rows, p, body.H);
     ordered(asked.start, 1, body.start);
-    int64_t supports = -1;
+    int64_t supports = 0;
     const Task task = {&body, int(asked.half), asked.tolerance};
-    Farthest(body, p).search({task}, [&](const Search &own, bool done) {
+    std::vector<double> gradient(nv);
+    const auto support = [&](const Point &direction, double *height, double *attains,
+                             double *w) {
+        asked.support(direction.data(), height, attains, gradient.data());
+        for (int j = 0; j < nv; ++j) w[j] = gradient[given.column[j]];
+    };
+    Farthest(body, p, support).search({task}, [&](const Search &own, bool) {
         bounds[0] = own.low, bounds[1] = own.high;
         std::copy(own.best, own.best + 6, screw);
-        if (done) supports = own.supports;
+        supports = own.supports;
     });
     return supports;
 }

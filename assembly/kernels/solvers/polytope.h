@@ -1,4 +1,9 @@
-// A convex polytope in three dimensions, cut plane by plane: polytope.py.
+// A convex polytope in three dimensions, cut plane by plane; its vertices are known.
+//
+// A cut drops the corners above the plane and puts new ones where it meets an edge; an
+// edge is two corners with two planes in common.  Every corner has three planes: one that
+// a plane touches by accident counts as below it, so that where more than three meet,
+// corners lie together and nothing else changes.
 #pragma once
 
 #include <array>

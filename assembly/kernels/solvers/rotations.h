@@ -1,4 +1,4 @@
-// Rotations of several problems side by side: compiled_rotations.py in lanes.
+// Rotations of several problems side by side.
 //
 // A rotation matrix is nine numbers, row after row.
 #pragma once

@@ -1,9 +1,18 @@
 // The state of a search of (27): bounds of the farthest point of a convex body of platform
-// screws, from one support function to the next; farthest.py.
+// screws, from one support function to the next.
 //
-// A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.
+// A body is {centre + X (v - start) : |v_k| <= 1, H (v - start) = 0}.  The largest rotation,
+// or translation, in it depends on three components: their projection is approximated from
+// outside by planes in three dimensions.
 //
-// Sources: those of farthest.py.
+// - A support function gives a cut on the upper side and a point on the lower; where the
+//   body is symmetric, the same support holds for the opposite direction.
+// - First the search climbs: the direction of the supporting point gains more.
+// - Then a box along that direction, and always the farthest vertex of what remains.
+// - majorant.h bounds round bodies, which would take many cuts.
+//
+// Sources: Horst, Tuy (1996), Global Optimization, ch. II (outer approximation of a convex
+// maximisation).
 #pragma once
 
 #include "majorant.h"

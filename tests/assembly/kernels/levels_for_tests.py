@@ -9,6 +9,7 @@ from dataclasses import is_dataclass
 import numpy as np
 
 from assembly.batch.many_draws import prepare_energies
+from assembly.batch.many_margins import prepare_margins
 from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import home_posture, place_many
 from assembly.linear.energy import minimise_energies, solve_assembly
@@ -17,6 +18,7 @@ from assembly.linear.zone import zone_margins
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
+from assembly.statistics.clearance_positions import position_clearances
 
 LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
 
@@ -61,7 +63,14 @@ def answers():
         yield f"{name} (21)", zone_margins(robot, T, "free", errors=errors)
         yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
         yield f"{name} K_C", platform_stiffnesses(robot, T)
-        yield f"{name} draws", prepare_energies(home).solve(errors)
+        one = prepare_energies(home)
+        draws = one.solve(errors)
+        yield f"{name} draws", draws
+        yield f"{name} draws (21)", prepare_margins(home).solve(errors)
+        for model in ("uniform", "contact"):
+            rngs = [np.random.default_rng(i) for i in range(k)]
+            moved = position_clearances(one, draws, model, rngs)
+            yield f"{name} {model}", moved
     group = np.repeat(np.arange(4), [1, 2, 3, 4])
     H = rng.normal(size=(2, 10))
     given = rng.normal(size=(5, 10)), 3 * rng.normal(size=5), rng.normal(size=10)

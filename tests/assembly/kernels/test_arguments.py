@@ -1,5 +1,6 @@
 """Arrays of a wrong shape, type or order are refused by name before they are read."""
 
+import _datetime as datetime
 import re
 
 import numpy as np
@@ -154,3 +155,60 @@ def test_a_wrong_argument_of_a_cone_programme_is_named(name, rng):
     named = {"h": "G", "d": "G", "k": "H"}.get(name, name)
     with pytest.raises(ValueError, match=rf"^{named}\b"):
         kernels.interior_point(**shorter)
+
+
+def farther(rng):
+    """Arguments of farthest points along two directions, by their names."""
+    d = rng.normal(size=(2, 5))
+    return {
+        "H": rng.normal(size=(1, 5)), "starts": np.array([0, 2, 3, 5]),
+        "d": d / np.linalg.norm(d, axis=1)[:, None], "right": np.zeros((2, 1)),
+        "tolerance": np.full(2, 1e-9), "points": np.zeros((2, 5)),
+        "multipliers": np.zeros((2, 1)), "solved": np.zeros(2, dtype=np.int64),
+    }  # fmt: skip
+
+
+def margins(rng):
+    """Of least margins of two draws."""
+    return {
+        "B": np.linalg.qr(rng.normal(size=(5, 2)))[0].T.copy(),
+        "starts": np.array([0, 2, 3, 5]), "right": rng.normal(size=(2, 2)),
+        "margin": np.zeros(2), "bound": np.zeros(2), "multipliers": np.zeros((2, 2)),
+    }  # fmt: skip
+
+
+def walk(rng):
+    """Of a walk of two screws."""
+    M = rng.normal(size=(5, 3))
+    return {
+        "axes": M, "gram": M @ M.T, "starts": np.array([0, 2, 3, 5]),
+        "to_screw": np.ones((6, 5)), "every": 2, "random": rng.bit_generator.capsule,
+        "u": np.zeros(5), "trace": np.zeros((2, 6)),
+    }  # fmt: skip
+
+
+CALLS = {"farthest_points": farther, "least_margins": margins, "billiard_walk": walk}
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (call, name)
+        for call, arguments in CALLS.items()
+        for name, value in arguments(np.random.default_rng(0)).items()
+        if isinstance(value, np.ndarray)
+    ],
+)
+def test_a_wrong_argument_of_others_is_named(call, name, rng):
+    right = CALLS[call](rng)
+    getattr(kernels, call)(**right)
+    with pytest.raises(ValueError, match=rf"^{name}: .*expected"):
+        getattr(kernels, call)(**right | {name: right[name].astype(np.float32)})
+
+
+@pytest.mark.parametrize("random", ["rng", "datetime"])
+def test_random_numbers_are_those_of_a_bit_generator(rng, random):
+    """Nor of the capsule of something else."""
+    given = {"rng": rng, "datetime": datetime.datetime_CAPI}
+    with pytest.raises((TypeError, ValueError)):
+        kernels.billiard_walk(**walk(rng) | {"random": given[random]})

@@ -9,8 +9,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.reach import ReachableSet, loaded_cones, reachable_screws
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers import one_problem
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.conic import SolverFailed, cone_sizes
 from tests.answers_for_tests import machine
 from tests.robots_for_tests import coaxial_beams
 
@@ -128,17 +127,35 @@ def test_what_nothing_bounds_is_infinite_in_its_own_half():
         assert reachable.support(1e-3 * d[3] + d[4]).height < np.inf
 
 
-def test_the_search_finds_the_same_one_support_after_the_other(rng, monkeypatch):
-    """Where the search in one call gives up, and with as many supports."""
-    reachable = body(rng, 1)
-    whole = reachable.farthest(3, 1e-4)
-    monkeypatch.setattr(one_problem, "farthest", lambda *_: None)
-    (low, high), screw, supports = reachable.farthest(3, 1e-4)
-    assert low <= whole[0][1] + 1e-9
-    assert whole[0][0] <= high + 1e-9
-    assert high - low <= 1e-4
-    assert np.linalg.norm(screw[3:]) == pytest.approx(low, rel=1e-9)
-    assert supports == whole[2] > 0
+def test_the_search_asks_for_supports_where_its_own_are_not_close_enough(
+    rng, monkeypatch
+):
+    """Asked for less than rounding: each support is then found by the reference."""
+    reachable, asked = body(rng, 1), []
+    (low, high), _, _ = reachable.farthest(3, 1e-4)
+    support = ReachableSet.support
+
+    def counted(self, direction):
+        asked.append(direction)
+        return support(self, direction)
+
+    monkeypatch.setattr(ReachableSet, "support", counted)
+    (own_low, own_high), screw, supports = reachable.farthest(3, 1e-15)
+    assert 0 < len(asked) <= supports <= 400
+    assert all(direction[:3].tolist() == [0, 0, 0] for direction in asked)
+    assert own_low <= high + 1e-12
+    assert low <= own_high + 1e-12
+    assert 0.0 <= own_high - own_low < 1e-6
+    assert np.linalg.norm(screw[3:]) == pytest.approx(own_low, rel=1e-12)
+
+
+def test_a_support_that_fails_ends_the_search(rng, monkeypatch):
+    def fails(self, direction):
+        raise SolverFailed("least energy", "NumericalError")
+
+    monkeypatch.setattr(ReachableSet, "support", fails)
+    with pytest.raises(SolverFailed, match="NumericalError"):
+        body(rng, 1).farthest(3, 1e-15)
 
 
 E3 = 1e-3  # [rad] of play about z, three times, and of an error

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 from assembly.model.error_distributions import draw_generator
-from assembly.statistics.billiard_walk import (
-    FLIGHT,
-    Positions,
-    _distance_to_bound,
-    start_chains,
-    walk,
-)
+from assembly.statistics.billiard_walk import Positions
+
+FLIGHT = 2.0  # mean time of a trajectory
 
 
 def sizes(starts, u):
@@ -25,8 +21,8 @@ def walked(starts, M, u, every=1, kept=1, seed=1, to_screw=None):
     M, starts = np.ascontiguousarray(M, dtype=float), np.array(starts)
     to_screw = np.zeros((6, len(M))) if to_screw is None else to_screw
     u, trace = np.array(u, dtype=float), np.empty((kept, 6))
-    positions = Positions(M, M @ M.T, starts, to_screw)
-    walk(positions, u, every, draw_generator(seed, 0, 9), trace)
+    positions = Positions(M, starts, to_screw)
+    positions.walk(u, every, draw_generator(seed, 0, 9), trace)
     return u, trace, draw_generator(seed, 0, 9)
 
 
@@ -100,36 +96,32 @@ def test_screws_are_kept_after_every_so_many_trajectories(rng):
     assert len(np.unique(all_[:, 0])) == 12
 
 
-def test_the_nearest_bound_is_where_a_cone_has_size_one(rng):
-    starts, spread = np.array([0, 2, 3, 5]), np.inf
-    for _ in range(20):
-        v, w = rng.uniform(-0.6, 0.6, 5), rng.normal(size=5)
-        reach, wall = _distance_to_bound(starts, v, w, spread)
-        there = sizes(starts, v + reach * w)
-        assert there[wall] == pytest.approx(1.0, rel=1e-12)
-        assert max(there) <= 1 + 1e-12
-        assert reach > 0
-        assert _distance_to_bound(starts, v, w, 0.9 * reach) == (0.9 * reach, -1)
-        near, same = _distance_to_bound(starts, v, w, 1.1 * reach)
-        assert (near, same) == (reach, wall)
+def test_a_cone_that_does_not_move_is_no_bound(rng):
+    """Even where it stands on its bound: the others decide how far a chain starts."""
+    starts, centre = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
+    M, walks = np.array([[0.0], [0.0], [0.3]]), np.empty((8, 3))
+    positions = Positions(M, starts, np.zeros((6, 3)))
+    positions.start_chains(centre, draw_generator(2, 0, 9), walks)
+    ends = centre[2] + (walks[:, 2] - centre[2]) / 0.9
+    np.testing.assert_allclose(np.abs(ends), 1.0, rtol=1e-12)
+    np.testing.assert_array_equal(walks[:, :2], np.tile(centre[:2], (8, 1)))
+    # where nothing moves, a trajectory ends where it began
+    still, _, _ = walked(starts, np.zeros((3, 1)), centre)
+    np.testing.assert_array_equal(still, centre)
 
 
-def test_a_cone_that_does_not_move_is_no_bound():
-    """Even where it stands on its bound; a point outside by rounding turns back."""
-    starts, v = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
-    reach, wall = _distance_to_bound(starts, v, np.array([0.0, 0.0, -0.5]), np.inf)
-    assert (reach, wall) == (pytest.approx(3.0), 1)
-    assert _distance_to_bound(starts, v, np.zeros(3), 7.0) == (7.0, -1)
-    outside, inward = v * (1 + 1e-15), np.array([-0.6, -0.8, 0.0])
-    assert _distance_to_bound(starts, outside, inward, np.inf)[0] == pytest.approx(2.0)
-    outward = _distance_to_bound(starts, outside, -inward, np.inf)
-    assert outward == (pytest.approx(0.0, abs=1e-12), 0)
+def test_a_point_outside_by_rounding_turns_back():
+    starts, outside = [0, 1], [1 + 1e-15]
+    for seed in range(6):
+        u, _, _ = walked(starts, [[0.5]], outside, seed=seed)
+        assert abs(u[0]) <= 1 + 2e-15
 
 
 def test_chains_start_at_nine_tenths_of_the_way_to_the_boundary(rng):
     starts, centre = np.array([0, 2, 3]), np.array([0.3, -0.2, 0.1])
     walks, M = np.empty((6, 3)), 0.2 * rng.normal(size=(3, 3))
-    start_chains(M, starts, centre, draw_generator(4, 0, 9), walks)
+    positions = Positions(M, starts, np.zeros((6, 3)))
+    positions.start_chains(centre, draw_generator(4, 0, 9), walks)
     for point in walks:
         assert max(sizes(starts, centre + (point - centre) / 0.9)) == pytest.approx(1.0)
     numbers = draw_generator(4, 0, 9)

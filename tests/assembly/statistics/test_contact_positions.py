@@ -17,10 +17,8 @@ def moved(directions, starts, rows=(), free=None, positions=None):
     nu = starts[-1]
     free = np.ones(nu, dtype=bool) if free is None else np.array(free)
     positions = np.zeros(directions.shape) if positions is None else positions
-    ends = np.full(directions.shape, 7.0)
     rows = np.array(rows, dtype=float).reshape(-1, nu)
-    move_to_contact(rows, starts, free, np.array(positions), directions, ends)
-    return ends
+    return move_to_contact(rows, starts, free, np.array(positions), directions)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])

@@ -1,0 +1,62 @@
+// The billiard walk, as Python calls it.
+#include "../arrays.h"
+#include "../bindings.h"
+#include "../kernels.h"
+
+namespace {
+
+// Unit cones, and the axes of Dikin's ellipsoid there.
+Ellipsoid ellipsoid_of(nb::handle axes, nb::handle gram, nb::handle cones) {
+    Size nu, n, ends;
+    Ellipsoid own;
+    own.axes = reals(axes, "axes", nu, n);
+    own.gram = reals(gram, "gram", nu, nu);
+    own.starts = starts(cones, "starts", nu.value, true, ends);
+    own.nu = nu.value, own.n = n.value, own.cones = ends.value - 1;
+    return own;
+}
+
+// Of the capsule of a bit generator, whose lock the caller holds.
+bitgen *bits_of(const nb::capsule &random) {
+    return static_cast<bitgen *>(random.data("BitGenerator"));
+}
+
+void call_start_chains(
+    nb::handle axes, nb::handle gram, nb::handle cones, nb::handle centre,
+    const nb::capsule &random, nb::handle walks) {
+    const Ellipsoid own = ellipsoid_of(axes, gram, cones);
+    Size chains;
+    const double *from = reals(centre, "centre", own.nu);
+    double *to = address<double>(walks, "walks", chains, own.nu);
+    bitgen *bits = bits_of(random);
+    const nb::gil_scoped_release others;
+    start_chains(own, from, bits, chains.value, to);
+}
+
+void call_billiard_walk(
+    nb::handle axes, nb::handle gram, nb::handle cones, nb::handle to_screw,
+    int64_t every, const nb::capsule &random, nb::handle u, nb::handle trace) {
+    const Ellipsoid own = ellipsoid_of(axes, gram, cones);
+    Size kept;
+    Trajectories asked;
+    asked.to_screw = reals(to_screw, "to_screw", 6, own.nu);
+    double *point = address<double>(u, "u", own.nu);
+    double *screws = address<double>(trace, "trace", kept, 6);
+    asked.kept = kept.value, asked.every = every;
+    bitgen *bits = bits_of(random);
+    const nb::gil_scoped_release others;
+    billiard_walk(own, asked, bits, point, screws);
+}
+
+}  // namespace
+
+void bind_statistics(nb::module_ &m) {
+    m.def(
+        "start_chains", &call_start_chains,
+        nb::arg("axes"), nb::arg("gram"), nb::arg("starts"), nb::arg("centre"),
+        nb::arg("random"), nb::arg("walks"));
+    m.def(
+        "billiard_walk", &call_billiard_walk,
+        nb::arg("axes"), nb::arg("gram"), nb::arg("starts"), nb::arg("to_screw"),
+        nb::arg("every"), nb::arg("random"), nb::arg("u"), nb::arg("trace"));
+}
