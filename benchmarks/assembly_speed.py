@@ -9,9 +9,8 @@ grid of its workspace.  Printed, in this order:
   DPP; its matrices ready made), Clarabel on the full problem, Clarabel on the problem
   reduced by ``assembly.linear.reduction`` (reduction counted), a batch of moreau's on
   the full problem (to its 1e-8, without our certificate), our reference in numpy,
-  ``solve_assembly`` and ``minimise_energies``, by numba and side by side in C++
-  (linearisation, reduction and certificate counted), with the ratio of cvxpy's DPP to
-  each;
+  ``solve_assembly`` and ``minimise_energies`` (linearisation, reduction and certificate
+  counted), with the ratio of cvxpy's DPP to each;
 - the same for the energy under a force and a moment on the platform and weight, errors
   times 1, 0.2 and 0, and for draws of the errors at one posture under them;
 - the same for the margin (21), both readings;
@@ -20,20 +19,19 @@ grid of its workspace.  Printed, in this order:
   and under four sizes of the load at three, and how many the fallback had to solve.
 
 The slow ways see a sample of the grid, ours all of it; nothing is run twice to choose
-the better time but ours, whose first run compiles.
+the better time but our batches.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
 import json
 import os
 
-for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
+for name in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{name}_NUM_THREADS"] = "1"
 
 import gc
 import time
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -61,7 +59,6 @@ from benchmarks.assembly_peers import (
     loaded_matrices,
     moreau_batched,
 )
-from forcefit.native.libraries import by_numba
 
 NUMBERS = Path(__file__).parents[1] / "tests" / "irsbot2_numbers.json"
 SAMPLE = 24  # points of the slow ways
@@ -106,23 +103,16 @@ def timed(solve: Callable[..., object], postures: Iterable) -> float:
     return taken
 
 
-def batched(solve: Callable[..., object], postures: list[Posture]) -> dict[str, float]:
-    """Processor time a point [us] of a batch, by numba and side by side.
-
-    In turns, the best of 10 each: both see the same load.
-    """
+def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
+    """Processor time a point [us] of a batch, the best of 10."""
     robot = postures[0].robot
     T = np.array([p.transforms for p in postures])
     mismatch = np.array([p.mismatch for p in postures])
-    methods = {"ours, batched, numba": by_numba, "ours, batched": nullcontext}
-    best = dict.fromkeys(methods, np.inf)
-    for turn in range(11):  # the first compiles
-        for name, method in methods.items():
-            with method():
-                start = time.process_time()
-                solve(robot, T, mismatch=mismatch)
-                taken = (time.process_time() - start) / len(T) * 1e6
-            best[name] = min(best[name], taken) if turn else np.inf
+    best = np.inf
+    for _ in range(10):
+        start = time.process_time()
+        solve(robot, T, mismatch=mismatch)
+        best = min(best, (time.process_time() - start) / len(T) * 1e6)
     return best
 
 
@@ -150,7 +140,7 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
         "moreau, batched, full problem": moreau_batched(own),
         "ours, reference in numpy": timed(reference_assembly, few),
         "ours, one at a time": timed(solve_assembly, own),
-        **batched(minimise_energies, own),
+        "ours, batched": batched(minimise_energies, own),
     }
     print_table(f"energy (22), errors times {kappa:g}", rows)
 
@@ -173,14 +163,12 @@ def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
         "cvxpy DPP, scaled": timed(dpp, data),
         "ours, reference in numpy": timed(partial(reference_assembly, **loaded), few),
         "ours, one at a time": timed(partial(solve_assembly, **loaded), own),
-        **batched(together, own),
+        "ours, batched": batched(together, own),
     }
     one = prepare_energies(own[len(own) // 2], **loaded)
     errors = kappa * np.linspace(-1, 1, 2000)[:, None, None] * robot.errors
-    draws = batched(lambda robot, T, mismatch: one.solve(errors), own)
-    for name, taken in draws.items():
-        each = taken * len(own) / len(errors)
-        rows[name.replace("batched", "draws at one posture")] = each
+    taken = batched(lambda robot, T, mismatch: one.solve(errors), own)
+    rows["ours, draws at one posture"] = taken * len(own) / len(errors)
     print_table(f"energy (22) under loads, errors times {kappa:g}", rows)
 
 
@@ -196,7 +184,9 @@ def print_margins(postures: list[Posture]) -> None:
             "cvxpy DPP, scaled": timed(Dpp(few[0].robot, reading, True, data), data),
             "ours, reference in numpy": timed(reference, few),
             "ours, one at a time": timed(ours, postures),
-            **batched(partial(zone_margins, compliant=reading), postures),
+            "ours, batched": batched(
+                partial(zone_margins, compliant=reading), postures
+            ),
         }
         print_table(f"margin (21), compliant {reading}", rows)
 

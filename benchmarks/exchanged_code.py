@@ -3,8 +3,8 @@
 All tests are collected once, all modules imported.  For each fault the process forks,
 exchanges the code of the fault's functions, and runs the tests that pass its line:
 hundredths of a second more than the tests, not the seconds that a process of its own
-takes.  Only a statement within a function of a file without compiled loops can be
-exchanged so; what an import has worked out is in use already.
+takes.  Only a statement within a function can be exchanged so; what an import has
+worked out is in use already.
 """
 
 import functools
@@ -28,8 +28,6 @@ from benchmarks.traced_tests import MEMORY, WORDS, places_of_tests, sources
 
 PASSED, FAILED, BROKEN = 0, 1, 2
 WAITS = 10  # seconds of the clock at most for one of the processor
-# what they keep is no answer
-KEPT_CACHES = ("forcefit.native", "assembly.solvers.compiled")
 
 
 class Session:
@@ -59,8 +57,7 @@ class Session:
             if type(found) is FunctionType:  # a proxy of what is gone has no class
                 self.functions[found.__code__.co_filename].append(found)
             elif type(found) is functools._lru_cache_wrapper:
-                if not found.__module__.startswith(KEPT_CACHES):
-                    found.cache_clear()
+                found.cache_clear()
         # of forks that share what they do not change
         gc.collect()
         gc.freeze()

@@ -2,9 +2,7 @@
 
 A file is as likely as it is long; pages and pictures (``report.py``, ``plot.py``,
 ``figures.py``, ``scene.py``) are left out: what they show is tested where it is a
-number.  So is what compiles loops and loads them (``compiled.py``): it works out no
-number, and runs once, in processes of its own, which no fork of one that has loaded it
-can try again.
+number.
 
 An operator becomes its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is dropped, a number becomes one larger, as mutmut and
@@ -14,7 +12,6 @@ of a size that ``reshape`` is to find, where any negative number is the same.
 """
 
 import ast
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +32,7 @@ SWAPS: dict[type, type] = {
 }  # fmt: skip
 LARGE = 10  # numbers above it become one
 LEFT_OUT = {
-    "report.py", "plot.py", "figures.py", "scene.py", "scenes.py", "compiled.py",
+    "report.py", "plot.py", "figures.py", "scene.py", "scenes.py",
 }  # fmt: skip
 
 
@@ -62,11 +59,6 @@ class Fault:
         lines = source.splitlines(keepends=True)
         lines[self.row - 1] = self.line
         return "".join(lines)
-
-    @property
-    def compiled(self) -> bool:
-        """Whether its file has compiled loops."""
-        return has_loops(ROOT / self.path)
 
     def __str__(self) -> str:
         return f"{self.path}:{self.row}  {self.what}"
@@ -192,11 +184,6 @@ def path_name(node: ast.AST) -> str | None:
     """The first name in an expression that runs while the module is imported."""
     names = [n.id for n in ast.walk(node) if isinstance(n, ast.Name)]
     return names[0] if names else None
-
-
-def has_loops(path: Path) -> bool:
-    """Whether a file has compiled loops."""
-    return bool(re.search(r"^@(kernel|part)", path.read_text("utf-8"), re.MULTILINE))
 
 
 def files_of(chapters: str) -> list[tuple[str, Path]]:

@@ -13,19 +13,15 @@ other tests would see counts as survived.
 Faults within functions are exchanged in a process that has loaded everything
 (``exchanged_code.py``).  The others are put into a copy of the tree, and tests run in a
 fork of this process, which has imported all libraries: of an eighth of S seconds first.
-Compiled loops have no lines to trace: tests of loops by themselves run a second time
-uncompiled, each for a few seconds at most; faults in them are judged uncompiled, then
-once more compiled, by the tests that import their module.
+C++ is left alone.
 
 After --files: every fault of these files instead of COUNT that are drawn.  Printed: the
 share caught, and every survivor.
 """
 
 import argparse
-import ast
 import importlib
 import os
-import re
 import shutil
 import tempfile
 import time
@@ -35,85 +31,17 @@ from pathlib import Path
 from random import Random
 
 from benchmarks.exchanged_code import Session
-from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of, has_loops
-from benchmarks.traced_tests import PACKAGES, Run, Trace, sources, traced
+from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of
+from benchmarks.traced_tests import Run, Trace, traced
 
 # imported once, before the forks
 LIBRARIES = (
     "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial",
     "scipy.stats", "scipy.ndimage", "cvxpy", "clarabel", "skfem", "xarray", "pandas",
     "h5netcdf", "matplotlib.figure", "pyvista", "meshio", "typer.testing", "hypothesis",
-    "hypothesis.extra.numpy", "numba.extending",
+    "hypothesis.extra.numpy",
 )  # fmt: skip
 LEAST_SECONDS = 15  # of processor time, for collecting tests
-
-
-def importing(fault: Fault) -> list[str]:
-    """Files of the tests that import the module, or stand in its folder's mirror."""
-    module = ".".join(fault.path.with_suffix("").parts)
-    folder, _, name = module.rpartition(".")
-    imports = re.compile(
-        rf"{re.escape(module)}\b|from {re.escape(folder)} import [^\n]*\b{name}\b"
-    )
-    files = sorted((ROOT / "tests").rglob("test_*.py"))
-    folder_of_tests = ROOT / "tests" / fault.chapter
-    return ["tests/test_answers.py"] + [
-        str(path.relative_to(ROOT))
-        for path in files
-        if path.is_relative_to(folder_of_tests) or imports.search(path.read_text())
-    ]
-
-
-class Caches:
-    """Compiled functions on disk, of the tree without a fault."""
-
-    def __init__(self, tree: Path) -> None:
-        self.tree = tree
-        self.files = {path: path.read_bytes() for path in self._found()}
-
-    def _found(self) -> list[Path]:
-        return [path for p in PACKAGES for path in (self.tree / p).rglob("*.nb[ic]")]
-
-    def restore(self) -> None:
-        """As they were before the fault."""
-        for path in set(self._found()) - self.files.keys():
-            path.unlink()
-        for path, content in self.files.items():
-            path.write_bytes(content)
-
-    def drop(self, fault: Fault) -> None:
-        """Leave out those that a fault is built into, though their files are the same.
-
-        A part is called by its address, a kernel and a constant are built in.
-        """
-        names, stale = built_in(fault), set[Path]()
-        while names:
-            named = re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
-            more = {
-                path
-                for path in sources()
-                if has_loops(ROOT / path) and named.search((ROOT / path).read_text())
-            } - stale
-            stale |= more
-            names = {name for path in more for name in kernels_of(path)}
-        for path in stale:
-            for cached in (self.tree / path.parent).rglob(f"{path.stem}.*.nbi"):
-                cached.unlink()
-
-
-def built_in(fault: Fault) -> set[str]:
-    """The kernel or the constant that a fault is in; nothing for a part."""
-    for node in ast.walk(ast.parse((ROOT / fault.path).read_text("utf-8"))):
-        if isinstance(node, ast.FunctionDef):
-            if node.lineno <= fault.row <= (node.end_lineno or 0):
-                return {node.name} & kernels_of(fault.path)
-    return {fault.name} if fault.name else set()
-
-
-def kernels_of(path: Path) -> set[str]:
-    """Names of a file's kernels."""
-    text = (ROOT / path).read_text("utf-8")
-    return set(re.findall(r"^@kernel.*\ndef (\w+)", text, re.MULTILINE))
 
 
 def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
@@ -128,55 +56,35 @@ def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
     return some
 
 
-def caught(
-    fault: Fault, tree: Path, traces: dict[bool, Trace], caches: Caches, seconds: float
-) -> str | None:
+def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
     """The test that sees a fault, "" where it is none's name; None if none does."""
     path = tree / fault.path
     whole, times = path.read_bytes(), path.stat()
     path.write_text(fault.put_into(whole.decode()), encoding="utf-8")
     try:
-        if fault.compiled:
-            caches.drop(fault)
-        return seen(fault, tree, traces, seconds)
+        return seen(fault, tree, trace, seconds)
     finally:
         path.write_bytes(whole)
         os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-        if fault.compiled:
-            caches.restore()
 
 
-def seen(
-    fault: Fault, tree: Path, traces: dict[bool, Trace], seconds: float
-) -> str | None:
+def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
     """The first test that sees the fault in the tree; None if none does."""
-    trace = traces[fault.compiled]
     tests = trace.nearest(fault)
     for share in (seconds / 8, seconds):
         some = chosen(tests, trace, share)
-        run = Run(tree, fault.compiled, LEAST_SECONDS + 3 * share)
+        run = Run(tree, LEAST_SECONDS + 3 * share)
         if some and (test := run(some)) is not None:
             return test
         tests = tests[len(some) :]
-    if not fault.compiled:
-        return None
-    files, trace = importing(fault), traces[False]
-    tests = [test for test in trace.seconds if test.partition("::")[0] in files]
-    # its own compilation takes half a minute at most
-    run = Run(tree, False, LEAST_SECONDS + 120 + 3 * seconds)
-    return run(chosen(sorted(tests, key=trace.cost(fault)), trace, seconds))
-
-
-def exchangeable(fault: Fault) -> bool:
-    """Whether it can be put into functions that are loaded already."""
-    return fault.within and not fault.compiled
+    return None
 
 
 def judged(
-    faults: list[Fault], tree: Path, traces: dict[bool, Trace], seconds: float
+    faults: list[Fault], tree: Path, trace: Trace, seconds: float
 ) -> Iterator[tuple[Fault, str | None]]:
     """Each fault with the test that sees it; first those that can be exchanged."""
-    trace, some = traces[False], [fault for fault in faults if exchangeable(fault)]
+    some = [fault for fault in faults if fault.within]
     # before the fork, which leaves the trace's data base behind
     tests = [chosen(trace.nearest(fault), trace, seconds) for fault in some]
     reading, writing = Pipe(duplex=False)
@@ -192,10 +100,9 @@ def judged(
     writing.close()
     yield from ((fault, reading.recv()) for fault in some)
     os.waitpid(child, 0)
-    caches = Caches(tree)
     for fault in faults:
-        if not exchangeable(fault):
-            yield fault, caught(fault, tree, traces, caches, seconds)
+        if not fault.within:
+            yield fault, caught(fault, tree, trace, seconds)
 
 
 def asked_for(asked: argparse.Namespace) -> list[Fault]:
@@ -229,15 +136,15 @@ def main() -> None:
     began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
-        # with the caches of compiled functions, whose files keep their times
+        # with the compiled modules
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
         shutil.copytree(ROOT, tree, ignore=left_out)
         kept = asked.traced or Path(scratch)
         kept.mkdir(parents=True, exist_ok=True)
-        traces = {loops: traced(tree, kept, loops) for loops in (False, True)}
+        trace = traced(tree, kept)
         faults = asked_for(asked)
         for done, (fault, test) in enumerate(
-            judged(faults, tree, traces, asked.seconds), start=1
+            judged(faults, tree, trace, asked.seconds), start=1
         ):
             survived += test is None
             seen = "survived" if test is None else f"caught by {test or 'a limit'}"

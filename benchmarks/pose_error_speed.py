@@ -23,7 +23,7 @@ line; ``pip install forcefit[benchmarks]`` brings both.
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
 import os
 
-for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
+for name in ("OMP", "OPENBLAS", "MKL"):
     os.environ[f"{name}_NUM_THREADS"] = "1"
 
 import heapq

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import resource
-import signal
 import sys
 import time
 import traceback
@@ -13,9 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy, which numba imports
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy
 
-import numba
 import pytest
 from coverage import Coverage, CoverageData
 
@@ -23,9 +21,6 @@ from benchmarks.faults import ROOT, Fault
 
 PACKAGES = ("stiffness", "assembly", "validation", "forcefit")
 BESIDE = ("tests/test_answers.py",)
-# of loops by themselves; elsewhere whole robots are solved, minutes uncompiled
-UNCOMPILED = tuple(f"tests/assembly/{c}" for c in ("solvers", "kinematics", "batch"))
-UNCOMPILED_SECONDS = 1.5  # of processor time, of a test that is to be of use uncompiled
 MEMORY = 8 * 2**30  # [byte]
 PASSED, FAILED, INTERRUPTED, NONE_COLLECTED = 0, 1, 2, 5
 WORDS = [
@@ -37,8 +32,8 @@ WORDS = [
 class Run:
     """Some tests in a fork of this process, on a tree."""
 
-    def __init__(self, tree: Path, uncompiled: bool, seconds: float) -> None:
-        self.tree, self.uncompiled, self.seconds = tree, uncompiled, seconds
+    def __init__(self, tree: Path, seconds: float) -> None:
+        self.tree, self.seconds = tree, seconds
 
     def __call__(self, tests: list[str], plugins: tuple[Any, ...] = ()) -> str | None:
         """The first test that fails, "" where none can be named; None if all pass."""
@@ -76,11 +71,6 @@ class Run:
         words = [*WORDS]
         if not plugins:
             words.append("-x")
-        if self.uncompiled:
-            os.environ["NUMBA_DISABLE_JIT"] = "1"
-            numba.config.DISABLE_JIT = True
-            # loops divide by zero where they then look at what came out
-            words += ["-W", "ignore::RuntimeWarning"]
         for plugin in plugins:
             plugin.start()
         code = pytest.main([*words, *tests], plugins=list(plugins))
@@ -92,8 +82,8 @@ class Run:
 class Tracer:
     """A plugin: lines that each test passes, and seconds of processor time it takes."""
 
-    def __init__(self, data: Path, limit: float | None) -> None:
-        self.data, self.limit = data, limit
+    def __init__(self, data: Path) -> None:
+        self.data = data
         self.seconds: dict[str, float] = {}
         self.took = 0.0
 
@@ -116,19 +106,11 @@ class Tracer:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
-        """The test ends where it takes too long."""
-
-        def end(*_: Any) -> None:
-            raise TimeoutError
-
-        if self.limit:
-            signal.signal(signal.SIGVTALRM, end)
-            signal.setitimer(signal.ITIMER_VIRTUAL, self.limit)
+        """How long it takes."""
         began = time.process_time()  # others may load the machine
         try:
             return (yield)
         finally:
-            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
             self.took = time.process_time() - began
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
@@ -198,23 +180,21 @@ def importers(path: Path) -> list[Path]:
     return [p for p in sources() if text.search((ROOT / p).read_text("utf-8"))]
 
 
-def traced(tree: Path, kept: Path, uncompiled: bool) -> Trace:
+def traced(tree: Path, kept: Path) -> Trace:
     """The default tests of each folder, traced, or what an earlier call left of them.
 
     A folder of which a test has changed since is traced anew.
     """
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}
-    for folder in UNCOMPILED if uncompiled else places_of_tests():
-        name = "uncompiled" if uncompiled else "compiled"
-        data = kept / f"{name}.{folder.replace('/', '.')}.coverage"
+    for folder in places_of_tests():
+        data = kept / f"{folder.replace('/', '.')}.coverage"
         times = data.with_suffix(".json")
         changed = max((path.stat().st_mtime for path in tests_in(folder)), default=0.0)
         if not times.exists() or times.stat().st_mtime < changed:
             data.unlink(missing_ok=True)
-            tracer = Tracer(data, UNCOMPILED_SECONDS if uncompiled else None)
-            Run(tree, uncompiled, 7200)([folder], (tracer,))
-            print(f"traced {folder}, {name}", flush=True)
+            Run(tree, 7200)([folder], (Tracer(data),))
+            print(f"traced {folder}", flush=True)
         part = CoverageData(str(data))
         part.read()
         lines.update(part)

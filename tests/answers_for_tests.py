@@ -4,8 +4,7 @@
 
 Stored numbers prove nothing about mechanics; the laws beside them do.  They tell that a
 change which was to change nothing changed nothing.  Left out is what rounding decides:
-what changes where the inputs are moved by 1e-12, or on an older processor that has no
-compiler for C++.
+what changes where the inputs are moved by 1e-12, or on an older processor.
 """
 
 import dataclasses
@@ -38,7 +37,6 @@ from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise
 from assembly.statistics.tolerances import present_errors
-from forcefit.native.libraries import by_numba
 from stiffness.fem.fea import FemOptions, solve_bar
 from stiffness.fem.material import Material
 from stiffness.fem.stress import peak_stress, stress_influence
@@ -67,7 +65,7 @@ PRINTED = "--print"  # the answers, instead of storing them
 # a processor without wide vectors: sums in other orders
 OLDER = {
     "OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3",
-    "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONWARNINGS": "ignore",
+    "PYTHONWARNINGS": "ignore",
 }  # fmt: skip
 FEW = 6  # numbers that are stored one by one; of more, two sums
 LONG = 200  # letters, of which the numbers are stored
@@ -278,8 +276,7 @@ def main() -> None:
     """Store answers."""
     names = [name for name in sys.argv[1:] if name != PRINTED] or [*QUESTIONS]
     if PRINTED in sys.argv:
-        with by_numba():
-            answers = {name: leaves(QUESTIONS[name](0.0)) for name in names}
+        answers = {name: leaves(QUESTIONS[name](0.0)) for name in names}
         print(json.dumps(answers))
         return
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # from the ground up: a chapter imports only chapters before its own, and itself
 FLOORS = (
-    "forcefit/inputs", "forcefit/native", "forcefit/page",
+    "forcefit/inputs", "forcefit/page",
     "stiffness/screws", "stiffness/link", "stiffness/beam", "stiffness/surface",
     "stiffness/mesh", "stiffness/fem", "stiffness/report", "stiffness/exchange",
     "assembly/kernels", "assembly/solvers", "assembly/model", "assembly/kinematics",
@@ -40,7 +40,6 @@ OWNERS = {
         "assembly/statistics/worst_case.py",
     ),
     "exudyn": (SIMULATION,),
-    "numba": ("assembly/solvers/compiled.py",),
     "xarray": (
         "assembly/sweeps/dataset.py",
         "assembly/statistics/monte_carlo.py",
@@ -197,10 +196,6 @@ def test_nothing_heavy_is_imported_before_it_is_needed(module):
 @pytest.mark.slow
 def test_nothing_heavy_is_imported_with_all_files_at_once():
     files = [path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")]
-    # files of compiled loops, and the one that says how they are compiled
-    loops = {f"assembly.solvers.compiled.{one}" for one in ("kernel", "part")}
-    loops.add("numba.njit")
-    files = [path for path in files if not loops & set(imports(path))]
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
     modules = sorted(name.removesuffix(".__init__") for name in names)
     assert loaded(", ".join(modules), ROOT) == []
@@ -214,7 +209,7 @@ def test_nothing_heavy_is_imported_with_all_files_at_once():
         ("assembly solve --help", ("numpy", "scipy", "rich")),
         ("validation diagnose --help", ("numpy", "scipy", "rich")),
         ("stiffness beam --length 1 --radius 0.1 --young 1e9 --poisson 0.3",
-         ("numba", "scipy")),
+         ("scipy",)),
         ("assembly zone irsbot2; assembly error irsbot2; "
          "assembly solve irsbot2 --pose tx=0.1,tz=-0.5", FOR_MANY),
     ],
@@ -234,7 +229,7 @@ for words in {words.split(";")}:
     except SystemExit as done:
         assert not done.code
 """
-    unwanted = {*HEAVY} - {"numba", "clarabel"} | {*left_out}
+    unwanted = {*HEAVY} - {"clarabel"} | {*left_out}
     assert sorted(unwanted & in_memory(code, ROOT)) == []
 
 

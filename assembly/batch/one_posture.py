@@ -7,13 +7,12 @@ whose certificate falls short, or that this does not cover, is solved again by
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.batch.draws import Draws
-from assembly.batch.draws_side_by_side import least_energies_side_by_side
+from assembly.batch.draws_side_by_side import Energies, Reduced, least_energies
 from assembly.batch.posture_loads import PostureLoads
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
@@ -28,9 +27,6 @@ from assembly.linear.reduction import FreeMotion
 from assembly.linear.rounding import closure_rounding, drop_zeros
 from assembly.linear.thresholds import INFEASIBLE, OPEN
 from assembly.solvers.conic import SolverFailed
-
-if TYPE_CHECKING:
-    from assembly.batch.compiled_draws import Reduced
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +143,6 @@ class OnePosture:
 
 def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
     """Least energies of k draws."""
-    from assembly.batch.compiled_draws import Energies, least_energies
-
     count, n = len(errors), len(one.posture.robot.frames)
     flat = errors.reshape(-1, 6 * n)
     erring = np.flatnonzero(flat.any(axis=0))  # most components have no error
@@ -163,9 +157,7 @@ def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
     most = np.concatenate([np.ones(nu), np.abs(e).max(axis=0, initial=0.0)])
     reduced = _reduced(one, np.abs(motions) @ most)
     h = e @ one.misfit[:, erring].T
-    out = Energies(u, y, energy, bound, outcome)
-    if not least_energies_side_by_side(reduced, h, out):
-        least_energies(reduced, h, out)
+    least_energies(reduced, h, Energies(u, y, energy, bound, outcome))
     parts = np.hstack([u, e])
     multipliers = y @ one.closing.T
     screw = parts @ screws.T
@@ -201,10 +193,8 @@ def _solve_draws(one: OnePosture, errors: NDArray) -> Draws:
     return draws
 
 
-def _reduced(one: OnePosture, most: NDArray) -> "Reduced":
+def _reduced(one: OnePosture, most: NDArray) -> Reduced:
     """What all draws share, free motions moving by at most (nq,) ``most``."""
-    from assembly.batch.compiled_draws import Reduced
-
     loads, slack = one.loads, 0.0
     if loads is not None:
         most = most + np.abs(loads.motions)
@@ -215,11 +205,10 @@ def _reduced(one: OnePosture, most: NDArray) -> "Reduced":
         inverse=np.linalg.pinv(one.G),
         cones=one.cones,
         gram=one.on_springs.T @ one.on_springs,
-        d=np.zeros(one.G.shape[1]) if loads is None else loads.d,
+        d=None if loads is None else loads.d,
         slip=float(np.linalg.norm(np.abs(one.free).T @ most)),
         slack=slack,
         stored=0.0 if loads is None else loads.stored,
-        loaded=loads is not None,
     )
 
 

@@ -1,7 +1,6 @@
 """Continuation to several targets side by side, compiled.
 
-The same steps and thresholds as :mod:`assembly.kinematics.compiled_continuation`, one
-target in each lane of the processor's vector registers.  No lane depends on another.
+One target in each lane of the processor's vector registers; no lane depends on another.
 """
 
 from typing import Any
@@ -11,14 +10,13 @@ from numpy.typing import NDArray
 
 from assembly.kernels.choice import kernels
 from assembly.kinematics.track import Track
-from forcefit.native.libraries import numba_alone
 
 
 def tree_of(fields: dict[str, Any]) -> Any:
     """A robot's tree for C++.
 
     Args:
-        fields: of :class:`assembly.kinematics.compiled_continuation.Tree`.
+        fields: arrays and numbers of ``Tree`` in ``assembly/kernels/records.h``.
 
     Returns:
         The same, checked.
@@ -32,7 +30,7 @@ def tree_of(fields: dict[str, Any]) -> Any:
 def follow_side_by_side(
     tree: Any, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: Track,
-) -> bool:  # fmt: skip
+) -> None:  # fmt: skip
     """Follow every target along its straight line.
 
     Args:
@@ -42,16 +40,11 @@ def follow_side_by_side(
         held: (k, n) coordinates, NaN where free.
         guess: the start is one, and does not close: one step, of any length.
         track: to fill.
-
-    Returns:
-        Whether it did; not where callers asked for numba.
     """
-    if numba_alone():
-        return False
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
     if len(held) == 1:
         _follow(tree, (start, poses, held), guess, out)
-        return True
+        return
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
     while left.size:
@@ -65,7 +58,6 @@ def follow_side_by_side(
         if not whole:
             for array, part in zip(out, filled, strict=True):
                 array[rows] = part
-    return True
 
 
 def _follow(

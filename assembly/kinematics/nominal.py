@@ -3,8 +3,7 @@
 Many targets are followed at once, each along its straight line from the home pose.
 Steps are damped Gauss-Newton of least norm, so what the closures and the target leave
 undetermined stays unchanged, and overconstrained robots are no special case.  The
-loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`, and
-:mod:`assembly.kinematics.compiled_continuation` by numba.
+loops are compiled: :mod:`assembly.kinematics.continuation_side_by_side`.
 """
 
 from dataclasses import dataclass
@@ -125,11 +124,5 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         np.zeros((count, len(tree["pairs"]))),
     )  # fmt: skip
     track.transforms[..., 3, 3] = 1.0
-    if not follow_side_by_side(addresses, start, poses, held, guess, track):
-        from assembly.kinematics.compiled_continuation import Tree, follow_all
-
-        follow_all(
-            Tree(**tree), start, poses, held, guess, track.coordinates, track.progress,
-            track.transforms, track.closure_mismatch,
-        )  # fmt: skip
+    follow_side_by_side(addresses, start, poses, held, guess, track)
     return track

@@ -17,8 +17,8 @@ from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
-# by the codes of assembly.linear.compiled_energy: the solver that solved, or, after the
-# second, why the point went to the fallback
+# by the codes of assembly/kernels/linear/energies.h: the solver that solved, or, after
+# the second, why the point went to the fallback
 OUTCOMES = (
     "dual Newton", "interior point", "rigid rows", "rank in doubt", "uncertified",
     "bounded joint", "free motion", "one by one",

@@ -1,8 +1,7 @@
 """The least energy that closes a manipulator, problem (22): one answer or many.
 
-Compiled from the frames' poses to the certificate
-(:mod:`assembly.linear.compiled_energy`), with loads and without: about a tenth of a
-millisecond a point.  What this does not cover, or where its certificate falls short, is
+Compiled from the frames' poses to the certificate (:mod:`assembly.linear.lanes`), with
+loads and without.  What this does not cover, or where its certificate falls short, is
 solved by :mod:`assembly.linear.fallback`, and is counted.
 """
 
@@ -226,45 +225,22 @@ def _solve_compiled(
             if some.all():
                 _fill(given, acting)
             elif some.any():
-                _fill_some(_fill, some, given, acting)
+                _fill_some(some, given, acting)
     return out
 
 
 def _fill(given: _Given, loads: NDArray | None) -> None:
-    """Every point: side by side, by numba where callers asked for it."""
-    structure, T, errors, mismatch, out = given
-    if loads is None and not np.count_nonzero(errors):
-        return  # nothing has to move, and zeros are the answer
-    if not assemble_side_by_side(*given, loads):
-        return _fill_by_numba(given, loads)
-    # what was not certified side by side; rounding is another
-    left = out.outcome >= COMPILED
-    if np.count_nonzero(left):
-        _fill_some(_fill_by_numba, left, given, loads)
+    """Every point; zeros are the answer where nothing has to move."""
+    if loads is not None or np.count_nonzero(given[2]):
+        assemble_side_by_side(*given, loads)
 
 
-def _fill_by_numba(given: _Given, loads: NDArray | None) -> None:
-    """One point after the other; numba's functions know writable arrays only."""
-    from assembly.linear.compiled_energy import assemble_all
-
-    structure, T, errors, mismatch, out = given
-    none = np.zeros((0, 2, T.shape[1], 6))
-    T, errors, loads = (
-        np.require(rows, requirements=["C", "W"])
-        for rows in (T, errors, none if loads is None else loads)
-    )
-    assemble_all(structure, T, errors, mismatch, loads, out)
-
-
-def _fill_some(
-    fill: Callable[[_Given, NDArray | None], None], some: NDArray, given: _Given,
-    loads: NDArray | None,
-) -> None:  # fmt: skip
+def _fill_some(some: NDArray, given: _Given, loads: NDArray | None) -> None:
     """Fill the rows of some of the points."""
     structure, T, errors, mismatch, out = given
     again = Solutions._make(rows[some] if len(rows) else rows for rows in out)
     own = errors[some] if len(errors) > 1 else errors
-    fill(
+    _fill(
         (structure, T[some], own, mismatch[some], again),
         None if loads is None else loads[some],
     )

@@ -1,8 +1,8 @@
-"""Problem (27) as :mod:`assembly.linear.compiled_reach` reads it, and its call."""
+"""Problem (27) as the compiled search reads it, and its call."""
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,22 +106,8 @@ def compiled_bounds(
         places.moving, T, off, centres, loads,
         (np.array(asked.offset, float), np.array(tolerance, float)),
     )  # fmt: skip
-    left = bounds.outcome == SOLVED
-    if bounds_side_by_side(*given, bounds):
-        left &= bounds.outcome != SOLVED
-    if left.any():
-        _bound_left(given, left, bounds)
+    bounds_side_by_side(*given, bounds)
     return bounds
-
-
-def _bound_left(given: tuple[Any, ...], left: NDArray, bounds: Bounds) -> None:
-    """By numba what side by side was not bounded; rounding there is another."""
-    from assembly.linear.compiled_reach import bound_all
-
-    again = bounds._replace(outcome=np.where(left, SOLVED, FALLBACK))
-    bounds.supports[left] = 0
-    bound_all(*given, again)
-    bounds.outcome[left] = again.outcome[left]
 
 
 class _Places(NamedTuple):

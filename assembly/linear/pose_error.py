@@ -15,9 +15,10 @@ bounded each by itself: a tool on a bearing turns freely, and its point still ha
 largest error.
 
 The set of platform screws (:mod:`assembly.linear.reach`) is convex; its farthest one is
-bracketed by :mod:`assembly.solvers.farthest`, compiled, with Clarabel as its fallback.
-The first two readings are compiled whole (:mod:`assembly.linear.compiled_reach`): some
-tenths of a millisecond a point.  ``budget``, and a point that this does not cover, is
+bracketed by :func:`assembly.solvers.one_problem.farthest`, compiled, with Clarabel as
+its fallback.  The first two readings are compiled whole
+(:mod:`assembly.linear.moving_clearances`): some tenths of a millisecond a point.
+``budget``, and a point that this does not cover, is
 left to numpy and counted.
 """
 

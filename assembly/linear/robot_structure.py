@@ -16,7 +16,6 @@ from assembly.linear.closure import (
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.model.robot import Robot
 from assembly.solvers.conic import cone_starts
-from assembly.solvers.layouts import Indices, Matrix, Vector
 
 
 class Structure(NamedTuple):
@@ -47,23 +46,23 @@ class Structure(NamedTuple):
 
     size: float
     platform: int
-    on_path: Vector
-    patterns: Matrix
-    pattern_of: Indices
-    springs: Matrix
-    spring_frame: Indices
-    spring_order: Indices
-    of_joint: Indices
-    groups: Indices
-    group_pattern: Indices
-    group_on_path: Vector
-    cone_frame: Indices
-    cone_axis: Indices
-    cone_size: Vector
-    starts: Indices
-    free_frame: Indices
-    free_axis: Indices
-    free_bound: Vector
+    on_path: NDArray
+    patterns: NDArray
+    pattern_of: NDArray
+    springs: NDArray
+    spring_frame: NDArray
+    spring_order: NDArray
+    of_joint: NDArray
+    groups: NDArray
+    group_pattern: NDArray
+    group_on_path: NDArray
+    cone_frame: NDArray
+    cone_axis: NDArray
+    cone_size: NDArray
+    starts: NDArray
+    free_frame: NDArray
+    free_axis: NDArray
+    free_bound: NDArray
 
 
 @lru_cache(maxsize=32)

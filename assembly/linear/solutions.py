@@ -5,7 +5,6 @@ from typing import NamedTuple
 from numpy.typing import NDArray
 
 from assembly.linear.robot_structure import Structure
-from assembly.solvers.layouts import Indices, Matrix, Vector
 
 # whether a margin (21), or a bound of a pose error (27), is solved
 SOLVED, FALLBACK = range(2)
@@ -29,17 +28,17 @@ class Solutions(NamedTuple):
             nobody asks.
     """
 
-    outcome: Indices
-    energy: Vector
-    bound: Vector
-    without_clearance: Vector
-    work: Vector
-    platform_screw: Matrix
-    clearances: Matrix
-    motions: Matrix
-    multipliers: Matrix
-    residual: Vector
-    elastic: Matrix
+    outcome: NDArray
+    energy: NDArray
+    bound: NDArray
+    without_clearance: NDArray
+    work: NDArray
+    platform_screw: NDArray
+    clearances: NDArray
+    motions: NDArray
+    multipliers: NDArray
+    residual: NDArray
+    elastic: NDArray
 
 
 class ClearanceLoads(NamedTuple):
@@ -55,11 +54,11 @@ class ClearanceLoads(NamedTuple):
     """
 
     structure: Structure
-    multipliers: Matrix
-    clearances: Matrix
-    energy: Vector
-    without_clearance: Vector
-    cone_of: Indices
+    multipliers: NDArray
+    clearances: NDArray
+    energy: NDArray
+    without_clearance: NDArray
+    cone_of: NDArray
 
 
 class Centres(NamedTuple):
@@ -71,9 +70,9 @@ class Centres(NamedTuple):
         motions: (k, nq) [rad, m] where they have a bound, else anything.
     """
 
-    screws: Matrix
-    clearances: Matrix
-    motions: Matrix
+    screws: NDArray
+    clearances: NDArray
+    motions: NDArray
 
 
 class Bounds(NamedTuple):

@@ -19,7 +19,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import checked_size
 from assembly.linear.fallback import reference_margin
 from assembly.linear.lanes import margins_side_by_side
-from assembly.linear.robot_structure import Structure, structure_of
+from assembly.linear.robot_structure import structure_of
 from assembly.linear.solutions import FALLBACK
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
@@ -214,23 +214,5 @@ def _compiled(
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),
             mismatch,
         )
-        _solve_all(structure, points, (margin, bound, outcome))
+        margins_side_by_side(structure, *points, (margin, bound, outcome))
     return margin, bound, outcome
-
-
-def _solve_all(
-    structure: Structure, points: tuple[NDArray, NDArray, NDArray],
-    out: tuple[NDArray, NDArray, NDArray],
-) -> None:  # fmt: skip
-    """Side by side, and by numba what is left: it rounds otherwise."""
-    margins_side_by_side(structure, *points, out)
-    left = np.flatnonzero(out[2])
-    if len(left):
-        from assembly.linear.compiled_zone import all_margins
-
-        T, errors, mismatch = points
-        again = tuple(rows[left] for rows in out)
-        own = errors[left] if len(errors) > 1 else errors
-        all_margins(structure, T[left], own, mismatch[left], *again)
-        for rows, solved in zip(out, again, strict=True):
-            rows[left] = solved

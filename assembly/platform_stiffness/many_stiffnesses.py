@@ -152,10 +152,7 @@ def platform_stiffnesses(
     joints, structure = structure_of(robot)
     inner = np.zeros((len(T), 6, len(structure.springs)))
     status = np.zeros(len(T), dtype=np.int64)
-    if not compliances_side_by_side(structure, T, off, inner, status):
-        from assembly.platform_stiffness.compiled_compliance import comply_all
-
-        comply_all(structure, T, off, inner, status)
+    compliances_side_by_side(structure, T, off, inner, status)
     size = size_of(robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths

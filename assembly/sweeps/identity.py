@@ -25,7 +25,7 @@ from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
 
 # libraries that the numbers depend on: another version may round differently
-_LIBRARIES = ("numpy", "scipy", "numba", "clarabel")
+_LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
 @cache

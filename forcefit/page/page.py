@@ -28,7 +28,7 @@ from forcefit.inputs.errors import BadInput
 from forcefit.page.charts import embedded
 from forcefit.page.tables import Value, inline, table
 
-_PACKAGES = ("numpy", "scipy", "numba", "clarabel", "cvxpy", "exudyn")
+_PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w]))")
 _DIGITS = 300  # of the longest integer that a float holds, nearly
 _BUTTONS = (

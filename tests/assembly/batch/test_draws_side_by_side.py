@@ -1,15 +1,14 @@
-"""Draws side by side in C++ against numba's kernel, and against each other."""
+"""Draws side by side against points one by one, and against each other."""
 
 import numpy as np
 import pytest
 
 from assembly.batch import one_posture
-from assembly.batch.compiled_draws import Energies
-from assembly.batch.draws_side_by_side import least_energies_side_by_side
+from assembly.batch.draws_side_by_side import Energies, least_energies
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import minimise_energies
 from assembly.robots import BUILT_IN
-from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
@@ -25,18 +24,18 @@ def draws_of(name, size, rng):
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
-def test_draws_have_numbas_energies(name, size, rng):
+def test_draws_have_the_energies_of_points(name, size, rng):
+    """Each above the other's certified bound, which is 1e-8 below its own energy."""
     one, errors = draws_of(name, size, rng)
-    lanes = one.solve(errors)
-    with by_numba():
-        numba = one.solve(errors)
-    assert not (lanes.fallback | numba.fallback).any()
-    assert np.array_equal(lanes.energy == 0.0, numba.energy == 0.0)
-    # each above the other's certified bound, which is 1e-8 below its own energy
-    rounding = 1e-8 * numba.energy + 2e-12 * numba.energy.max() + 1e-30
-    assert np.all(lanes.energy >= numba.bound - rounding)
-    assert np.all(numba.energy >= lanes.bound - rounding)
-    assert np.all(lanes.energy - lanes.bound <= rounding)
+    draws, home = one.solve(errors), one.posture
+    T = np.repeat(home.transforms[None], len(errors), axis=0)
+    points = minimise_energies(home.robot, T, errors, home.mismatch)
+    assert not draws.fallback.any()
+    assert points.fallbacks() == {}
+    rounding = 1e-8 * points.energy + 2e-12 * points.energy.max() + 1e-30
+    assert np.all(draws.energy >= points.bound - rounding)
+    assert np.all(points.energy >= draws.bound - rounding)
+    assert np.all(draws.energy - draws.bound <= rounding)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-3])
@@ -46,9 +45,9 @@ def test_a_draw_does_not_depend_on_its_neighbours(size, rng, monkeypatch):
 
     def note(reduced, h, out):
         given.append((reduced, h))
-        return least_energies_side_by_side(reduced, h, out)
+        least_energies(reduced, h, out)
 
-    monkeypatch.setattr(one_posture, "least_energies_side_by_side", note)
+    monkeypatch.setattr(one_posture, "least_energies", note)
     one, errors = draws_of("five_bar", size, rng)
     one.solve(errors)
     ((reduced, h),) = given
@@ -60,7 +59,7 @@ def test_a_draw_does_not_depend_on_its_neighbours(size, rng, monkeypatch):
             np.zeros((count, nu)), np.zeros((count, r)), np.zeros(count),
             np.zeros(count), np.zeros(count, dtype=np.int64),
         )  # fmt: skip
-        assert least_energies_side_by_side(reduced, h, out)
+        least_energies(reduced, h, out)
         return out
 
     whole = solve(h)

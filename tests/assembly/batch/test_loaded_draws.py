@@ -1,7 +1,6 @@
 """Draws of the errors under loads and weight: the same laws, and what follows."""
 
 import json
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,6 @@ from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
 from forcefit.commands.assembly import app
 from forcefit.inputs.table import BadInput
-from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import random_robot
 
 LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]
@@ -54,11 +52,10 @@ def test_draws_under_load_agree_with_one_solve_at_a_time(name, gravity):
         np.testing.assert_allclose(wrenches[i], answer.wrenches, atol=1e-4 * size)
 
 
-@pytest.mark.parametrize("method", [nullcontext, by_numba])
 @pytest.mark.parametrize("size", [0.01, 1.0, 10.0])
 @pytest.mark.parametrize("kappa", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("name", ["irsbot2", "five_bar", "3rrr", "hexapod"])
-def test_all_draws_under_load_are_certified_by_themselves(name, kappa, size, method):
+def test_all_draws_under_load_are_certified_by_themselves(name, kappa, size):
     """Each by what is eliminated once.  Strains y differ by their gaps' roots at most.
 
     Energy minus work is strongly convex in them: |y - y_least|^2 / 2 <= gap.
@@ -66,9 +63,8 @@ def test_all_draws_under_load_are_certified_by_themselves(name, kappa, size, met
     robot = load_robot(name)
     posture, errors = place_robot(robot), kappa * some_errors(robot)
     load, gravity = size * np.array(LOAD), size * np.array(GRAVITY)
-    with method():
-        found = prepare_energies(posture, load, gravity).solve(errors)
-        many = solve_assembly(posture, load, gravity=gravity, errors=errors)
+    found = prepare_energies(posture, load, gravity).solve(errors)
+    many = solve_assembly(posture, load, gravity=gravity, errors=errors)
     assert not found.fallback.any()
     assert many.fallbacks() == {}
     rounding = 1e-12 * (many.energy_without_clearance + np.abs(many.work))

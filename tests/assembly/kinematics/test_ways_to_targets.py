@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from assembly.kinematics.nominal import Target, follow
 from assembly.kinematics.posture import (
@@ -15,9 +16,14 @@ from assembly.kinematics.posture import (
 )
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
-from forcefit.native.libraries import by_numba
-from tests.assembly.kinematics.test_compiled_continuation import frames_of
-from tests.linkages_for_tests import five_bar, four_bar
+from stiffness.screws import rotation_matrix, transform
+from tests.linkages_for_tests import (
+    CRANK,
+    GROUND,
+    five_bar,
+    four_bar,
+    four_bar_angles,
+)
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 
@@ -119,10 +125,28 @@ def test_what_a_pose_leaves_open_does_not_hang_on_rounding(name):
     assert all(np.abs(first - other).max() < 1e-6 for other in others)
 
 
-def ended(robot, start, target, guess=False):
-    """A track of numba's loops."""
-    with by_numba():
-        return follow(robot, np.array(start, dtype=float), target, guess)
+def frames_of(robot, q):
+    """Products of transforms, one after the other."""
+    T, after = [], []
+    for i, frame in enumerate(robot.frames):
+        parent = robot.parents[i]
+        before = np.eye(4) if parent < 0 else after[parent]
+        T.append(before @ robot.fixed_transforms[i])
+        motion = {
+            "fixed": np.eye(4),
+            "revolute": transform(np.zeros(3), rotation_matrix([0, 0, q[i]])),
+            "prismatic": transform([0, 0, q[i]], np.eye(3)),
+        }[frame.joint]
+        after.append(T[i] @ motion)
+    return np.array(T)
+
+
+def held_at(robot, **coordinates):
+    """One row of coordinates that are held, and those that are free."""
+    held = np.full((1, len(robot.frames)), np.nan)
+    for name, value in coordinates.items():
+        held[0, robot.index(name)] = value
+    return Target(coordinates=held)
 
 
 def test_frames_and_what_is_open_are_those_of_the_end():
@@ -139,7 +163,7 @@ def test_frames_and_what_is_open_are_those_of_the_end():
     ), tuple(("a", seat.name) for seat in seats))  # fmt: skip
     held = np.full((2, 5), np.nan)
     held[:, 0] = 0.3, -0.4
-    track = ended(robot, np.zeros(5), Target(coordinates=held), guess=True)
+    track = follow(robot, np.zeros(5), Target(coordinates=held), guess=True)
     for row in range(2):
         q = [held[row, 0], 0, 0, 0, 0]
         assert track.coordinates[row] == pytest.approx(q, abs=1e-15)
@@ -147,8 +171,7 @@ def test_frames_and_what_is_open_are_those_of_the_end():
         assert track.closure_mismatch[row] == pytest.approx([4e-3, 3e-7, 7e-3])
 
 
-@pytest.mark.parametrize("loops", ["numba", "default"])
-def test_a_closure_is_open_by_no_number_where_a_frame_is_at_none(loops):
+def test_a_closure_is_open_by_no_number_where_a_frame_is_at_none():
     """However well its turns are closed, and along whichever axis."""
     half = math.pi / 2
     for turn in ([0, half, 0], [half, 0, 0], [0, 0, 0]):  # slides along x, y, z
@@ -157,13 +180,12 @@ def test_a_closure_is_open_by_no_number_where_a_frame_is_at_none(loops):
             Frame("b", translation=[1e-3, 0, 0]),
         ), (("a", "b"),))  # fmt: skip
         nowhere = np.full(3, np.nan), Target(coordinates=np.full((1, 3), np.nan)), True
-        track = (ended if loops == "numba" else follow)(robot, *nowhere)
+        track = follow(robot, *nowhere)
         assert np.isnan(track.closure_mismatch).all()
         assert not track.reached.any()
 
 
-@pytest.mark.parametrize("loops", ["numba", "default"])
-def test_what_cannot_be_reached_stops_on_the_straight_line_to_it(loops):
+def test_what_cannot_be_reached_stops_on_the_straight_line_to_it():
     """Of three hinges in a plane, place and turn: in parts as progress says.
 
     The last step is 1e-5 of the way, 1 m and 1 rad.
@@ -179,11 +201,7 @@ def test_what_cannot_be_reached_stops_on_the_straight_line_to_it(loops):
     goal = begin + [0.8, -0.3, 0.5]
     pose = np.full((2, 6), np.nan)
     pose[:, [0, 1, 5]] = goal, begin + 0.1 * (goal - begin)
-    target = Target(pose=pose)
-    if loops == "numba":
-        track = ended(robot, robot.positions, target)
-    else:
-        track = follow(robot, robot.positions, target)
+    track = follow(robot, robot.positions, Target(pose=pose))
     assert track.reached.tolist() == [False, True]
     assert 0.1 < track.progress[0] < 1
     wanted = begin + np.outer([track.progress[0], 0.1], goal - begin)
@@ -199,13 +217,118 @@ def test_what_cannot_be_reached_stops_on_the_straight_line_to_it(loops):
 def test_both_poses_and_coordinates_are_followed_together():
     """A drive held and one component asked: the other drive closes."""
     robot = five_bar()
-    home = ended(robot, robot.positions, Target(coordinates=np.full((1, 8), np.nan)))
+    home = follow(robot, robot.positions, Target(coordinates=np.full((1, 8), np.nan)))
     pose, held = np.full((1, 6), np.nan), np.full((1, 8), np.nan)
     pose[0, 0] = home.transforms[0, robot.index("right.tip"), 0, 3] + 0.02
     held[0, 0] = robot.positions[0] + 0.03
-    track = ended(robot, robot.positions, Target(pose, held))
+    track = follow(robot, robot.positions, Target(pose, held))
     assert track.reached[0]
     assert track.coordinates[0, 0] == held[0, 0]
     tip = track.transforms[0, robot.index("right.tip")]
     assert tip[0, 3] == pytest.approx(pose[0, 0], abs=1e-9)
     assert track.mismatch[0] < 1e-9
+
+
+BALL = Robot("ball", "body", (
+    *(
+        Frame(f"slide{k}", f"slide{k - 1}" if k else "base", rotation=turn,
+              joint="prismatic", actuated=True)
+        for k, turn in enumerate([[0, np.pi / 2, 0], [-np.pi / 2, 0, 0], [0, 1.1, 0]])
+    ),
+    *(
+        Frame(f"turn{k}", f"turn{k - 1}" if k else "slide2", rotation=turn,
+              joint="revolute", actuated=True)
+        for k, turn in enumerate([[0, 0.3, 0], [np.pi / 2, 0, 0], [0, np.pi / 2, 0]])
+    ),
+    Frame("body", "turn2", [0.1, 0.0, 0.2]),
+))  # fmt: skip
+
+
+@pytest.mark.parametrize("given", ["all", "turns", "place"])
+def test_a_free_body_is_turned_and_put_where_it_is_told(given, rng):
+    """Rotation vectors by scipy, from no turn to nearly half a turn about any axis."""
+    robot = BALL
+    axes = rng.normal(size=(60, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    angles = np.r_[0.0, 1e-9, 1e-4, 3.1, np.pi - 1e-7, rng.uniform(0.1, 3.0, 55)]
+    wanted = np.full((60, 6), np.nan)
+    if given != "turns":
+        wanted[:, :3] = 0.3 * rng.normal(size=(60, 3))
+    if given != "place":
+        wanted[:, 3:] = axes * angles[:, None]
+    track = follow(robot, np.zeros(7), Target(pose=wanted))
+    # its own joints may be locked on the way; most are not
+    assert track.reached.sum() > 40
+    T = track.transforms[track.reached, robot.index("body")]
+    wanted = wanted[track.reached]
+    if given != "turns":
+        np.testing.assert_allclose(T[:, :3, 3], wanted[:, :3], rtol=0, atol=EXACT)
+    if given != "place":
+        R = Rotation.from_rotvec(wanted[:, 3:]).as_matrix()
+        np.testing.assert_allclose(T[:, :3, :3], R, rtol=0, atol=1e-8)
+
+
+def test_one_component_of_a_turn_is_that_of_scipys_vector(rng):
+    """The others are left open; beside a place."""
+    robot = BALL
+    wanted = np.full((12, 6), np.nan)
+    wanted[:, :3] = 0.2 * rng.normal(size=(12, 3))
+    wanted[np.arange(12), 3 + np.arange(12) % 3] = rng.uniform(-0.8, 0.8, 12)
+    track = follow(robot, np.zeros(7), Target(pose=wanted))
+    assert track.reached.sum() > 6
+    T = track.transforms[track.reached, robot.index("body")]
+    wanted = wanted[track.reached]
+    vectors = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
+    found = np.c_[T[:, :3, 3], vectors]
+    asked = np.isfinite(wanted)
+    np.testing.assert_allclose(found[asked], wanted[asked], rtol=0, atol=1e-8)
+
+
+def test_nothing_is_reached_where_nothing_can_close():
+    """The two bars are 0.1 m too short for the crank's place."""
+    robot = Robot("short", "end", (
+        Frame("crank", joint="revolute", actuated=True),
+        Frame("elbow", "crank", [CRANK, 0, 0], joint="revolute"),
+        Frame("end", "elbow", [0.2, 0, 0]),
+        Frame("rocker", translation=[GROUND, 0, 0], joint="revolute",
+              position=np.pi),
+        Frame("wrist", "rocker", [0.2, 0, 0], joint="revolute", position=np.pi),
+        Frame("seat", "wrist"),
+    ), (("end", "seat"),))  # fmt: skip
+    start = np.array(robot.positions) + [0, 0.1, 0, -0.1, 0, 0]
+    for guess in (True, False):
+        assert not follow(robot, start, held_at(robot, crank=0.0), guess).reached[0]
+
+
+@pytest.mark.parametrize(
+    ("gap", "accepted"),
+    [(0.0, True), (0.9e-5, True), (1.1e-5, False), (1e-3, False), (0.5, False)],
+)
+def test_what_no_joint_can_close_is_accepted_to_a_hundred_thousandth(gap, accepted):
+    """Of the reference length, 2 m: what rounding leaves in files may be so much."""
+    robot = Robot("gap", "far", (
+        Frame("a"), Frame("b", translation=[2 * gap, 0, 0]),
+        Frame("c", joint="revolute"), Frame("far", "c", [2.0, 0, 0]),
+    ), (("a", "b"),))  # fmt: skip
+    assert follow(robot, np.zeros(4), held_at(robot), True).reached[0] == accepted
+
+
+def test_what_a_target_leaves_open_is_still_followed():
+    """Two drives of a five-bar and one coordinate asked: any elbow would do."""
+    robot, pose = five_bar(), np.full((1, 6), np.nan)
+    pose[0, 0] = 0.01
+    track = follow(robot, robot.positions, Target(pose=pose))
+    assert track.reached[0]
+    assert track.transforms[0, robot.index("right.tip"), 0, 3] == pytest.approx(0.01)
+    assert track.mismatch[0] < 1e-9
+
+
+def test_a_guess_takes_one_step_of_any_length():
+    robot, start = four_bar(0.5), np.array(four_bar(0.5).positions)
+    held = held_at(robot, crank=0.5)
+    track = follow(robot, start, held, True)
+    assert track.progress[0] == 1.0
+    assert track.coordinates[0, 3] == pytest.approx(four_bar_angles(0.5)[1], abs=EXACT)
+    # a coordinate that is none closes nothing
+    start[1] = np.nan
+    assert follow(robot, start, held, True).progress[0] == 0.0

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import Posture, home_posture
+from assembly.linear import energy
+from assembly.linear.assemblies import OUTCOMES
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.fallback import (
@@ -15,7 +17,6 @@ from assembly.linear.fallback import (
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
-from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -106,7 +107,7 @@ def test_errors_of_their_own_for_every_point(grid, rng):
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-@pytest.mark.parametrize("size", [1e-5, 1e-3])
+@pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
 def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
     home = home_posture(BUILT_IN[name]())
     robot = home.robot
@@ -251,30 +252,27 @@ def test_the_certificate_refuses_a_spoilt_point(grid):
     assert not unknown.certified.any()
 
 
-def test_a_spoilt_solver_is_caught_and_the_fallback_taken(grid, monkeypatch):
-    """The kernel's own certificate: asked for more than is possible, it refuses."""
+def test_what_is_not_certified_the_reference_solves(grid, monkeypatch):
+    """One point of three, with its own errors; the others stay as they are."""
     robot, postures = grid
-    from assembly.linear import compiled_energy as compiled_assembly
+    T, mismatch = stack(postures[:3])
+    errors = robot.errors * np.array([1.0, 0.5, 2.0])[:, None, None]
+    whole = minimise_energies(robot, T, errors, mismatch)
+    solve = energy.assemble_side_by_side
 
-    assemble_all = compiled_assembly.assemble_all
+    def uncertified(*given):
+        solve(*given)
+        given[4].outcome[1] = OUTCOMES.index("uncertified")
 
-    def spoilt(s, T, errors, mismatch, loads, out):
-        assemble_all(s, T, errors, mismatch, loads, out)
-        for i in range(len(T)):
-            out.energy[i] *= 1 + 1e-6
-            P = compiled_assembly.paths_of(T[i], s)
-            out.outcome[i] = compiled_assembly._certify(
-                i, s, P, errors[0], np.zeros(out.multipliers.shape[1]), 0, -1.0, out
-            )
-
-    monkeypatch.setattr(compiled_assembly, "assemble_all", spoilt)
-    T, _ = stack(postures[:2])
-    with by_numba():
-        batch = minimise_energies(robot, T)
-        one = reference_assembly(postures[0])
-    assert batch.fallbacks() == {"uncertified": 2}
+    monkeypatch.setattr(energy, "assemble_side_by_side", uncertified)
+    monkeypatch.setattr(energy, "_compiled_assembly", lambda *given: None)
+    batch = minimise_energies(robot, T, errors, mismatch)
+    own = replace(postures[1], robot=robot.with_errors(errors[1]))
+    assert batch.fallbacks() == {"uncertified": 1}
     assert batch.certified.all()
-    assert batch.energy[0] == one.energy
+    assert batch.energy[1] == pytest.approx(reference_assembly(own).energy, rel=1e-14)
+    assert np.array_equal(batch.energy[[0, 2]], whole.energy[[0, 2]])
+    assert batch.energy == pytest.approx(whole.energy, rel=2e-8)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Batched bounds of (27) against one posture at a time, on many robots."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from assembly.linear.moving_clearances import Asked
 from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
-from forcefit.native.libraries import by_numba
 from tests.assembly.linear.test_pose_error import hinged_frame
 from tests.robots_for_tests import (
     coaxial_beams,
@@ -122,13 +120,11 @@ def test_random_robots(seed):
 
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
 @pytest.mark.parametrize("reading", ["frozen", "free"])
-@pytest.mark.parametrize("compiled", [nullcontext, by_numba])
-def test_bounds_of_passive_joints_count_in_a_batch(spin, reading, compiled):
+def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
     """Compiled where no clearance comes near them, else by the fallback."""
     posture = home_posture(hinged_frame(spin))
     one = reference_pose_error(reference_assembly(posture), Asked(reading))
-    with compiled():
-        batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
+    batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
     assert_overlap(batch, 0, one)
     assert batch.fallback[0] == (0.0 < spin < 1e-3)
     loose = home_posture(hinged_frame(None))

@@ -93,20 +93,3 @@ def test_a_robots_addresses_are_found_again(monkeypatch):
     first = lanes._robot(one)
     lanes._robot(other)
     assert lanes._robot(one) is first
-
-
-def test_deformations_side_by_side_need_closures_alone(monkeypatch):
-    """An open chain is left to others; whatever else is asked of the library."""
-    asked = []
-    monkeypatch.setattr(
-        lanes, "_side_by_side", lambda *given: asked.append(given) or True
-    )
-    closed = structure_of(planar_four_bar())[1]
-    T = home_posture(planar_four_bar()).transforms[None]
-    rows = np.zeros(1), np.zeros((1, 6, 1)), np.zeros(1)
-    assert lanes.compliances_side_by_side(closed, T, *rows)
-    assert len(asked) == 1
-    assert not lanes.compliances_side_by_side(
-        closed._replace(patterns=np.zeros((1, 0))), T, *rows
-    )
-    assert len(asked) == 1

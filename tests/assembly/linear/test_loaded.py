@@ -1,6 +1,5 @@
 """Problem (22) under loads, compiled: closed forms, cvxpy, reference, certificates."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,6 @@ from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN, load_robot
 from assembly.solvers.conic import SolverFailed
-from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -37,7 +35,6 @@ ROWS = (
     "outcome", "energy", "bound", "energy_without_clearance", "work", "platform_screw",
     "closure_residual", "clearances", "motions", "multipliers",
 )  # fmt: skip
-methods = pytest.mark.parametrize("method", [nullcontext, by_numba])
 
 
 def compiled(posture, *loads, **others):
@@ -48,19 +45,16 @@ def compiled(posture, *loads, **others):
     return many
 
 
-@methods
-def test_a_spring_gives_by_force_over_stiffness(method):
+def test_a_spring_gives_by_force_over_stiffness():
     """A load w on two springs k1, k2 side by side: w / (k1 + k2), w^2 / 2 (k1 + k2)."""
-    with method():
-        many = compiled(home_posture(coaxial_beams([0.0] * 6, (1e6, 3e6))), LOAD)
+    many = compiled(home_posture(coaxial_beams([0.0] * 6, (1e6, 3e6))), LOAD)
     assert many.platform_screw[0] == pytest.approx(LOAD / 4e6, rel=1e-12)
     assert many.energy[0] == pytest.approx(LOAD @ LOAD / 8e6, rel=1e-12)
     assert many.work[0] == pytest.approx(LOAD @ LOAD / 4e6, rel=1e-12)
 
 
-@methods
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
-def test_a_pin_rattles_to_its_rim_before_both_springs_give(method, force):
+def test_a_pin_rattles_to_its_rim_before_both_springs_give(force):
     """Radial clearance c: the platform's spring gives alone until it reaches the rim.
 
     From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,
@@ -69,16 +63,14 @@ def test_a_pin_rattles_to_its_rim_before_both_springs_give(method, force):
     k1, k2, c = 1e6, 3e6, 1e-4
     robot = coaxial_beams([0.0] * 6, (k1, k2), clearance=Clearance(radial=c))
     robot = replace(robot, platform="one")
-    with method():
-        many = compiled(home_posture(robot), [0, 0, 0, 0.6 * force, 0.8 * force, 0])
+    many = compiled(home_posture(robot), [0, 0, 0, 0.6 * force, 0.8 * force, 0])
     x = force / k1 if force <= k1 * c else (force + k2 * c) / (k1 + k2)
     stored = k1 * x**2 / 2 + k2 * max(0.0, x - c) ** 2 / 2
     assert many.platform_screw[0, 3:5] == pytest.approx([0.6 * x, 0.8 * x], rel=1e-7)
     assert many.energy[0] == pytest.approx(stored, rel=2e-8)
 
 
-@methods
-def test_clearance_without_a_spring_lets_the_load_fall_onto_its_rim(method):
+def test_clearance_without_a_spring_lets_the_load_fall_onto_its_rim():
     """A spring and a pin in series, in no closure: c + w / k, energy w^2 / 2k."""
     k, c, force = 1e5, 2e-4, 7.0
     frames = (
@@ -86,18 +78,14 @@ def test_clearance_without_a_spring_lets_the_load_fall_onto_its_rim(method):
         Frame("pin", "arm", clearance=Clearance(radial=c)),
         Frame("tip", "pin"),
     )
-    with method():
-        many = compiled(
-            home_posture(Robot("hung", "tip", frames)), [0, 0, 0, 0, -force, 0]
-        )
+    many = compiled(home_posture(Robot("hung", "tip", frames)), [0, 0, 0, 0, -force, 0])
     assert many.platform_screw[0, 4] == pytest.approx(-c - force / k, rel=1e-12)
     assert many.energy[0] == pytest.approx(force**2 / (2 * k), rel=1e-12)
     assert many.work[0] == pytest.approx(force * c + force**2 / k, rel=1e-12)
 
 
-@methods
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "five_bar", "four_bar"])
-def test_without_clearances_loads_and_errors_add_up(name, method, rng):
+def test_without_clearances_loads_and_errors_add_up(name, rng):
     """Superposition, and the reciprocity of the platform's compliance."""
     posture = home_posture(without_joint_clearances(load_robot(name)))
     robot = posture.robot
@@ -105,19 +93,17 @@ def test_without_clearances_loads_and_errors_add_up(name, method, rng):
     if name == "irsbot2":  # its proximal loops are rigid and perfect
         errors[~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
     erring = replace(posture, robot=robot.with_errors(errors))
-    with method():
-        alone = solve_assembly([erring]).platform_screw[0]
-        loaded = compiled(posture, LOAD, gravity=GRAVITY).platform_screw[0]
-        both = compiled(erring, LOAD, gravity=GRAVITY).platform_screw[0]
-        C = np.array([compiled(posture, w).platform_screw[0] for w in np.eye(6)[3:]])
+    alone = solve_assembly([erring]).platform_screw[0]
+    loaded = compiled(posture, LOAD, gravity=GRAVITY).platform_screw[0]
+    both = compiled(erring, LOAD, gravity=GRAVITY).platform_screw[0]
+    C = np.array([compiled(posture, w).platform_screw[0] for w in np.eye(6)[3:]])
     size = np.abs(both).reshape(2, 3).max(axis=1).repeat(3) + 1e-12
     assert np.abs((both - alone - loaded) / size).max() < 1e-9
     assert C[:, 3:] == pytest.approx(C[:, 3:].T, rel=1e-8, abs=1e-9 * np.abs(C).max())
 
 
-@methods
 @pytest.mark.parametrize("name", ["3rrr", "five_bar", "irsbot2", "orthoglide"])
-def test_cvxpy_finds_the_same_energy_and_no_less(name, method, rng):
+def test_cvxpy_finds_the_same_energy_and_no_less(name, rng):
     """The paper's equations as they are printed; Clarabel's tolerance is 1e-11."""
     posture = place_robot(load_robot(name))
     robot = posture.robot
@@ -126,8 +112,7 @@ def test_cvxpy_finds_the_same_energy_and_no_less(name, method, rng):
         errors = 0.2 * irsbot2_with(NUMBERS["cases"][0]).errors
     erring = replace(posture, robot=robot.with_errors(errors))
     energy, screw = reference_energy(erring, LOAD)
-    with method():
-        many = compiled(erring, LOAD)
+    many = compiled(erring, LOAD)
     assert many.energy[0] == pytest.approx(energy, rel=1e-5)
     assert many.platform_screw[0] @ LOAD == pytest.approx(screw @ LOAD, rel=1e-5)
     on_errors = many[0].frame_loads.body @ errors.ravel()
@@ -137,15 +122,13 @@ def test_cvxpy_finds_the_same_energy_and_no_less(name, method, rng):
     assert least == pytest.approx(proved, abs=1e-5 * energy)
 
 
-@methods
 @pytest.mark.parametrize("kappa", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 10.0])
-def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size, method):
+def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
     robot, postures = grid
     erring = robot.with_errors(kappa * robot.errors)
     postures = [replace(posture, robot=erring) for posture in postures]
-    with method():
-        many = solve_assembly(postures, size * LOAD, gravity=size * np.array(GRAVITY))
+    many = solve_assembly(postures, size * LOAD, gravity=size * np.array(GRAVITY))
     assert many.loaded.all()
     assert many.fallbacks() == {}
     assert many.certified.all()
@@ -153,12 +136,10 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size, method)
     assert many.clearance_excess.max() < 1e-14
 
 
-@methods
-def test_wrenches_prove_the_bound_on_the_problem_as_it_is_written(grid, method):
+def test_wrenches_prove_the_bound_on_the_problem_as_it_is_written(grid):
     """By the complementary energy in numpy, which shares nothing with the kernels."""
     _, postures = grid
-    with method():
-        many = solve_assembly(postures, LOAD, gravity=GRAVITY)
+    many = solve_assembly(postures, LOAD, gravity=GRAVITY)
     for i in (0, 11, 20, 33):
         reference = reference_assembly(postures[i], LOAD, gravity=GRAVITY)
         one = replace(
@@ -182,8 +163,7 @@ def cases_at_random():
         yield home_posture(random_robot(rng, 1 + seed % 3, 1 + seed // 3 % 3))
 
 
-@methods
-def test_random_robots_have_the_references_answers_or_its_reasons(method):
+def test_random_robots_have_the_references_answers_or_its_reasons():
     """Loads on every body, sizes and errors over decades; potentials within gaps."""
     solved = 0
     for number, home in enumerate(cases_at_random()):
@@ -199,8 +179,7 @@ def test_random_robots_have_the_references_answers_or_its_reasons(method):
             size * rng.normal(size=6), 0.3 * size * rng.normal(size=errors.shape),
             GRAVITY,
         )  # fmt: skip
-        with method():
-            many = solve_assembly([posture], *given)
+        many = solve_assembly([posture], *given)
         try:
             reference = reference_assembly(posture, *given)
         except FreeMotion:
@@ -223,24 +202,22 @@ def test_random_robots_have_the_references_answers_or_its_reasons(method):
     assert solved
 
 
-@methods
-def test_no_load_is_the_unloaded_answer_bit_for_bit(grid, method):
+def test_no_load_is_the_unloaded_answer_bit_for_bit(grid):
     """Zero alone, or beside others that are loaded."""
     robot, postures = grid
-    with method():
-        plain = solve_assembly(postures)
-        zero = solve_assembly(postures, np.zeros(6), gravity=(0, 0, 0))
-        assert not zero.loaded.any()
-        for name in ROWS:
-            assert np.array_equal(getattr(zero, name), getattr(plain, name)), name
-        one = solve_assembly(postures[0], np.zeros(6))
-        assert one.energy == plain.energy[0]
-        assert np.array_equal(one.platform_screw, plain.platform_screw[0])
-        T, off = stack(postures)
-        loads = solve_assembly(postures[0], LOAD).frame_loads
-        every = np.arange(len(T))[:, None] % 3 == 0
-        some = type(loads)(loads.body * every, loads.joint * every)
-        mixed = minimise_under_loads(robot, T, some, lambda i: None, None, off)
+    plain = solve_assembly(postures)
+    zero = solve_assembly(postures, np.zeros(6), gravity=(0, 0, 0))
+    assert not zero.loaded.any()
+    for name in ROWS:
+        assert np.array_equal(getattr(zero, name), getattr(plain, name)), name
+    one = solve_assembly(postures[0], np.zeros(6))
+    assert one.energy == plain.energy[0]
+    assert np.array_equal(one.platform_screw, plain.platform_screw[0])
+    T, off = stack(postures)
+    loads = solve_assembly(postures[0], LOAD).frame_loads
+    every = np.arange(len(T))[:, None] % 3 == 0
+    some = type(loads)(loads.body * every, loads.joint * every)
+    mixed = minimise_under_loads(robot, T, some, lambda i: None, None, off)
     assert np.array_equal(mixed.loaded, every[:, 0])
     for name in ROWS:
         rows, expected = getattr(mixed, name), getattr(plain, name)
@@ -274,15 +251,13 @@ def test_many_draws_under_a_load_are_those_of_robots_with_these_errors(grid):
         assert np.array_equal(many[i].wrenches, one.wrenches)
 
 
-@methods
-def test_a_driven_motion_stops_no_other_point(method):
+def test_a_driven_motion_stops_no_other_point():
     """A hinge that a moment turns has no equilibrium; a force through it does."""
     link = MatrixLink(1e6 * np.eye(6))
     frames = (Frame("hinge", joint="revolute"), Frame("tip", "hinge", link=link))
     posture = home_posture(Robot("r", "tip", frames))
-    with method():
-        turned = solve_assembly([posture], [0, 0, 1.0, 0, 0, 0])
-        pulled = compiled(posture, [0, 0, 0, 10.0, 0, 0])
+    turned = solve_assembly([posture], [0, 0, 1.0, 0, 0, 0])
+    pulled = compiled(posture, [0, 0, 0, 10.0, 0, 0])
     assert turned.fallbacks() == {"free motion": 1}
     assert turned.status[0] == "no equilibrium"
     assert pulled.platform_screw[0, 3] == pytest.approx(1e-5, rel=1e-12)

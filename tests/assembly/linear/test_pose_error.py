@@ -1,13 +1,9 @@
 """Bounds of (27): closed forms, the reference's brackets, and a second method."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.spatial import HalfspaceIntersection
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import linearise
@@ -17,8 +13,6 @@ from assembly.linear.reach import reachable_screws
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
-from assembly.solvers.majorant import eigenvectors, largest_on_sphere
-from assembly.solvers.polytope import cut, empty_polytope, farthest_corner, start_box
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -293,91 +287,3 @@ def test_attaining_screws_are_in_the_set_and_no_random_screw_beats_the_bound():
     assert np.linalg.norm(found.rotation_screw[:3]) == pytest.approx(
         found.rotation_error[0], rel=1e-12
     )
-
-
-@settings(deadline=None, max_examples=40)
-@given(seed=st.integers(0, 2**32 - 1), cuts=st.integers(1, 30), thin=st.booleans())
-def test_polytope_corners_equal_qhulls(seed, cuts, thin):
-    rng = np.random.default_rng(seed)
-    size = np.array([1.0, 1.0, 1e-3 if thin else 1.0])
-    low, high = -size * rng.uniform(0.5, 1.5, 3), size * rng.uniform(0.5, 1.5, 3)
-    body = empty_polytope()
-    start_box(body, np.eye(3), low, high)
-    planes = [np.append(e, -h) for e, h in zip(np.eye(3), high, strict=True)]
-    planes += [np.append(-e, h) for e, h in zip(np.eye(3), low, strict=True)]
-    for _ in range(cuts):
-        normal = rng.normal(size=3)
-        normal /= np.linalg.norm(normal)
-        height = rng.uniform(0.3, 1.2) * np.linalg.norm(size * normal)
-        assert cut(body, normal, height)
-        planes.append(np.append(normal, -height))
-    assert_same_corners(body, np.array(planes), rng)
-
-
-@pytest.mark.parametrize("tilt", [0.0, 1e-13, 1e-9, 1e-3])
-def test_polytope_survives_planes_through_its_corners_and_parallel_ones(tilt, rng):
-    """An octahedron cut out of a cube: every plane through three of its corners, and
-    again with a normal off by ``tilt``.
-    """
-    body = empty_polytope()
-    start_box(body, np.eye(3), -np.ones(3), np.ones(3))
-    planes = [np.append(s * e, -1.0) for e in np.eye(3) for s in (1, -1)]
-    for signs in itertools.product((-1.0, 1.0), repeat=3):
-        for off in (0.0, tilt):
-            normal = np.array(signs) + off * rng.normal(size=3)
-            length = np.linalg.norm(normal)
-            assert cut(body, normal / length, 1.0 / length)
-            planes.append(np.append(normal / length, -1.0 / length))
-    assert_same_corners(body, np.array(planes), rng, max(1e-9, 2 * tilt))
-
-
-def assert_same_corners(body, planes, rng, tolerance=1e-9):
-    """Farthest corner, and heights in many directions, as by Qhull."""
-    expected = HalfspaceIntersection(planes, np.zeros(3)).intersections
-    farthest = np.linalg.norm(expected, axis=1).max()
-    assert np.linalg.norm(farthest_corner(body)) == pytest.approx(
-        farthest, rel=tolerance
-    )
-    corners = body.corners[: body.used[0]]
-    for normal in itertools.chain(np.eye(3), rng.normal(size=(10, 3))):
-        heights = [float((p @ normal).max()) for p in (corners, expected)]
-        assert heights[0] == pytest.approx(heights[1], abs=tolerance)
-
-
-@settings(deadline=None, max_examples=60)
-@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 3), hard=st.booleans())
-def test_largest_value_of_a_quadratic_on_the_sphere(seed, rank, hard):
-    """Against a fine look at the sphere, improved by power iterations; the hard case
-    has no linear part along the largest eigenvector.
-    """
-    rng = np.random.default_rng(seed)
-    A = rng.normal(size=(3, rank))
-    Q, g = A @ A.T, rng.normal(size=3) * 10.0 ** rng.integers(-6, 2)
-    values, vectors = np.linalg.eigh(Q)
-    if hard:
-        g -= vectors[:, 2] * (vectors[:, 2] @ g)
-    d = rng.normal(size=(3, 200))
-    for _ in range(3000):
-        # of a convex function the linear part's maximiser never goes down
-        before = d
-        d = Q @ d + g[:, None] + 1e-3 * values[2] * d
-        d /= np.linalg.norm(d, axis=0)
-        if np.abs(d - before).max() < 1e-15:  # most stand still long before
-            break
-    best = np.max(np.sum(d * (Q @ d), axis=0) / 2 + g @ d)
-    found = largest_on_sphere(Q, g)
-    assert found == pytest.approx(best, rel=1e-6)
-    assert found >= best * (1 - 1e-13)
-
-
-@settings(deadline=None, max_examples=60)
-@given(seed=st.integers(0, 2**32 - 1), scale=st.integers(-20, 20))
-def test_eigenvectors_equal_lapacks(seed, scale):
-    rng = np.random.default_rng(seed)
-    A = rng.normal(size=(3, 3)) * 10.0 ** rng.integers(-8, 3, 3)
-    Q = (A + A.T) * 10.0**scale
-    values, vectors = eigenvectors(Q)
-    size = np.abs(Q).max()
-    assert np.allclose(np.sort(values), np.linalg.eigvalsh(Q), atol=1e-14 * size)
-    assert np.allclose(vectors.T @ vectors, np.eye(3), atol=1e-14)
-    assert np.allclose(Q @ vectors, vectors * values, rtol=0, atol=1e-14 * size)

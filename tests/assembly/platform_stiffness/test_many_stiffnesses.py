@@ -1,7 +1,5 @@
 """K_C of many postures at once is that of one at a time."""
 
-from contextlib import nullcontext
-
 import numpy as np
 import pytest
 
@@ -10,11 +8,9 @@ from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import BUILT_IN, load_robot
-from forcefit.native.libraries import by_numba
 from tests.robots_for_tests import random_robot
 
 UNIT = np.eye(6)
-METHODS = {"side by side": nullcontext, "by numba": by_numba}
 
 
 def assert_same(many, row, one):
@@ -40,12 +36,10 @@ def assert_same(many, row, one):
             assert shares[part][row] == pytest.approx(share, abs=1e-9)
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_at_home_it_is_that_of_one_posture(name, method):
+def test_at_home_it_is_that_of_one_posture(name):
     posture = home_posture(load_robot(name))
-    with METHODS[method]():
-        many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    many = platform_stiffnesses(posture.robot, posture.transforms[None])
     assert not many.fallback.any()
     assert_same(many, 0, without_clearance(posture))
 
@@ -76,16 +70,14 @@ def test_over_a_workspace_it_is_that_of_each_posture():
         assert_same(many, row, without_clearance(posture))
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(30))
-def test_of_random_robots_it_is_the_same(seed, method):
+def test_of_random_robots_it_is_the_same(seed):
     """Some have free motions, some rigid directions; ranks are told alike."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
-    with METHODS[method]():
-        many = platform_stiffnesses(
-            posture.robot, posture.transforms[None], posture.mismatch
-        )
+    many = platform_stiffnesses(
+        posture.robot, posture.transforms[None], posture.mismatch
+    )
     assert_same(many, 0, without_clearance(posture))
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from forcefit.inputs import cache_folder as module
 from forcefit.inputs.cache_folder import cache_folder
-from forcefit.native import libraries
 
 ROOT = Path(__file__).parents[3]
 
@@ -18,7 +17,7 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture
 def nothing(monkeypatch, tmp_path):
     """No variable, a home that is a file, temporary files in a folder of the test's."""
-    for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+    for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     (tmp_path / "home").write_text("a file: nothing can be made in it")
     (tmp_path / "tmp").mkdir()
@@ -78,21 +77,9 @@ def test_a_temporary_folder_that_others_may_write_is_not_taken(nothing):
     assert cache_folder() is None
 
 
-def test_nothing_is_kept_where_no_folder_can_be_written(nothing, monkeypatch):
+def test_nothing_is_kept_where_no_folder_can_be_written(nothing):
     shutil.rmtree(nothing / "tmp")
     assert cache_folder() is None
-    monkeypatch.setattr(libraries, "_BESIDE", nothing / "home" / "__pycache__")
-    assert libraries.folder_of_compiled() is None
-
-
-def test_compiled_code_is_kept_where_numba_is_told_if_that_can_be_written(
-    nothing, monkeypatch
-):
-    monkeypatch.setattr(libraries, "_BESIDE", nothing / "beside")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(nothing / "mine"))
-    assert libraries.folder_of_compiled() == nothing / "mine"
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(nothing / "home" / "mine"))
-    assert libraries.folder_of_compiled() == nothing / "beside"
 
 
 @pytest.mark.slow

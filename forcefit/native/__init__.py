@@ -1,1 +1,0 @@
-"""Where numba keeps what it compiled: ``libraries.py``."""
