@@ -120,11 +120,13 @@ inline Row Energies::least_multipliers(int r, int count) {
     Row multipliers = loaded ? holding : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
     // nothing feels those along Z's other rows, made orthonormal here
-    for (int i = r; i < count; ++i) {
-        Real *own = Z[i];
-        for (int l = r; l < i; ++l) {
-            const Real along = inner(Z[l], own, m);
-            for (int a = 0; a < m; ++a) own[a] -= along * Z[l][a];
+    Table unfelt(count - r, m);
+    for (int i = 0; i < count - r; ++i) {
+        Real *own = unfelt[i];
+        std::copy(Z[r + i], Z[r + i] + m, own);
+        for (int l = 0; l < i; ++l) {
+            const Real along = inner(unfelt[l], own, m);
+            for (int a = 0; a < m; ++a) own[a] -= along * unfelt[l][a];
         }
         const Real over = 1.0 / root(inner(own, own, m));
         for (int a = 0; a < m; ++a) own[a] *= over;
@@ -227,21 +229,19 @@ inline Whole Energies::solve(
             if (where[l]) out.outcome[block.point[l]] = outcome;
     };
     const Whole all = asked;
-    read(points, block);
     const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Ranks ranks = eliminate(tolerance, asked);
+    const Ranks ranks = read_and_eliminate(points, block, asked);
     settle(ranks.unclear, AMBIGUOUS);
     const Whole settled = ranks.unclear | ranks.same;
     if (!any(asked = ranks.same)) return all & ~settled;
     const int rank = ranks.free, count = m - rank, r = ranks.springs;
-    clearance_parts(count);
     const Whole rigid = rigid_rows(r, count, tolerance);
     settle(asked & rigid, RIGID);
     if (!any(asked &= ~rigid)) return all & ~settled;
     small_problem(r);
     Real without = 0.5 * inner(programme.h.data(), programme.h.data(), r);
     if (loaded) {
-        const Whole driven = balance(points, block, rank, r);
+        const Whole driven = bring_into_balance(points, block, rank, r);
         settle(asked & driven, DRIVEN);
         if (!any(asked &= ~driven)) return all & ~settled;
         without += stored;

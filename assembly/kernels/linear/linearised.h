@@ -42,12 +42,16 @@ protected:
     Real screw[6];  // of the platform
     Real largest_error, largest_spring;
 
-    void read(const Points &points, const Block &block);
+    bool stays(const Points &points, const Block &block);
+    void read(const Points &points, const Block &block, bool stay = false);
     void column(int64_t j, int64_t axis, Real *out) const;
     void move(int64_t pattern, double on_path, const Real *step, Row &open);
     void part(const Real *row, int64_t pattern, Real *out) const;
     Real enters(int c, const Real *part) const;
     Real largest_clearance() const;
+
+    std::vector<double> posture;  // of all lanes: frames and closure error, if it is one
+    int64_t changes = 0;          // of the posture
 
 private:
     void read_frame(const Points &points, const Block &block, int j, const Real *origin);
@@ -73,20 +77,43 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
             if (points.errors[6 * i + axis] != 0.0) erring[i % n] = true;
 }
 
-// The columns that the frames' poses give, the closure error and the platform's screw
-// that their errors cause.
-inline void Linearised::read(const Points &points, const Block &block) {
-    Real origin[3];
-    for (int a = 0; a < 3; ++a)
-        origin[a] = block.read(points.T, n * 16, s.platform * 16 + 4 * a + 3);
+// Whether all lanes stand where all lanes of the block before stood: what depends on the
+// frames alone is then known.
+inline bool Linearised::stays(const Points &points, const Block &block) {
+    const size_t count = 16 * size_t(n);
+    const double *own = points.T + block.point[0] * count;
+    const double mismatch = points.mismatch[block.point[0]];
+    const auto stand = [&](const double *T, double off) {
+        return off == mismatch && std::equal(own, own + count, T);
+    };
+    for (int l = 1; l < LANES; ++l)
+        if (!stand(points.T + block.point[l] * count, points.mismatch[block.point[l]])) {
+            posture.clear(), ++changes;
+            return false;
+        }
+    if (!posture.empty() && stand(posture.data(), posture.back())) return true;
+    ++changes;
+    posture.assign(own, own + count);
+    posture.push_back(mismatch);
+    return false;
+}
+
+// The columns that the frames' poses give, unless they stay, and the closure error and the
+// platform's screw that their errors cause.
+inline void Linearised::read(const Points &points, const Block &block, bool stay) {
+    if (!stay) {
+        Real origin[3];
+        for (int a = 0; a < 3; ++a)
+            origin[a] = block.read(points.T, n * 16, s.platform * 16 + 4 * a + 3);
+        for (int j = 0; j < n; ++j)
+            if (felt[j] || erring[j]) read_frame(points, block, j, origin);
+        columns();
+    }
     std::fill(known.begin(), known.end(), Real{});
     std::fill(screw, screw + 6, Real{});
     largest_error = Real{};
-    for (int j = 0; j < n; ++j) {
-        if (felt[j] || erring[j]) read_frame(points, block, j, origin);
+    for (int j = 0; j < n; ++j)
         if (erring[j]) read_errors(points, block, j);
-    }
-    columns();
 }
 
 // A frame's turns: unit screws about its axes.

@@ -22,7 +22,7 @@ public:
     Loaded(const Robot &s, const Points &points)
         : Reduction(s, points), loaded(points.loads), tight(loaded ? s.ny : 0),
           holding(loaded ? m : 0), drive(loaded ? nq : 0), on_play(loaded ? nu : 0),
-          left(loaded ? 6 * ng : 0) {
+          left(loaded ? 6 * ng : 0), pull(loaded ? nu : 0) {
         programme.loaded = loaded;
     }
 
@@ -36,10 +36,16 @@ protected:
     Real stored;   // |t|^2 / 2
 
     Whole balance(const Points &points, const Block &block, int rank, int r);
+    Whole bring_into_balance(const Points &points, const Block &block, int rank, int r);
     Real along(const Real *column, const Real *wrench) const;
     Row on_patterns(const Row &closing) const;
 
 private:
+    std::vector<double> acting;  // on all lanes, if they are the same
+    int64_t balanced = -1;       // at which change of the posture
+    Row pull;                    // (nu,) d
+    Whole driven;
+
     Row bent_groups();
 };
 
@@ -107,9 +113,28 @@ inline Whole Loaded::balance(
         const int k = int(cones.column[c]);
         const int64_t j = s.cone_frame[k];
         on_play[k] = s.cone_size[k] * load(1, j, s.cone_axis[k]);
-        programme.d[c] = on_play[k] + enters(k, &on[6 * s.pattern_of[j]]);
+        pull[c] = on_play[k] + enters(k, &on[6 * s.pattern_of[j]]);
     }
     return loose;
+}
+
+// The same, which is kept while the posture and the loads of all lanes are.
+inline Whole Loaded::bring_into_balance(
+    const Points &points, const Block &block, int rank, int r) {
+    const size_t count = 12 * size_t(n);
+    const double *own = points.loads + block.point[0] * count;
+    bool alike = !posture.empty();
+    for (int l = 1; alike && l < LANES; ++l)
+        alike = std::equal(own, own + count, points.loads + block.point[l] * count);
+    const bool known = alike && balanced == changes && acting.size() == count &&
+                       std::equal(own, own + count, acting.data());
+    if (!known) {
+        driven = balance(points, block, rank, r);
+        acting.assign(own, own + (alike ? count : 0));
+        balanced = changes;
+    }
+    std::copy(pull.begin(), pull.end(), programme.d.begin());
+    return driven;
 }
 
 }  // namespace LANE_SPACE

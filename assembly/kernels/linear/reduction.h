@@ -61,6 +61,7 @@ protected:
     void orthogonal_rows(int rank, int count);
     struct Ranks { int free, springs; Whole same, unclear; };
     Ranks eliminate(Real tolerance, Whole asked);
+    Ranks read_and_eliminate(const Points &points, const Block &block, Whole asked);
     void clearance_parts(int count);
     void small_problem(int r);
     Row spring_strains(int r, const Row &v);
@@ -72,6 +73,8 @@ protected:
     int spring_group(int g, Triangle &rows);
 
 private:
+    Ranks kept;  // of the last elimination
+
     void grouped_springs();
     void spring_rows(int count);
     void eliminate_springs(int rank, int count);
@@ -182,6 +185,22 @@ inline Reduction::Ranks Reduction::eliminate(Real tolerance, Whole asked) {
     ranks.same = asked & (spring_rank == ranks.springs);
     eliminate_springs(ranks.springs, count);
     return ranks;
+}
+
+// Everything of the lanes asked for but what their errors and loads are; it is kept while
+// their posture is.
+inline Reduction::Ranks Reduction::read_and_eliminate(
+    const Points &points, const Block &block, Whole asked) {
+    const bool stay = stays(points, block);
+    read(points, block, stay);
+    if (stay) {  // in all lanes alike
+        const bool unclear = any(kept.unclear);
+        return {kept.free, kept.springs, unclear ? Whole{} : asked, unclear ? asked : Whole{}};
+    }
+    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
+    kept = eliminate(tolerance, asked);
+    if (any(kept.same)) clearance_parts(m - kept.free);
+    return kept;
 }
 
 // What a screw of each pattern is in Z's rows.

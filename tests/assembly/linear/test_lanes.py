@@ -182,3 +182,34 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa):
         one = zone_margins(robot, T[i : i + 1], "rigid", mismatch[i : i + 1], errors)
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
+
+
+@pytest.mark.parametrize("load", ["none", "each its own", "the same"])
+def test_a_posture_that_stays_changes_no_bit(grid, rng, load):
+    """What is kept of it while only errors and loads change, and forgotten after."""
+    robot, postures = grid
+    # whole blocks of two, four and eight lanes, and mixed ones
+    stays = [0] * 16 + [5] * 8 + [3] * 8 + [0] * 5 + [3, 7, 3, 7] + [0] * 16 + [7] * 9
+    T, off = stack([postures[i] for i in stays])
+    count, n = len(stays), len(robot.frames)
+    errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
+    errors[::6] = 0.0
+    loads = 30.0 * rng.normal(size=(count, 2, n, 6))
+    if load == "the same":  # but for those in the middle of what stays
+        loads[:10], loads[12:] = loads[0], loads[40]
+    joints, structure = structure_of(robot)
+
+    def solved(rows):
+        out, own = rows_for(joints, robot, len(rows)), loads[rows]
+        assemble_side_by_side(
+            structure, T[rows], errors[rows], off[rows], out,
+            None if load == "none" else own,
+        )  # fmt: skip
+        return out
+
+    whole = solved(np.arange(count))
+    assert (whole.outcome < COMPILED).any()
+    orders = [rng.permutation(count), *([i] for i in (0, 9, 11, 16, 20, 27, 30, 50))]
+    for order in orders:
+        for rows, expected in zip(solved(np.array(order)), whole, strict=True):
+            assert np.array_equal(rows, expected[order], equal_nan=True)
