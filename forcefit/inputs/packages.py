@@ -27,7 +27,7 @@ _EXTRAS = {
 }
 # absent only where forcefit was installed without what it requires
 _REQUIRED = (
-    "clarabel", "cvxpy", "exudyn", "filelock", "numba", "numpy", "pytetwild", "pyvista",
+    "clarabel", "cvxpy", "exudyn", "filelock", "numpy", "pytetwild", "pyvista",
     "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
 _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}  # named otherwise

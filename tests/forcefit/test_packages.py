@@ -16,7 +16,7 @@ from forcefit.inputs.errors import BadInput
 from forcefit.inputs.packages import naming_packages
 from tests.packages_for_tests import ROOT, modules_of, run_without
 
-LEAST = ("numpy", "scipy", "clarabel", "typer", "rich", "numba")
+LEAST = ("numpy", "scipy", "clarabel", "typer", "rich")
 OURS = ("forcefit", "assembly", "stiffness", "validation")
 POSE = ("--pose", "tx=0.1,tz=-0.5")
 GRID = ("--grid", "tx=-0.1:0.1:0.1,tz=-0.5")
