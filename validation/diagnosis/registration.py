@@ -15,7 +15,7 @@ from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_second_order
 from forcefit.inputs.table import BadInput
-from stiffness.screws import rotation_matrix
+from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
@@ -90,21 +90,41 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     turned &= np.isfinite(model).all(axis=1)
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
-    if turned.any():
-        device = Rotation.from_rotvec(campaign.measured[turned, :3])
-        R = (device * Rotation.from_rotvec(model[turned, :3]).inv()).mean().as_matrix()
-    elif _spread(thought):
-        # of two sets of points it is enough to centre one
-        R = Rotation.align_vectors(seen, thought - thought.mean(axis=0))[0].as_matrix()
-    else:
+    if not turned.any() and not _spread(thought):
         raise BadInput(
             f"{campaign.name}: registration is unknown, and there are no rotations "
             f"nor {_FEWEST_POINTS} measured points off one line; expected either"
         )
+    parts = campaign.measured[turned, :3], model[turned, :3]
+    turns = [rotation_matrix(vectors) for vectors in parts]
+    R = device_rotation(thought, seen, turns[1], turns[0])
     shift = (seen - thought @ R.T).mean(axis=0) if len(seen) else np.zeros(3)
-    vector = Rotation.from_matrix(R).as_rotvec()
-    assert np.allclose(rotation_matrix(vector), R, atol=1e-9)
+    vector = rotation_vector(R)
     return dict(zip(BASE, np.concatenate([vector, shift]).tolist(), strict=True))
+
+
+def device_rotation(
+    points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
+) -> NDArray:
+    """Rotation of a device by what it sees: the mean of rotations, else Kabsch's.
+
+    Args:
+        points: (P, 3) [m] in the base's axes.
+        seen: (P, 3) [m] the same in the device's.
+        turns: (T, 3, 3) orientations in the base's axes.
+        seen_turns: (T, 3, 3) the same in the device's.
+
+    Returns:
+        (3, 3) from the base's axes to the device's.
+    """
+    if len(turns):
+        gap = seen_turns @ np.swapaxes(turns, 1, 2)
+        return Rotation.from_matrix(gap).mean().as_matrix()
+    U, _, Vt = np.linalg.svd(
+        (points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0))
+    )
+    R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
+    return np.asarray(R)
 
 
 def _spread(points: NDArray) -> bool:

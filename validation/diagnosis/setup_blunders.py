@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from assembly.kinematics.posture import place_many, place_many_joints
 from assembly.measurement.conditions import Conditions
@@ -17,6 +16,7 @@ from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.registration import device_rotation
 from validation.diagnosis.setup_corrections import (
     Correction,
     SetUp,
@@ -35,6 +35,9 @@ _NEEDED = 1.5  # times the residual that is left without one of them
 _FAR = 10.0  # times the spread of the readings: no unit that places could have
 _NOISE = 3.0  # [sigma] of residual, below which nothing is looked for
 _LEAST = 100.0  # by which chi-square must fall for each blunder
+
+
+Corrections = tuple[Correction, ...]
 
 
 @dataclass(frozen=True)
@@ -74,53 +77,44 @@ def setup_blunders(
     rows = _sample(campaign)
     if not len(rows):
         return ()
-    judged = _Judge(campaign.take(rows), conditions.take(rows))
-    given = judged.given
-    start = judged.residual(given)
+    judge = _Judge(campaign.take(rows), conditions.take(rows))
+    start = judge.residual(())
     if not _NOISE < start < np.inf:
         return ()
-    chosen, left = _search(judged, given, start)
-    chosen, left = _needed(judged, given, chosen, left)
-    gain = int(judged.cells.sum()) * (start**2 - left**2) / max(left, 1.0) ** 2
+    chosen, left = _needed(judge, *_search(judge, start))
+    gain = int(judge.cells.sum()) * (start**2 - left**2) / max(left, 1.0) ** 2
     if not chosen or left > _DECISIVE * start or gain < _LEAST * len(chosen):
         return ()
-    # in the sentence sigma is the one stated
-    stated = [
-        judged.residual(replace(_made(given, made), sigma=given.sigma))
-        for made in (chosen, *(_without(chosen, one) for one in chosen))
-    ]
+    after = judge.residual(chosen, stated=True)
     return tuple(
-        _blunder(one, before, stated[0])
-        for one, before in zip(chosen, stated[1:], strict=True)
+        _blunder(one, judge.residual(_without(chosen, one), stated=True), after)
+        for one in chosen
     )
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
     """A blunder with its sentence."""
     columns = correction.columns
-    names = ", ".join(columns)
-    fit = "fits" if len(columns) == 1 else "fit"
+    fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
-        f"{names} {fit} {correction.what}: the residual is then {after:.3g} sigma, "
-        f"otherwise {before:.3g}; look at the column"
-        f"{'s' if len(columns) > 1 else ''} and at the robot's file"
+        f"{', '.join(columns)} {fit} {correction.what}: the residual is then "
+        f"{after:.3g} sigma, otherwise {before:.3g}; look at the column{s} and at the "
+        "robot's file"
     )
     return SetupBlunder(correction.kind, columns, before, after, sentence)
 
 
-def _search(
-    judged: "_Judge", given: SetUp, start: float
-) -> tuple[tuple[Correction, ...], float]:
+def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
     """The corrections that leave least, by a beam search, and what they leave."""
-    tried = corrections(judged.campaign)
-    best: tuple[tuple[Correction, ...], float] = ((), start)
+    tried = corrections(judge.campaign)
+    best: tuple[Corrections, float] = ((), start)
     beam = [best]
     for _ in range(_MOST):
         further = []
         for made, left in beam:
             for one in tried:
                 if all(one is not other for other in made):
-                    now = judged.residual(_made(given, (*made, one)))
+                    now = judge.residual((*made, one))
                     further += [((*made, one), now)] if now < _LESS * left else []
         beam = sorted(further, key=lambda pair: pair[1])[:_BEAM]
         if not beam or beam[0][1] >= _LESS * best[1]:
@@ -134,30 +128,23 @@ def _search(
 
 
 def _needed(
-    judged: "_Judge", given: SetUp, chosen: tuple[Correction, ...], left: float
-) -> tuple[tuple[Correction, ...], float]:
+    judge: "_Judge", chosen: Corrections, left: float
+) -> tuple[Corrections, float]:
     """The corrections without those that hardly change what is left."""
     for one in chosen:
         fewer = _without(chosen, one)
-        without = judged.residual(_made(given, fewer))
+        without = judge.residual(fewer)
         rivals = [without]
-        if one.rival is not None:
-            rivals.append(judged.residual(one.rival(_made(given, fewer))))
+        if one.array == "loads":  # small ones are no better where springs hardly respond
+            rivals.append(judge.residual(fewer, loads=0.0))
         if min(rivals) < _NEEDED * left:
             chosen, left = fewer, without
     return chosen, left
 
 
-def _without(chosen: Sequence[Correction], one: Correction) -> tuple[Correction, ...]:
+def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
     """All corrections but one."""
     return tuple(other for other in chosen if other is not one)
-
-
-def _made(given: SetUp, made: Sequence[Correction]) -> SetUp:
-    """A set-up with corrections made."""
-    for correction in made:
-        given = correction.apply(given)
-    return given
 
 
 def _sample(campaign: Campaign) -> NDArray:
@@ -170,7 +157,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """What a set-up leaves of the readings of some rows."""
+    """What set-ups leave of the readings of some rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -179,79 +166,83 @@ class _Judge:
         self.cells = np.array(campaign.cells)
         self.cells[:, :3] = self.cells[:, :3].all(axis=1, keepdims=True)
 
-    def residual(self, setup: SetUp) -> float:
-        """[sigma] trimmed rms of what is left, infinite where it cannot be placed."""
-        moved = self._moved(setup)
+    def residual(
+        self, made: Corrections, *, loads: float = 1.0, stated: bool = False
+    ) -> float:
+        """Trimmed rms with corrections made.
+
+        Args:
+            made: corrections of the campaign as given.
+            loads: factor on all loads.
+            stated: whether sigma is as stated, whatever was made of the lengths.
+
+        Returns:
+            [sigma], infinite where a command cannot be reached.
+        """
+        setup = self.given
+        for correction in made:
+            setup = correction.apply(setup)
+        moved = self._moved(replace(setup, loads=loads * setup.loads))
         if moved is None:
             return np.inf
         with np.errstate(all="ignore"):
             deviation = predict(moved).deviation
-        platform = moved.postures.platform[:, :3, :3]
         points = moved.measured_points + deviation[:, 3:]
+        platform = moved.postures.platform[:, :3, :3]
         turns = rotation_matrix(deviation[:, :3]) @ platform
         left = np.full((len(points), 6), np.nan)
-        for rows in self._sessions():
-            R, shift = self._device(setup, points, turns, rows)
-            left[rows, 3:] = setup.points[rows] - points[rows] @ R.T - shift
-            seen = np.isfinite(setup.turns[rows]).all(axis=(1, 2))
-            at = rows[seen & np.isfinite(turns[rows]).all(axis=(1, 2))]
-            gap = setup.turns[at] @ np.swapaxes(R @ turns[at], 1, 2)
-            left[at, :3] = rotation_vector(gap)
-        sizes = np.sort(np.abs(left / setup.sigma)[self.cells])
+        names = self.campaign.session
+        for session in self.campaign.sessions or (None,):
+            own = slice(None) if names is None else names == session
+            R, shift = self._device(setup, points, turns, own)
+            left[own, 3:] = setup.points[own] - points[own] @ R.T - shift
+            gap = setup.turns[own] @ np.swapaxes(R @ turns[own], 1, 2)
+            known = np.isfinite(gap).all(axis=(1, 2))
+            left[own, :3][known] = rotation_vector(gap[known])
+        sigma = self.given.sigma if stated else setup.sigma
+        sizes = np.sort(np.abs(left / sigma)[self.cells])
         if not np.isfinite(sizes).all():
             return np.inf
         kept = sizes[: max(1, round(_TRIMMED * len(sizes)))]
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Conditions of a set-up; None where too few of its commands can be reached."""
-        moved = replace(self.conditions, load=setup.loads)
-        robot = moved.robot
-        if not np.array_equal(setup.poses, self.given.poses):
+        """Conditions of a set-up; None where a command cannot be reached."""
+        moved, given = replace(self.conditions, load=setup.loads), self.given
+        if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
-            if np.std(setup.poses[:, :3], axis=0).max() > _FAR * wide:
+            if np.std(setup.places, axis=0).max() > _FAR * wide:
                 return None  # and it may take long to find that it is out of reach
-            postures, _ = place_many(robot, setup.poses)
-        elif not np.array_equal(setup.coordinates, self.given.coordinates):
-            actuated = np.array([frame.actuated for frame in robot.frames])
+            poses = np.hstack([setup.places, rotation_vector(setup.axes)])
+            postures, _ = place_many(moved.robot, poses)
+        elif setup.coordinates is not given.coordinates:
+            actuated = np.array([frame.actuated for frame in moved.robot.frames])
             held = np.where(actuated, setup.coordinates, np.nan)
-            postures, _ = place_many_joints(robot, held)
+            postures, _ = place_many_joints(moved.robot, held)
         else:
             return moved
-        if any(posture is None for posture in postures):
-            return None
         placed = [posture for posture in postures if posture is not None]
+        if len(placed) < len(postures):
+            return None
         return replace(
             moved,
             coordinates=np.array([p.coordinates for p in placed]),
             transforms=np.array([p.transforms for p in placed]),
         )
 
-    def _sessions(self) -> list[NDArray]:
-        """Rows that share where the device stood."""
-        session = self.campaign.session
-        if session is None:
-            return [np.arange(len(self.campaign))]
-        return [np.flatnonzero(session == name) for name in self.campaign.sessions]
-
     def _device(
-        self, setup: SetUp, points: NDArray, turns: NDArray, rows: NDArray
+        self, setup: SetUp, points: NDArray, turns: NDArray, own: slice | NDArray
     ) -> tuple[NDArray, NDArray]:
         """Rotation (3, 3) and shift (3,) [m] of the device, fitted where not known."""
-        R, shift = np.eye(3), np.zeros(3)
         if self.campaign.registration == "known":
-            return R, shift
-        placed = rows[np.isfinite(setup.points[rows] + points[rows]).all(axis=1)]
-        both = np.isfinite(setup.turns[rows] + turns[rows]).all(axis=(1, 2))
-        turned = rows[both]
-        a, b = points[placed], setup.points[placed]
-        if len(turned):
-            gap = setup.turns[turned] @ np.swapaxes(turns[turned], 1, 2)
-            R = Rotation.from_matrix(gap).mean().as_matrix()
-        elif len(placed) > 2:
-            U, _, Vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
-            sign = np.sign(np.linalg.det(Vt.T @ U.T))
-            R = Vt.T @ np.diag([1.0, 1.0, sign]) @ U.T
-        if len(placed):
-            shift = np.median(b - a @ R.T, axis=0)
+            return np.eye(3), np.zeros(3)
+        read, seen = points[own], setup.points[own]
+        placed = np.isfinite(seen + read).all(axis=1)
+        read, seen = read[placed], seen[placed]
+        turned = np.isfinite(setup.turns[own] + turns[own]).all(axis=(1, 2))
+        both = turns[own][turned], setup.turns[own][turned]
+        R = np.eye(3)
+        if turned.any() or len(seen) > 2:
+            R = device_rotation(read, seen, *both)
+        shift = np.median(seen - read @ R.T, axis=0) if len(seen) else np.zeros(3)
         return R, shift

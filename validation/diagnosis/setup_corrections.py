@@ -7,26 +7,48 @@ saw these, or on the deviations themselves, where it says so.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from assembly.model.robot import Robot
-from stiffness.screws import rotation_vector
+from stiffness.screws import rotation_matrix
 from validation.campaign.campaign import LOAD, Campaign
 
-_INCH = 25.4
-_GRAVITY = 9.81  # kg taken for N
-_MISREAD: tuple[tuple[str, str, Callable[[Rotation], Rotation]], ...] = (
-    ("transposed", "transposed", lambda turn: turn.inv()),
+_UNITS = {  # factors between units that are taken for one another
+    "length": (25.4, 1e3),  # inches, millimetres
+    "angle": (180 / np.pi,),  # degrees
+    "load": (9.81, 1e3),  # kilograms, kilonewtons
+}
+
+
+def _rolled(turns: Rotation, by: int) -> Rotation:
+    """Rotations whose quaternions have a part at the wrong end."""
+    return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
+
+
+_MISREAD = (
+    ("transposed", "transposed", Rotation.inv),
     # of x y z w read as w x y z, the parts x y z w hold y z w x
     ("quaternion", "with the quaternion's w taken last, not first",
-     lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), 1, axis=-1))),
+     partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
-     lambda turn: Rotation.from_quat(np.roll(turn.as_quat(), -1, axis=-1))),
+     partial(_rolled, by=-1)),
 )  # fmt: skip
+# columns, the array of a SetUp that they fill, in words how it is corrected, and
+# whether the deviation alone is
+_LENGTHS = (
+    ("pose.t", "places", "", False),
+    ("meas.t", "points", ", as positions", False),
+    ("meas.t", "points", ", as deviations", True),
+)
+_ROTATIONS = (
+    ("pose.r", "axes", "", False),
+    ("meas.r", "turns", ", as orientations", False),
+    ("meas.r", "turns", ", as deviations", True),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,22 +57,22 @@ class SetUp:
 
     Attributes:
         coordinates: (R, n) [rad or m] commanded, of every joint.
-        poses: (R, 6) [m, rad] tx ty tz rx ry rz commanded, where poses are.
+        places: (R, 3) [m] commanded of the platform, where poses are.
+        axes: (R, 3, 3) likewise.
         loads: (R, 6) [N m, N].
-        nominal_points: (R, 3) [m] of the commands as the file gives them.
-        nominal_turns: (R, 3, 3) likewise the platform's axes.
         points: (R, 3) [m] as read, base axes; NaN where not read.
         turns: (R, 3, 3) the platform's axes as read; NaN where not read.
+        nominal: points and turns of the commands as the file gives them.
         sigma: (R, 6) [rad, m] of the readings.
     """
 
     coordinates: NDArray
-    poses: NDArray
+    places: NDArray
+    axes: NDArray
     loads: NDArray
-    nominal_points: NDArray
-    nominal_turns: NDArray
     points: NDArray
     turns: NDArray
+    nominal: dict[str, NDArray]
     sigma: NDArray
 
 
@@ -62,210 +84,129 @@ class Correction:
         kind: in one word.
         columns: of the campaign's table that it changes.
         what: what is done to them, for a sentence.
-        apply: the set-up corrected.
-        rival: a simpler set-up that must fit clearly worse; None without one.
+        array: of :class:`SetUp` that it changes, by name.
+        change: of that array, or of its deviation from what was commanded.
+        deviation: whether of the deviation.
+        sigma: factor on the sigma of positions.
     """
 
     kind: str
     columns: tuple[str, ...]
     what: str
-    apply: Callable[[SetUp], SetUp]
-    rival: Callable[[SetUp], SetUp] | None = None
+    array: str
+    change: Callable[[NDArray], NDArray]
+    deviation: bool = False
+    sigma: float = 1.0
+
+    def apply(self, given: SetUp) -> SetUp:
+        """The set-up corrected."""
+        values, about = getattr(given, self.array), given.nominal.get(self.array)
+        if not self.deviation or about is None:
+            values = self.change(values)
+        elif self.array == "points":
+            values = about + self.change(values - about)
+        else:
+            values = self.change(values @ np.swapaxes(about, 1, 2)) @ about
+        sigma = given.sigma * np.repeat([1.0, self.sigma], 3)
+        return replace(given, **{self.array: values, "sigma": sigma})
 
 
 def as_given(campaign: Campaign) -> SetUp:
-    """The set-up of a campaign as its files give it.
-
-    Args:
-        campaign: of R rows.
-
-    Returns:
-        The set-up.
-    """
+    """The set-up of a campaign of R rows as its files give it."""
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
-    points = T[:, :3, 3] + np.einsum("rij,rj->ri", T[:, :3, :3], campaign.targets)
-    turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)
-    turns = np.full((len(T), 3, 3), np.nan)
-    deviation = Rotation.from_rotvec(campaign.measured[turned, :3]).as_matrix()
-    turns[turned] = deviation @ T[turned, :3, :3]
+    axes = T[:, :3, :3]
+    points = T[:, :3, 3] + np.einsum("rij,rj->ri", axes, campaign.targets)
     return SetUp(
         coordinates=np.array(campaign.coordinates),
-        poses=np.hstack([T[:, :3, 3], rotation_vector(T[:, :3, :3])]),
+        places=T[:, :3, 3],
+        axes=axes,
         loads=np.array(campaign.loads),
-        nominal_points=points,
-        nominal_turns=T[:, :3, :3],
         points=points + campaign.measured[:, 3:],
-        turns=turns,
+        turns=rotation_matrix(campaign.measured[:, :3]) @ axes,
+        nominal={"points": points, "turns": axes},
         sigma=np.array(campaign.sigma),
     )
 
 
 def corrections(campaign: Campaign) -> list[Correction]:
-    """All corrections that a campaign's columns allow.
-
-    Args:
-        campaign: of R rows.
-
-    Returns:
-        The corrections.
-    """
-    tried = []
-    if campaign.commanded == "joints":
-        tried += [*_of_joints(campaign.robot)]
-    else:
-        tried += [*_of_poses()]
-    tried += [*_of_loads(campaign)]
-    if np.isfinite(campaign.measured[:, 3:]).all(axis=1).any():
-        tried += [*_of_lengths()]
-    if np.isfinite(campaign.measured[:, :3]).all(axis=1).any():
-        tried += [*_of_rotations()]
+    """All corrections that a campaign's columns allow."""
+    read = np.isfinite(campaign.measured)
+    there = {
+        "pose.t": campaign.commanded == "pose",
+        "pose.r": campaign.commanded == "pose",
+        "meas.t": read[:, 3:].all(axis=1).any(),
+        "meas.r": read[:, :3].all(axis=1).any(),
+    }
+    tried = [*_of_joints(campaign)] if campaign.commanded == "joints" else []
+    tried += _of_loads(campaign)
+    for stem, array, how, deviation in _LENGTHS:
+        for factor, what in _factors("length") if there[stem] else ():
+            # a sigma that grows with its lengths would let any division fit
+            sigma = min(factor, 1.0) if array == "points" else 1.0
+            tried.append(Correction(
+                "unit", _xyz(stem), what + how, array, partial(np.multiply, factor),
+                deviation, sigma,
+            ))  # fmt: skip
+    for stem, array, how, deviation in _ROTATIONS:
+        for kind, what, change in _MISREAD if there[stem] else ():
+            tried.append(Correction(
+                kind, _xyz(stem), what + how, array, partial(_turned, change=change),
+                deviation,
+            ))  # fmt: skip
     return tried
 
 
-def _of_joints(robot: Robot) -> Iterator[Correction]:
+def _of_joints(campaign: Campaign) -> Iterator[Correction]:
     """Signs, quarter turns, exchanges and units of commanded coordinates."""
-    driven = [i for i, frame in enumerate(robot.frames) if frame.actuated]
-    kinds: dict[str, list[int]] = {}
-    for i in driven:
-        kinds.setdefault(robot.frames[i].joint, []).append(i)
-        name = f"q.{robot.frames[i].name}"
-        yield Correction("sign", (name,), "with its sign reversed", _scaled([i], -1.0))
-        for quarters in (1, 2, 3) if robot.frames[i].joint == "revolute" else ():
-            what = f"with {(90, 180, -90)[quarters - 1]} degrees added"
-            turn = (np.pi / 2, np.pi, -np.pi / 2)[quarters - 1]
-            yield Correction("quarter_turn", (name,), what, _added(i, turn))
+    frames, kinds = campaign.robot.frames, dict[str, list[int]]()
+    count = np.arange(len(frames))
+    of = partial(Correction, array="coordinates")
+    for i, frame in enumerate(frames):
+        if not frame.actuated:
+            continue
+        own, name = count == i, (f"q.{frame.name}",)
+        kinds.setdefault(frame.joint, []).append(i)
+        change = partial(np.multiply, np.where(own, -1.0, 1.0))
+        yield of("sign", name, "with its sign reversed", change=change)
+        for degrees in (90, 180, -90) if frame.joint == "revolute" else ():
+            change = partial(np.add, np.where(own, np.deg2rad(degrees), 0.0))
+            yield of(
+                "quarter_turn", name, f"with {degrees} degrees added", change=change
+            )
     for joint, columns in kinds.items():
-        names = tuple(f"q.{robot.frames[i].name}" for i in columns)
-        for i, j in combinations(range(len(columns)), 2):
-            pair = names[i], names[j]
-            apply = _exchanged(columns[i], columns[j])
-            yield Correction("exchanged", pair, "exchanged", apply)
-        factors = (_INCH, 1e3) if joint == "prismatic" else (180 / np.pi,)
-        for factor in (f for one in factors for f in (one, 1 / one)):
-            what = f"times {factor:.4g}"
-            yield Correction("unit", names, what, _scaled(columns, factor))
-
-
-def _of_poses() -> Iterator[Correction]:
-    """Units of commanded places, and commanded rotations misread."""
-    names = ("pose.tx", "pose.ty", "pose.tz")
-    for factor in (f for one in (_INCH, 1e3) for f in (one, 1 / one)):
-
-        def scaled(given: SetUp, factor: float = factor) -> SetUp:
-            return replace(given, poses=given.poses * np.repeat([factor, 1.0], 3))
-
-        yield Correction("unit", names, f"times {factor:.4g}", scaled)
-    for kind, what, change in _MISREAD:
-
-        def turned(
-            given: SetUp, change: Callable[[Rotation], Rotation] = change
-        ) -> SetUp:
-            turns = change(Rotation.from_rotvec(given.poses[:, 3:])).as_rotvec()
-            return replace(given, poses=np.hstack([given.poses[:, :3], turns]))
-
-        yield Correction(kind, ("pose.rx", "pose.ry", "pose.rz"), what, turned)
-
-
-def _scaled(columns: list[int], factor: float) -> Callable[[SetUp], SetUp]:
-    """Some coordinates times a factor."""
-
-    def apply(given: SetUp) -> SetUp:
-        q = given.coordinates.copy()
-        q[:, columns] *= factor
-        return replace(given, coordinates=q)
-
-    return apply
-
-
-def _added(column: int, turn: float) -> Callable[[SetUp], SetUp]:
-    """An angle added to a coordinate."""
-
-    def apply(given: SetUp) -> SetUp:
-        q = given.coordinates.copy()
-        q[:, column] += turn
-        return replace(given, coordinates=q)
-
-    return apply
-
-
-def _exchanged(i: int, j: int) -> Callable[[SetUp], SetUp]:
-    """Two coordinates exchanged."""
-
-    def apply(given: SetUp) -> SetUp:
-        q = given.coordinates.copy()
-        q[:, [i, j]] = q[:, [j, i]]
-        return replace(given, coordinates=q)
-
-    return apply
+        names = tuple(f"q.{frames[i].name}" for i in columns)
+        for (i, a), (j, b) in combinations(zip(columns, names, strict=True), 2):
+            order = np.where(count == i, j, np.where(count == j, i, count))
+            change = partial(np.take, indices=order, axis=1)
+            yield of("exchanged", (a, b), "exchanged", change=change)
+        unit = "length" if joint == "prismatic" else "angle"
+        for factor, what in _factors(unit):
+            by = np.where(np.isin(count, columns), factor, 1.0)
+            yield of("unit", names, what, change=partial(np.multiply, by))
 
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
     """Loads that are reactions, or in another unit."""
-    names = tuple(
-        f"load.{n}" for n, w in zip(LOAD, campaign.loads.T, strict=True) if w.any()
-    )
-    units = [factor for one in (_GRAVITY, 1e3) for factor in (one, 1 / one)]
-    for factor in (-1.0, *units) if names else ():
-
-        def apply(given: SetUp, factor: float = factor) -> SetUp:
-            return replace(given, loads=factor * given.loads)
-
+    loaded = zip(LOAD, campaign.loads.any(axis=0), strict=True)
+    names = tuple(f"load.{name}" for name, acts in loaded if acts)
+    factors = [(-1.0, "with their signs reversed"), *_factors("load")]
+    for factor, what in factors if names else ():
         kind = "sign" if factor < 0 else "unit"
-        what = "with their signs reversed" if factor < 0 else f"times {factor:.4g}"
-        yield Correction(kind, names, what, apply, _without_loads)
+        yield Correction(kind, names, what, "loads", partial(np.multiply, factor))
 
 
-def _without_loads(given: SetUp) -> SetUp:
-    """No loads: where springs hardly respond, small loads are no better."""
-    return replace(given, loads=0.0 * given.loads)
+def _xyz(stem: str) -> tuple[str, ...]:
+    """Three columns of a campaign's table."""
+    return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
-def _of_lengths() -> Iterator[Correction]:
-    """Lengths read in another unit: of the positions, or of the deviations alone."""
-    names = ("meas.tx", "meas.ty", "meas.tz")
-    for factor in (f for one in (_INCH, 1e3) for f in (one, 1 / one)):
-
-        def absolute(given: SetUp, factor: float = factor) -> SetUp:
-            sigma = _cautious(given.sigma, factor)
-            return replace(given, points=factor * given.points, sigma=sigma)
-
-        def relative(given: SetUp, factor: float = factor) -> SetUp:
-            points = given.nominal_points
-            points = points + factor * (given.points - points)
-            sigma = _cautious(given.sigma, factor)
-            return replace(given, points=points, sigma=sigma)
-
-        what = f"times {factor:.4g}"
-        yield Correction("unit", names, f"{what}, as positions", absolute)
-        yield Correction("unit", names, f"{what}, as deviations", relative)
+def _factors(quantity: str) -> list[tuple[float, str]]:
+    """Factors between units, both ways, and what they do in words."""
+    both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
+    return [(factor, f"times {factor:.4g}") for factor in both]
 
 
-def _cautious(sigma: NDArray, factor: float) -> NDArray:
-    """Sigma of lengths times a factor: smaller with them, or any division would fit."""
-    return sigma * np.repeat([1.0, min(factor, 1.0)], 3)
-
-
-def _of_rotations() -> Iterator[Correction]:
-    """Rotations read inverted, or from a quaternion whose w is in the wrong place."""
-    names = ("meas.rx", "meas.ry", "meas.rz")
-    for kind, what, change in _MISREAD:
-
-        def absolute(
-            given: SetUp, change: Callable[[Rotation], Rotation] = change
-        ) -> SetUp:
-            return replace(given, turns=_changed(given.turns, change))
-
-        def relative(
-            given: SetUp, change: Callable[[Rotation], Rotation] = change
-        ) -> SetUp:
-            gap = given.turns @ np.swapaxes(given.nominal_turns, 1, 2)
-            return replace(given, turns=_changed(gap, change) @ given.nominal_turns)
-
-        yield Correction(kind, names, f"{what}, as orientations", absolute)
-        yield Correction(kind, names, f"{what}, as deviations", relative)
-
-
-def _changed(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
+def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
     """(R, 3, 3) rotations changed; NaN stays."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
