@@ -80,6 +80,5 @@ def machine(campaign, *hypotheses, start=0.0):
 
 def numbers(fit):
     """Name, value and standard deviation of the first effect's parameters."""
-    one = fit.unknowns.effects[0]
-    x, C, _ = fit.own(one)
-    return parameters_of(fit.unknowns.robot, one, x, C)
+    found = parameters_of(fit, fit.unknowns.effects[0])
+    return [(one.name, one.value, one.std) for one in found]

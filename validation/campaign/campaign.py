@@ -126,6 +126,12 @@ class Campaign:
         return np.isfinite(self.measured)
 
     @property
+    def not_measured(self) -> list[str]:
+        """Components of a reading that no row has."""
+        seen = zip(READING, self.cells.T, strict=True)
+        return [name for name, cells in seen if not cells.any()]
+
+    @property
     def sessions(self) -> tuple[str, ...]:
         """Names of its sessions in the order of first use; none where it has none."""
         return (

@@ -11,7 +11,7 @@ from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
-from validation.diagnosis.verdict import Kept, verdict
+from validation.diagnosis.verdict import verdict
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,11 @@ def calibrate(
 def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
     """The verdict on a simulated campaign."""
     best = selected.states[0]
-    kept = Kept(
-        tuple(sorted(e.name for e in best.elements if e.name)),
-        bool(selected.functions), len(selected.prior.std) > 0,
-    )  # fmt: skip
+    names = tuple(sorted(e.name for e in best.elements if e.name))
     freedom = max(1.0, count - selected.unknowns)
     more = float(chi2.sf(best.sizes.squares, freedom)) < SIGNIFICANT
-    decision, claimed = verdict(selected, kept, more)
+    decision, claimed = verdict(
+        selected, names, functions=bool(selected.functions),
+        small=len(selected.prior.std) > 0, more_than_noise=more,
+    )  # fmt: skip
     return decision, tuple(sorted(claimed))

@@ -5,24 +5,20 @@ that change, the chance of as large a change without it is small, and none of it
 unknowns that give it its name is at a bound.
 """
 
-from types import MappingProxyType
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from assembly.effects import LIBRARY
 from assembly.effects.combine import combined
-from assembly.effects.effect import Values
-from assembly.model.robot import Robot
 from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.unknowns import Acting
+from validation.diagnosis.unknowns import Acting, effects_in
 
 _CHANCE = 1e-3  # probability of as large an effect where there is none
-_AT_BOUND = 1e-3  # of a bound's distance from the start: the unknown is at the bound
+_AT_BOUND = 1e-3  # of a bound: the unknown is at the bound
 _RANK = 1e-9  # relative singular value of a direction that others do as well
 _STEP = 1e-4  # of an unknown's size, for derivatives of public parameters
-_NOTHING: Values = MappingProxyType({})
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
@@ -35,18 +31,17 @@ def supported(fit: MachineFit, one: Acting) -> bool:
     Returns:
         True for the place of the measuring frame, which is always there.
     """
-    if one.device or not one.hypothesis.slots:
+    slots = one.hypothesis.slots
+    if one.device or not slots:
         return True
     x, C, slopes = fit.own(one)
-    begin = np.array([s.unknown.start for s in one.hypothesis.slots])
-    shape = np.array([s.shape for s in one.hypothesis.slots])
-    if any(
-        _at_bound(s.unknown.upper, v)
-        for s, v in zip(one.hypothesis.slots, x, strict=True)
-    ):
-        return False
-    if np.any(shape & _at_lower(one, x)):
-        return False
+    for slot, value in zip(slots, x, strict=True):
+        if _at_bound(slot.unknown.upper, value):
+            return False
+        if slot.shape and _at_bound(slot.unknown.lower, value):
+            return False
+    shape = np.array([slot.shape for slot in slots])
+    begin = np.array([slot.unknown.start for slot in slots])
     moved = np.where(shape, 0.0, x - begin)
     slopes = _without_devices(fit, slopes)
     size = float(np.sum((slopes @ moved) ** 2))
@@ -61,8 +56,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
     """(n, k) slopes without what the place of a measuring device does as well."""
-    places = zip(fit.unknowns.effects, fit.unknowns.slices, strict=False)
-    own = [fit.slopes[:, place] for one, place in places if one.device]
+    own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
     flat = np.hstack(own)
@@ -77,42 +71,45 @@ def _at_bound(bound: float, value: float) -> bool:
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 
-def _at_lower(one: Acting, x: NDArray) -> NDArray:
-    """(k,) bool, unknowns at their lower bound."""
-    slots = zip(one.hypothesis.slots, x, strict=True)
-    return np.array([_at_bound(s.unknown.lower, v) for s, v in slots])
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect of a machine, in the unit of the public format.
+
+    Attributes:
+        name: public.
+        value: of the machine, with what was declared.
+        std: of it.
+        declared: in the robot's file; None where it is not.
+        difference: found for it.
+    """
+
+    name: str
+    value: float
+    std: float
+    declared: float | None
+    difference: float
 
 
-def parameters_of(
-    robot: Robot,
-    one: Acting,
-    x: NDArray,
-    C: NDArray,
-    declared: Values = _NOTHING,
-    seen: NDArray | None = None,
-) -> list[tuple[str, float, float]]:
-    """Public name, value and standard deviation of a machine's parameters.
+def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
+    """Parameters of an effect that was found.
 
     Args:
-        robot: without effects.
+        fit: of the machine that has it.
         one: the effect.
-        x: (k,) values of its unknowns.
-        C: (k, k) their covariance.
-        declared: parameters of the same effect in the robot's file.
-        seen: (k,) bool, unknowns that some reading depends on; all if absent.
 
     Returns:
-        Parameters that were found, in the units of the public format: of the machine,
-        with what was declared.
+        Those on which some reading depends.
     """
-    h = one.hypothesis
+    h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
+    declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
+    x, C, _ = fit.own(one)
 
     def public(x: NDArray) -> dict[str, float]:
         found = h.public(robot, x)
         both = combined({h.effect: declared}, {h.effect: found})[h.effect]
         return {name: both[name] for name in found if name in both}
 
-    value = public(x)
+    value, difference = public(x), h.public(robot, x)
     J = np.zeros((len(value), len(x)))
     phase = np.array([name.endswith(".phase") for name in value], dtype=bool)
     for i, slot in enumerate(h.slots):
@@ -126,17 +123,11 @@ def parameters_of(
         change = ends[0] - ends[1]
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
-    std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0))
-    # what no reading depends on, such as a component that was not measured
-    acting = J if seen is None else J[:, seen]
-    shown = np.any(acting != 0, axis=1).tolist()
+    std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0)).tolist()
+    # not a component that was not measured
+    shown = np.any(J[:, fit.seen(one)] != 0, axis=1).tolist()
     return [
-        (name, v, float(s))
+        Parameter(name, v, s, declared.get(name), difference[name])
         for (name, v), s, kept in zip(value.items(), std, shown, strict=True)
         if kept
     ]
-
-
-def unit_of(effect: str, robot: Robot, name: str) -> str:
-    """Unit of an effect's parameter."""
-    return LIBRARY[effect].unit(robot, name)

@@ -40,7 +40,6 @@ class Diagnosis:
         probability: of every effect of the library that the design can show.
         alternatives: sets of effects by name, with their probabilities, best first.
         lack: is the residual of the fitted rows noise?
-        declared: the same for the declared model.
         before: on the held-out rows without outliers, with the declared model.
         after: likewise, with machines fitted without these rows; whatever the verdict.
         saved: errors of the saved robot on all rows without outliers, to which it was
@@ -77,7 +76,6 @@ class Diagnosis:
     probability: dict[str, float]
     alternatives: tuple[tuple[tuple[str, ...], float], ...]
     lack: LackOfFit
-    declared: LackOfFit
     before: Errors
     after: Errors
     saved: Errors

@@ -1,49 +1,51 @@
-"""Charts of a diagnosis.  Functions take it and return HTML of a page."""
+"""Charts of a diagnosis, and the robot to be turned.
+
+Functions take a diagnosis and return HTML of a page.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.energy import Assembly, CannotAssemble
+from assembly.linear.reduction import FreeMotion
+from assembly.measurement.predict import assemble_row
+from assembly.report.scene import robot_scene
+from assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, label, matrix
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.separability import Separability, compare_signatures
+from validation.diagnosis.separability import compare_signatures
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.verdict import CLAIM, RIVAL
 
 _SIDES = ((0, 1, "from above"), (0, 2, "from the side"))
+_COLOURS = {"before": RED, "after": BLUE}
+
+
+def _grid(charts: Sequence[str]) -> str:
+    """Charts side by side."""
+    return f"<div class=grid>{''.join(charts)}</div>"
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Before, after and noise on the held-out rows, position and rotation.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        HTML of bars; what was not measured is left out.
-    """
-    sizes = {
-        "before": diagnosis.before,
-        "after": diagnosis.after,
-        "noise": diagnosis.noise,
-    }
+    """Bars of the errors before, after and of noise on the held-out rows."""
     charts = []
     for kind, unit in (("position", "m"), ("rotation", "rad")):
-        values = {name: getattr(e, kind) for name, e in sizes.items()}
+        names = ("before", "after", "noise")
+        values = {name: getattr(getattr(diagnosis, name), kind) for name in names}
         known = {name: v for name, v in values.items() if np.isfinite(v)}
         if known:
             axis = Axis(f"{kind}: rms on held-out rows", unit)
             caption = "Rows that chose and fitted nothing."
             charts.append(bars(known, axis, caption, float("nan")))
-    return f"<div class=grid>{''.join(charts)}</div>"
+    return _grid(charts)
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Error of every model of the sequence on the held-out rows, in sigmas.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        HTML of bars in the order of the steps.
-    """
+    """Bars of the error of every model of the sequence, in sigma, in their order."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
@@ -54,69 +56,55 @@ def sequence_chart(diagnosis: Diagnosis) -> str:
 
 
 def vector_charts(diagnosis: Diagnosis) -> str:
-    """Residual displacements where they were measured, seen from the top and the side.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        HTML of lines before and after, all to the same scale.
-    """
+    """Residual displacements at the points measured, seen from the top and the side."""
     platform = diagnosis.conditions.postures.platform
     where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
     known = ~diagnosis.outliers
-    both = {
-        "before": (RED, np.nan_to_num(diagnosis.residual_before[:, 3:])),
-        "after": (BLUE, np.nan_to_num(diagnosis.residual_after[:, 3:])),
+    shifts = {
+        name: np.nan_to_num(residual[:, 3:])
+        for name, residual in _residuals(diagnosis).items()
     }
-    size = np.linalg.norm(both["before"][1][known], axis=1)
+    size = np.linalg.norm(shifts["before"][known], axis=1)
     span = float(np.ptp(where, axis=0).max()) or 1.0
     larger = 0.12 * span / max(float(np.quantile(size, 0.9)), 1e-12)
-    ids = [label(i) for i, k in zip(diagnosis.campaign.ids, known, strict=True) if k]
+    ids = [text for row in _labels(diagnosis) for text in (row, row, "")]
     charts = []
     for i, j, side in _SIDES:
         traces = []
-        for name, (colour, shift) in both.items():
+        for name, shift in shifts.items():
             start, end = where[known], (where + larger * shift)[known]
             gap = np.full_like(start, np.nan)
             points = np.stack([start, end, gap], axis=1).reshape(-1, 3)
             traces.append({
                 "type": "scatter", "mode": "lines", "name": name,
-                "x": points[:, i], "y": points[:, j], "line": {"color": colour},
-                "text": [one for row in ids for one in (row, row, "")],
-                "hoverinfo": "text",
+                "x": points[:, i], "y": points[:, j],
+                "line": {"color": _COLOURS[name]}, "text": ids, "hoverinfo": "text",
             })  # fmt: skip
-        equal = {"scaleanchor": "x"}
-        axes = Axis("xyz"[i], "m"), Axis("xyz"[j], "m", equal)
+        axes = Axis("xyz"[i], "m"), Axis("xyz"[j], "m", {"scaleanchor": "x"})
         caption = f"Seen {side}, {larger:.0f} times larger; all rows but outliers."
         charts.append(chart(traces, *axes, caption))
-    return f"<div class=grid>{''.join(charts)}</div>"
+    return _grid(charts)
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Size of the residual against everything that was varied, before and after.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        HTML of a chart for each of load, drives and covariates.
-    """
-    kept, charts = ~diagnosis.outliers, []
-    rows = [label(i) for i, k in zip(diagnosis.campaign.ids, kept, strict=True) if k]
+    """Size of the residual against load, drives and covariates, before and after."""
+    kept, rows = ~diagnosis.outliers, _labels(diagnosis)
+    sizes = {
+        name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
+        for name, left in _residuals(diagnosis).items()
+    }
+    charts = []
     for (name, unit), values in _varied(diagnosis).items():
         if np.ptp(values) == 0:
             continue
-        traces = []
-        for residual, colour, when in (
-            (diagnosis.residual_before, RED, "before"),
-            (diagnosis.residual_after, BLUE, "after"),
-        ):
-            z = np.sqrt(np.nanmean((residual / diagnosis.campaign.sigma) ** 2, axis=1))
-            traces.append({
+        traces: list[dict[str, Any]] = [
+            {
                 "type": "scatter", "mode": "markers", "name": when, "text": rows,
-                "x": values[kept], "y": z[kept], "marker": {"color": colour, "size": 5},
-            })  # fmt: skip
+                "x": values[kept], "y": z,
+                "marker": {"color": _COLOURS[when], "size": 5},
+            }
+            for when, z in sizes.items()
+        ]  # fmt: skip
         ends = [values[kept].min(), values[kept].max()]
         traces.append({
             "type": "scatter", "mode": "lines", "x": ends, "y": [1.0, 1.0],
@@ -125,7 +113,18 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
         log = Axis("residual / sigma", options={"type": "log"})
         caption = "Line at 1: noise as stated."
         charts.append(chart(traces, Axis(name, unit), log, caption))
-    return f"<div class=grid>{''.join(charts)}</div>"
+    return _grid(charts)
+
+
+def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
+    """(R, 6) [rad, m] before and after."""
+    return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
+
+
+def _labels(diagnosis: Diagnosis) -> list[str]:
+    """Of all rows but outliers."""
+    ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
+    return [label(name) for name, outlier in ids if not outlier]
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
@@ -143,47 +142,67 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Probability of every effect that the design can show.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        HTML of bars, the likeliest on top.
-    """
+    """Bars of the probability of every effect, the likeliest on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
-    axis = Axis("probability (claimed from 0.9, a rival from 0.5)",
+    axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
-    return bars(dict(ranked), axis, "Posterior weight of all sets with it.", 0.9)
-
-
-def separability_of(diagnosis: Diagnosis) -> Separability:
-    """Angles between the signatures of effects, by the design of this campaign.
-
-    Args:
-        diagnosis: the diagnosis.
-
-    Returns:
-        The comparison, each effect in its most general form.
-    """
-    columns: dict[str, NDArray] = {}
-    for element in diagnosis.traced.columns.library:
-        if element.name not in columns and np.any(element.columns):
-            columns[element.name] = element.columns
-    return compare_signatures(columns)
+    return bars(dict(ranked), axis, "Posterior weight of all sets with it.", CLAIM)
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """What can imitate what: share of the row's effect that the column's can show.
+    """Matrix of the share of a row's effect that the column's effect can imitate."""
+    columns: dict[str, NDArray] = {}
+    for element in diagnosis.traced.columns.library:  # the most general form first
+        if np.any(element.columns):
+            columns.setdefault(element.name, element.columns)
+    angles = compare_signatures(columns)
+    return matrix(
+        angles.shared, angles.names, "share of the row that the column can imitate",
+        "1: whatever the row's effect does, the column's can do as well.", around=False,
+    )  # fmt: skip
+
+
+def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
+    """The held-out row at which the declared model errs most.
 
     Args:
         diagnosis: the diagnosis.
 
     Returns:
-        HTML of a matrix of numbers from 0 to 1.
+        The row and what of it is largest, ``"position"``, or ``"rotation"`` where no
+        position was measured; -1 and an empty text without such a row.
     """
-    angles = separability_of(diagnosis)
-    return matrix(
-        angles.shared, angles.names, "share of the row that the column can imitate",
-        "1: whatever the row's effect does, the column's can do as well.", around=False,
+    aside = diagnosis.held.rows & ~diagnosis.outliers
+    for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
+        components = diagnosis.residual_before[:, part]
+        known = aside & np.isfinite(components).any(axis=1)
+        if known.any():
+            sizes = np.sqrt(np.nansum(components**2, axis=1))
+            return int(np.argmax(np.where(known, sizes, -1.0))), name
+    return -1, ""
+
+
+def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
+    """The machine found at a row under its load, by small screws; None if it is not."""
+    campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
+    try:
+        forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
+    except (CannotAssemble, FreeMotion, SolverFailed):
+        return None
+    return forced if isinstance(forced, Assembly) else None
+
+
+def worst_robot(diagnosis: Diagnosis) -> str:
+    """The robot as it is assembled at the worst row; empty without such a row."""
+    row, name = worst_row(diagnosis)
+    forced = assembled(diagnosis, row) if row >= 0 else None
+    if forced is None:
+        return ""
+    effects = ", ".join(diagnosis.effects).replace("_", " ") or "none"
+    return robot_scene(
+        forced, None, None,
+        f"Row {diagnosis.campaign.ids[row]}, held out, where the declared model errs "
+        f"most in {name}. Grey: nominal. Coloured: the machine found, assembled under "
+        f"the row's load (effects: {effects}). Red: elastic links; blue: rigid bodies; "
+        "orange: driven joints.",
     )  # fmt: skip

@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from assembly.model.robot import Robot
@@ -69,23 +69,30 @@ class MachineFit:
         """The fitted robot, as it would be saved."""
         return self.unknowns.robot_at(self.x)
 
-    def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
-        """(k,) values, (k, k) covariance and (n, k) slopes of one effect's unknowns."""
-        places = zip(self.unknowns.parts, self.unknowns.slices, strict=True)
-        own = next(s for one, s in places if one is part)
-        return self.x[own], self.covariance[own, own], self.slopes[:, own]
-
-    def seen(self, part: Acting) -> NDArray:
-        """(k,) bool, unknowns of one effect that some reading depends on."""
-        places = zip(self.unknowns.parts, self.unknowns.slices, strict=True)
-        own = next(s for one, s in places if one is part)
-        return self.determined[own] > _SEEN
+    @property
+    def std(self) -> NDArray:
+        """(k,) standard deviations of the numbers."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def determined(self) -> NDArray:
         """(k,) share of each unknown that the readings say and not its prior."""
-        std = self.unknowns.std
-        return 1.0 - np.clip(np.diag(self.covariance) / std**2, 0.0, 1.0)
+        prior = self.unknowns.std**2
+        return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
+
+    @property
+    def effects(self) -> tuple[Acting, ...]:
+        """Effects of the library that it has, the measuring frame's place aside."""
+        return tuple(one for one in self.unknowns.effects if not one.device)
+
+    def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
+        """(k,) values, (k, k) covariance and (n, k) slopes of one effect's unknowns."""
+        own = self.unknowns.place(part)
+        return self.x[own], self.covariance[own, own], self.slopes[:, own]
+
+    def seen(self, part: Acting) -> NDArray:
+        """(k,) bool, unknowns of one effect that some reading depends on."""
+        return self.determined[self.unknowns.place(part)] > _SEEN
 
 
 def fit_machine(
@@ -114,7 +121,9 @@ def fit_machine(
         return whiten(unknowns.slopes(campaign, x)[cells] / sigma[:, None])
 
     x, A, left = _minimum(unknowns, residual, slopes, start)
-    covariance = _covariance(A, unknowns.std)
+    root = _root(A * unknowns.std)
+    C = cho_solve((root, True), np.eye(len(x)), check_finite=False)
+    covariance = C * np.outer(unknowns.std, unknowns.std)
     return MachineFit(unknowns, x, covariance, A, left)
 
 
@@ -132,10 +141,8 @@ def _minimum(
 
     left = residual(x)
     A, F = slopes(x), total(x, left)
-    for turn in range(_STEPS):
-        if not len(x):
-            break
-        step = _step(A, left, x, (mean, std, lower, upper))
+    for turn in range(_STEPS if len(x) else 0):
+        step = _step(unknowns, A, left, x)
         share = 1.0
         while share >= _SHORTEST:
             trial = np.clip(x + share * step, lower, upper)
@@ -154,20 +161,15 @@ def _minimum(
     return x, A, left
 
 
-def _step(
-    A: NDArray, left: NDArray, x: NDArray,
-    prior: tuple[NDArray, NDArray, NDArray, NDArray],
-) -> NDArray:  # fmt: skip
+def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     """(k,) Gauss-Newton step within the bounds, unknowns in units of their prior."""
-    mean, std, lower, upper = prior
+    std = unknowns.std
     B = A * std
-    M = B.T @ B
-    M[np.diag_indices(len(M))] += 1.0
-    L = cholesky(M, lower=True, check_finite=False)
-    wanted = B.T @ left - (x - mean) / std
+    L = _root(B)
+    wanted = B.T @ left - (x - unknowns.mean) / std
     y = solve_triangular(L, wanted, lower=True, check_finite=False)
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
-    low, high = (lower - x) / std, (upper - x) / std
+    low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
         # |L' step - y| is the same minimum, now with bounds
         wide = high - low > 0.0
@@ -177,10 +179,8 @@ def _step(
     return step * std
 
 
-def _covariance(A: NDArray, std: NDArray) -> NDArray:
-    """(k, k) of the posterior."""
-    B = A * std
+def _root(B: NDArray) -> NDArray:
+    """(k, k) lower L with L L' = B'B + 1, for unknowns in units of their prior."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
-    C = np.linalg.inv(M)
-    return np.asarray(C * np.outer(std, std))
+    return cholesky(M, lower=True, check_finite=False)

@@ -18,16 +18,16 @@ from validation.diagnosis.lack_of_fit import (
     lack_of_fit,
     outlying,
 )
-from validation.diagnosis.next_measurement import NextMeasurement, next_measurement
+from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
 from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.prediction import predicted, residual_of
-from validation.diagnosis.sequence import errors_of, pooled, stages
+from validation.diagnosis.sequence import errors_of, joined, pooled, stages
 from validation.diagnosis.signatures import whiten
-from validation.diagnosis.structure import Trend, trends
+from validation.diagnosis.structure import trends
 from validation.diagnosis.text import text
 from validation.diagnosis.trace import FINITE, Traced
-from validation.diagnosis.verdict import NOT_ENOUGH, Kept, by_names, verdict
+from validation.diagnosis.verdict import NOT_ENOUGH, by_names, verdict
 from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
 BLUNDERS = 20  # one row in so many may be called a blunder, in all
@@ -67,37 +67,49 @@ def judge(
     Returns:
         The diagnosis.
     """
-    used = traced.used
-    every = [stages(_believed(campaign, traced), f.fit, f.used, f.held) for f in folds]
+    used, noise = traced.used, traced.selected.noise
+    believed = replace(traced.campaign, measured=campaign.measured)
+    every = [stages(believed, f.fit, f.used, f.held) for f in folds]
     first = 1 if campaign.registration == "unknown" else 0
-    before, after = (_joined(campaign, every, place) for place in (first, -1))
+    before, after = (
+        joined([list(fold.values())[place] for fold in every]) for place in (first, -1)
+    )
     outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
     rows = held.rows & ~outliers
-    steps = pooled(campaign, every, rows)
+    errors = [errors_of(campaign, residual, rows) for residual in (before, after)]
     fit, correlated = _with_noise_in_time(traced.fitting, fit)
     left = residual_of(campaign, fit.robot)
     noisy = _noisy(campaign, traced)
-    lack = _lack_of_fit(noisy, traced, fit, left)
-    names = _names(fit)
-    kept = Kept(names, bool(fit.unknowns.functions), bool(fit.unknowns.small))
-    decision, claimed = verdict(traced.selected, kept, lack.significant)
-    errors = {
-        kind: errors_of(campaign, residual, rows)
-        for kind, residual in (("before", before), ("after", after))
-    }
+    fitting, determined = noisy.take(used), float(fit.determined.sum())
+    lack = lack_of_fit(fitting, independent(fitting, left[used]), round(determined))
+    names = tuple(dict.fromkeys(one.hypothesis.effect for one in fit.effects))
+    decision, claimed = verdict(
+        traced.selected, names, functions=bool(fit.unknowns.functions),
+        small=bool(fit.unknowns.small), more_than_noise=lack.significant,
+    )  # fmt: skip
     if decision in {"explained", "learned", "ambiguous"}:
         fails = _fails(noisy, folds, after, rows, lack)
-        if fails or errors["after"].normalised > errors["before"].normalised:
+        if fails or errors[1].normalised > errors[0].normalised:
             decision, claimed = "outside_library", ()
-        if _too_few(campaign, traced, fit, fails):
+        if _too_few(campaign, used, determined, fails):
             decision, claimed = NOT_ENOUGH, ()
     remarks = implausible(campaign, fit)
     if remarks and decision in {"explained", "learned"}:
         decision, claimed = "outside_library", ()
-    declared = _declared_residual(campaign, traced, FINITE in names)
+    conditions = traced.conditions
+    if FINITE in names:
+        conditions = replace(conditions, second_order=0.0)
+    declared = np.asarray(campaign.measured - predict(conditions).deviation)
     if held.how == "split":  # what is saved is fitted to all rows, now that they judged
-        fit, correlated = _of_all_rows(campaign, traced, fit, used | rows)
+        fit, correlated = _of_all_rows(believed, traced, fit, used | rows)
         left = residual_of(campaign, fit.robot)
+    varies, following = [], None
+    if decision == "outside_library":
+        varies = trends(campaign.take(used), traced.conditions.take(used), left[used])
+    if decision == "ambiguous":
+        rivals = [fit_machine(traced.campaign, u, used) for u in traced.rivals()]
+        following = next_measurement(campaign, traced.conditions, fit, rivals)
+    free = [predicted(campaign, robot).undetermined for robot in (None, fit.robot)]
     return Diagnosis(
         campaign=campaign,
         verdict=decision,
@@ -108,11 +120,8 @@ def judge(
         probability=traced.selected.probability,
         alternatives=by_names(traced.selected),
         lack=lack,
-        declared=lack_of_fit(
-            noisy.take(used), independent(noisy.take(used), declared[used]), 0
-        ),
-        before=errors["before"],
-        after=errors["before"] if decision == "none_needed" else errors["after"],
+        before=errors[0],
+        after=errors[0] if decision == "none_needed" else errors[1],
         saved=errors_of(campaign, left, ~outliers),
         noise=errors_of(campaign, size_of_noise(noisy), rows),
         with_outliers=(
@@ -120,39 +129,21 @@ def judge(
             errors_of(campaign, after, held.rows),
         ),
         uncertainty=_uncertainty(campaign, after, rows),
-        noise_scale=(traced.selected.noise.tau, traced.selected.noise.tau_std),
+        noise_scale=(noise.tau, noise.tau_std),
         noise_in_time=correlated,
-        sequence=tuple(steps),
+        sequence=tuple(pooled(campaign, every, rows)),
         held=held,
         outliers=outliers,
         conditions=traced.conditions,
-        open=_open(campaign, fit),
+        open=np.any(free, axis=0),
         residual_before=declared,
         residual_after=left,
-        trends=_trends(campaign, traced, left) if decision == "outside_library" else (),
-        next=_next(campaign, traced, fit) if decision == "ambiguous" else None,
-        needed=_needed(campaign, traced, fit) if decision == NOT_ENOUGH else "",
+        trends=tuple(varies),
+        next=following,
+        needed=_needed(campaign, fit) if decision == NOT_ENOUGH else "",
         remarks=remarks + _impossible(campaign),
         wording=text,
-    )  # fmt: skip
-
-
-def _open(campaign: Campaign, fit: MachineFit) -> NDArray:
-    """(R,) bool, rows where clearances leave the pose free, declared or as found."""
-    found = predicted(campaign, fit.robot).undetermined
-    return np.asarray(predicted(campaign).undetermined | found)
-
-
-def _trends(campaign: Campaign, traced: Traced, left: NDArray) -> tuple[Trend, ...]:
-    """What the residual of the fitted rows varies with."""
-    used = traced.used
-    conditions = traced.conditions.take(used)
-    return tuple(trends(campaign.take(used), conditions, left[used]))
-
-
-def _believed(campaign: Campaign, traced: Traced) -> Campaign:
-    """The campaign with its readings and the sigma that the search believed."""
-    return replace(traced.campaign, measured=campaign.measured)
+    )
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
@@ -163,29 +154,6 @@ def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
         return campaign
     scale = min(traced.selected.noise.tau, 1.0)
     return replace(campaign, sigma=scale * campaign.sigma, common=common)
-
-
-def _declared_residual(campaign: Campaign, traced: Traced, linear: bool) -> NDArray:
-    """(R, 6) [rad, m] readings minus the declared model, registered."""
-    conditions = traced.conditions
-    if linear:
-        conditions = replace(conditions, second_order=0.0)
-    return np.asarray(campaign.measured - predict(conditions).deviation)
-
-
-def _names(fit: MachineFit) -> tuple[str, ...]:
-    """Effects of the library that a machine has, the measuring frame's place aside."""
-    own = [e.hypothesis.effect for e in fit.unknowns.effects if not e.device]
-    return tuple(dict.fromkeys(own))
-
-
-def _joined(campaign: Campaign, folds: list, place: int) -> NDArray:
-    """(R, 6) residual of one stage of every fold, each on the rows that it held out."""
-    residual = np.full(campaign.measured.shape, np.nan)
-    for fold in folds:
-        there = fold[place].residual
-        residual = np.where(np.isnan(there), residual, there)
-    return residual
 
 
 def _outlying_held(
@@ -201,12 +169,11 @@ def _outlying_held(
 
 
 def _of_all_rows(
-    campaign: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
+    believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
     """The same unknowns fitted to some more rows, of the noise found in the others."""
-    believed = _believed(campaign, traced)
-    more = campaign.cells & ~traced.campaign.cells
-    sigma = np.where(more, believed.sigma * traced.selected.noise.tau, believed.sigma)
+    more = believed.cells & ~traced.campaign.cells
+    sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
     fit = fit_machine(believed, fit.unknowns, rows, fit.x)
     return _with_noise_in_time(believed.take(rows), fit)
@@ -221,15 +188,6 @@ def _with_noise_in_time(
         return fit, noise
     C = widened(fit.covariance, fit.slopes, fitting, noise)
     return replace(fit, covariance=C), noise
-
-
-def _lack_of_fit(
-    campaign: Campaign, traced: Traced, fit: MachineFit, left: NDArray
-) -> LackOfFit:
-    """Is the residual of the fitted rows noise, by the stated sigma and repeats?"""
-    fitting = campaign.take(traced.used)
-    residual = independent(fitting, left[traced.used])
-    return lack_of_fit(fitting, residual, round(float(fit.determined.sum())))
 
 
 def _fails(
@@ -256,15 +214,14 @@ def _fails(
     return bool(loose and chi2.sf(squares, count) < SIGNIFICANT)
 
 
-def _too_few(campaign: Campaign, traced: Traced, fit: MachineFit, fails: bool) -> bool:
+def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) -> bool:
     """Whether so few rows decide nothing."""
-    cells = int(campaign.cells[traced.used].sum())
-    blocks = len(np.unique(blocks_of(campaign)[0][traced.used]))
-    many = float(fit.determined.sum()) > _SHARE * cells
+    blocks = len(np.unique(blocks_of(campaign)[0][used]))
+    many = determined > _SHARE * int(campaign.cells[used].sum())
     return many or (fails and blocks <= _DECISIVE)
 
 
-def _needed(campaign: Campaign, traced: Traced, fit: MachineFit) -> str:
+def _needed(campaign: Campaign, fit: MachineFit) -> str:
     """Rows that would decide, in words."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
@@ -279,13 +236,11 @@ def _needed(campaign: Campaign, traced: Traced, fit: MachineFit) -> str:
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
     """Standard error of the rms of held-out rows in sigma, by scatter of blocks."""
-    z = np.where(campaign.cells, residual / campaign.sigma, np.nan)
-    squares = np.nansum(z**2, axis=1)
-    blocks = blocks_of(campaign)[0]
-    names = np.unique(blocks[rows])
-    sums = np.array([squares[rows & (blocks == b)].sum() for b in names])
-    count = np.isfinite(z[rows]).sum()
-    if len(names) < 2 or not count or not sums.any():
+    z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
+    _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
+    sums = np.bincount(block, np.nansum(z**2, axis=1))
+    count = np.isfinite(z).sum()
+    if len(sums) < 2 or not count or not sums.any():
         return float("nan")
     error = sums.std(ddof=1) * np.sqrt(len(sums)) / count
     return float(error / (2 * np.sqrt(sums.sum() / count)))
@@ -297,14 +252,3 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     if not ids:
         return ()
     return (f"a temperature that no sensor has, left out: {', '.join(ids[:10])}",)
-
-
-def _next(
-    campaign: Campaign, traced: Traced, fit: MachineFit
-) -> NextMeasurement | None:
-    """The measurement that would tell the best model from its rivals."""
-    rivals = [
-        fit_machine(traced.campaign, unknowns, traced.used)
-        for unknowns in traced.rivals()
-    ]
-    return next_measurement(campaign, traced.conditions, fit, rivals)

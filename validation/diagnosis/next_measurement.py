@@ -94,7 +94,10 @@ def _measurement(
     fit: MachineFit, rival: MachineFit,
 ) -> NextMeasurement:  # fmt: skip
     """One of the conditions tried, in words and numbers."""
-    names = [" + ".join(_names(one)) or "nothing" for one in (fit, rival)]
+    names = [
+        " + ".join(sorted({e.hypothesis.effect for e in one.effects})) or "nothing"
+        for one in (fit, rival)
+    ]
     covariates = {
         name: float(getattr(tried, name)[best])
         for name in ("temperature", "approach")
@@ -153,46 +156,35 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     )
 
 
-def _names(fit: MachineFit) -> list[str]:
-    """Effects of the library that a machine was found to have."""
-    own = {e.hypothesis.effect for e in fit.unknowns.effects if not e.device}
-    return sorted(own)
-
-
 def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """(S, 6) whitened predictions with a machine's effects, (S, 6, k) derivatives."""
     # a session's own numbers say nothing of another measurement
-    parts = [e for e in fit.unknowns.effects if not e.device and e.session is None]
-    values = [fit.own(one)[0] for one in parts]
-    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
-    which = [np.arange(own.start, own.stop) for one, own in places if one in parts]
-    chosen = np.concatenate([np.zeros(0, int), *which])
+    parts = [one for one in fit.effects if one.session is None]
+    places = [fit.unknowns.place(one) for one in parts]
+    chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
     C = fit.covariance[np.ix_(chosen, chosen)]
-    finite = any(LIBRARY[e.hypothesis.effect].finite for e in parts)
+    finite = any(LIBRARY[one.hypothesis.effect].finite for one in parts)
 
-    def read(values: Sequence[NDArray], finite: bool) -> NDArray:
+    def read(x: NDArray, finite: bool) -> NDArray:
         effects = {
-            e.hypothesis.effect: e.hypothesis.public(tried.robot, x)
-            for e, x in zip(parts, values, strict=True)
+            one.hypothesis.effect: one.hypothesis.public(tried.robot, x[own])
+            for one, own in zip(parts, places, strict=True)
         }
         conditions = replace(apply_effects(tried, effects), exact=finite)
         return predict(conditions).deviation / sigma
 
-    model = read(values, finite)
+    model = read(fit.x, finite)
     # finite motions hardly change the slopes, and take a hundred times longer
-    middle = read(values, False) if finite else model
+    middle = read(fit.x, False) if finite else model
     J = np.zeros((*middle.shape, len(chosen)))
-    std = np.sqrt(np.maximum(np.diag(C), 0.0))
-    k = 0
-    for i, x in enumerate(values):
-        for j in range(len(x)):
-            moved = [v.copy() for v in values]
-            moved[i][j] += _STEP * std[k]
-            if std[k] > 0:
-                J[:, :, k] = (read(moved, False) - middle) / (_STEP * std[k])
-            k += 1
+    for k, place in enumerate(chosen):
+        step = _STEP * fit.std[place]
+        if step > 0.0:
+            moved = fit.x.copy()
+            moved[place] += step
+            J[:, :, k] = (read(moved, False) - middle) / step
     known = np.isfinite(sigma)
     return model[:, known], J[:, known], C
 

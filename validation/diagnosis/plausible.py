@@ -109,9 +109,7 @@ def _parameters(
 ) -> Iterator[tuple[str, str, float]]:
     """Effect, name and value of what was found; a drift as far as it went."""
     bare = campaign.robot.without_effects()
-    for one in fit.unknowns.effects:
-        if one.device:
-            continue
+    for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
         if one.session is None:  # with what the robot's file declares
             machine = fit.robot.effects.get(one.hypothesis.effect, {})

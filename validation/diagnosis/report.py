@@ -1,6 +1,9 @@
 """A diagnosis as one self-contained page."""
 
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from forcefit.inputs.writing import write_text
 from forcefit.page.page import (
@@ -12,21 +15,11 @@ from forcefit.page.page import (
     section,
 )
 from forcefit.page.tables import Cell, Column, Value, table
-from validation.diagnosis import results
+from validation.diagnosis import figures, results
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.figures import (
-    confounding_chart,
-    covariate_charts,
-    error_chart,
-    probability_chart,
-    sequence_chart,
-    vector_charts,
-)
 from validation.diagnosis.next_measurement import load_text
-from validation.diagnosis.results import LISTED, effects, learned, steps
-from validation.diagnosis.scene import worst_robot
-from validation.diagnosis.sentence import calibration_text, open_text, sentence
+from validation.diagnosis.sentence import calibration_text, open_text
 
 _ASSUMED = (
     "Held-out rows chose and fitted nothing; errors before and after are theirs.",
@@ -35,6 +28,7 @@ _ASSUMED = (
     "the library; effects that the design cannot tell apart are named together.",
 )
 NOWHERE = Provenance()
+Table = dict[str, Any]
 
 
 def write_report(
@@ -72,34 +66,39 @@ def report_page(
     Returns:
         The whole page.
     """
-    campaign = diagnosis.campaign
+    campaign, told = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
-        section("Before and after", error_chart(diagnosis)),
+        section("Before and after", figures.error_chart(diagnosis)),
         section(
             "Models, and what each reduces",
-            sequence_chart(diagnosis),
-            _steps(diagnosis),
+            figures.sequence_chart(diagnosis),
+            _steps(told),
         ),
-        *_robot(diagnosis),
-        *_learned(diagnosis),
-        *_parameters(diagnosis),
-        section("Where the residual is", vector_charts(diagnosis)),
+        *_section(
+            "The robot where the error is largest", figures.worst_robot(diagnosis)
+        ),
+        *_section("Learned", _learned(told)),
+        *_section(*_parameters(told)),
+        section("Where the residual is", figures.vector_charts(diagnosis)),
         section(
-            "What it varies with", covariate_charts(diagnosis), *_structure(diagnosis)
+            "What it varies with",
+            figures.covariate_charts(diagnosis),
+            *_structure(told),
         ),
-        section("Which effect", probability_chart(diagnosis), _sets(diagnosis)),
-        section("What this design can tell apart", confounding_chart(diagnosis)),
-        *_next(diagnosis),
-        *_noise(diagnosis),
+        section("Which effect", figures.probability_chart(diagnosis), _sets(told)),
+        section(
+            "What this design can tell apart", figures.confounding_chart(diagnosis)
+        ),
+        *_next(told),
+        section("Noise and outliers", *map(paragraph, _noise(diagnosis))),
     ]
     if tally is not None:
-        body.append(
-            section("How often this is right", paragraph(calibration_text(tally)))
-        )
+        told_tally = paragraph(calibration_text(tally))
+        body.append(section("How often this is right", told_tally))
     return page(
         Page(
             title=f"Diagnosis of {campaign.name}",
-            verdict=sentence(diagnosis),
+            verdict=told["sentence"],
             good=diagnosis.verdict in {"explained", "learned", "none_needed"},
             tiles=_tiles(diagnosis),
             about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
@@ -107,9 +106,14 @@ def report_page(
             body=body,
             assumed=_ASSUMED,
             provenance=provenance,
-            results=results.table(diagnosis, tally),
+            results=told,
         )
     )
+
+
+def _section(title: str, content: str) -> list[str]:
+    """A section, unless it is empty."""
+    return [section(title, content)] if content else []
 
 
 def _tiles(diagnosis: Diagnosis) -> list[Tile]:
@@ -131,103 +135,84 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
     return tiles
 
 
-def _robot(diagnosis: Diagnosis) -> list[str]:
-    """The robot where the declared model errs most."""
-    drawn = worst_robot(diagnosis)
-    return [section("The robot where the error is largest", drawn)] if drawn else []
-
-
-def _steps(diagnosis: Diagnosis) -> str:
+def _steps(told: Table) -> str:
     """Table of the model sequence."""
     rows: list[list[Cell]] = [
         [row["term"], f"{row['unknowns']:.0f}",
          Value(row["kept_aside_rms"], row["unit"], 3),
          Value(row["kept_aside_sigma"], "", 3)]
-        for row in steps(diagnosis)
+        for row in told["ladder"]
     ]  # fmt: skip
     return table(["model", "unknowns", "rms held out", "sigma"], rows, "steps")
 
 
-def _sets(diagnosis: Diagnosis) -> str:
+def _sets(told: Table) -> str:
     """Table of the sets of effects."""
     rows: list[list[Cell]] = [
-        [" + ".join(n) or "none", p] for n, p in diagnosis.alternatives
+        [" + ".join(one["names"]) or "none", one["probability"]]
+        for one in told["alternatives"]
     ]
     return table(["set of effects", Column("probability", digits=3)], rows)
 
 
-def _learned(diagnosis: Diagnosis) -> list[str]:
+def _learned(told: Table) -> str:
     """Table of the functions learned."""
     rows = [
         [f"{one['where']} {', '.join(one['components'])}", ", ".join(one["variables"]),
          one["form"], one["formula"]]
-        for one in learned(diagnosis)
+        for one in told["learned"]
     ]  # fmt: skip
+    head = ["where", "of", "form", "value [rad, m, per N m or N]"]
+    return table(head, rows) if rows else ""
+
+
+def _parameters(told: Table) -> tuple[str, str]:
+    """Title and table of the best set's numbers."""
+    rows: list[list[Cell]] = [
+        [f"{effect['name']}: {p['name']}", Value(p["value"], p["unit"], 6),
+         Value(p["std"], p["unit"], 2),
+         *(Value(end, p["unit"], 6) for end in p["interval_90"])]
+        for effect in told["effects"] for p in effect["parameters"]
+    ]  # fmt: skip
+    title = "Parameters, if so" if told["verdict"] == "ambiguous" else "Parameters"
+    head = ["parameter", "value", "standard deviation", "at least (90 %)", "at most"]
+    listed = told["verdict"] in results.LISTED
+    return title, table(head, rows, "parameters") if listed else ""
+
+
+def _structure(told: Table) -> list[str]:
+    """Table of what the residual varies with."""
+    rows: list[list[Cell]] = [
+        [t["against"], f"{100 * t['share']:.0f} %", f"{t['probability']:.1g}"]
+        for t in told["structure"]
+    ]
     if not rows:
         return []
-    head = ["where", "of", "form", "value [rad, m, per N m or N]"]
-    return [section("Learned", table(head, rows))]
-
-
-def _parameters(diagnosis: Diagnosis) -> list[str]:
-    """Table of the best set's numbers."""
-    if diagnosis.verdict not in LISTED:
-        return []
-    rows: list[list[Cell]] = []
-    for effect in effects(diagnosis):
-        for p in effect["parameters"]:
-            low, high = p["interval_90"]
-            rows.append([
-                f"{effect['name']}: {p['name']}",
-                Value(p["value"], p["unit"], 6), Value(p["std"], p["unit"], 2),
-                Value(low, p["unit"], 6), Value(high, p["unit"], 6),
-            ])  # fmt: skip
-    title = "Parameters, if so" if diagnosis.verdict == "ambiguous" else "Parameters"
-    head = ["parameter", "value", "standard deviation", "at least (90 %)", "at most"]
-    return [section(title, table(head, rows, "parameters"))]
-
-
-def _structure(diagnosis: Diagnosis) -> list[str]:
-    """Table of what is left varies with."""
-    if not diagnosis.trends:
-        return []
-    rows: list[list[Cell]] = [
-        [t.against, f"{100 * t.share:.0f} %", f"{t.probability:.1g}"]
-        for t in diagnosis.trends
-    ]
     return [
         paragraph("What is left after the best set of effects varies with:"),
         table(["against", "share of its square", "by chance"], rows),
     ]
 
 
-def _next(diagnosis: Diagnosis) -> list[str]:
+def _next(told: Table) -> list[str]:
     """What to measure next."""
-    if diagnosis.next is None:
+    following = told["next_measurement"]
+    if following is None:
         return []
-    rows = [[k, f"{v:.6g}"] for k, v in diagnosis.next.configuration.items()]
-    rows.append(["load [N m, N]", load_text(diagnosis.next.load)])
-    rows += [[k, f"{v:g}"] for k, v in diagnosis.next.covariates.items()]
-    return [
-        section(
-            "Measure next",
-            paragraph(f"{diagnosis.next.why}."),
-            table(["command", "value"], rows),
-        )
-    ]
+    rows = [[k, f"{v:.6g}"] for k, v in following["configuration"].items()]
+    rows.append(["load [N m, N]", load_text(following["load"])])
+    rows += [[k, f"{v:g}"] for k, v in following["covariates"].items()]
+    commands = table(["command", "value"], rows)
+    return [section("Measure next", paragraph(f"{following['why']}."), commands)]
 
 
 def _noise(diagnosis: Diagnosis) -> list[str]:
     """How the noise was judged, and which rows were left out."""
-    far = [
-        i for i, o in zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True) if o
-    ]
     lack = diagnosis.lack
-    repeats = (
-        f"{lack.repeats:.2f} between repeats"
-        if lack.repeats_freedom
-        else "no repeats to judge it by"
-    )
+    far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
+    repeats = "no repeats to judge it by"
+    if lack.repeats_freedom:
+        repeats = f"{lack.repeats:.2f} between repeats"
     texts = [
         f"What is left is {lack.rms:.2f} of the stated sigma (probability "
         f"{lack.probability:.2g} by chance); {repeats}.",
@@ -235,4 +220,4 @@ def _noise(diagnosis: Diagnosis) -> list[str]:
     ]
     if diagnosis.open.any():
         texts.append(f"{open_text(diagnosis.open)}.")
-    return [section("Noise and outliers", *map(paragraph, texts))]
+    return texts

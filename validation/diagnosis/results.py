@@ -9,16 +9,17 @@ import numpy as np
 from assembly.effects import LIBRARY
 from stiffness.screws import SCREW
 from validation.diagnosis.calibration import Calibration
-from validation.diagnosis.claims import parameters_of
+from validation.diagnosis.claims import Parameter, parameters_of
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.saving import functions_of, not_measured
-from validation.diagnosis.sentence import formula, sentence
-from validation.diagnosis.sequence import LEARNED, Errors
+from validation.diagnosis.saving import functions_of
+from validation.diagnosis.sentence import WORDS, formula, sentence
+from validation.diagnosis.sequence import LEARNED
 from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS
-from validation.diagnosis.unknowns import Small
 
 LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
+_INTERVAL = 1.645  # standard deviations of a normal distribution: 90 % lie within
+_UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
@@ -33,6 +34,8 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
     """
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
+    noise, held = diagnosis.traced.selected.noise, diagnosis.held
+    before, after = map(asdict, diagnosis.with_outliers)
     return {
         "campaign": diagnosis.campaign.name,
         "robot": diagnosis.campaign.robot.name,
@@ -48,42 +51,35 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "best_by_score": list(diagnosis.effects),
         "error": {
             "unit": {"position": "m", "rotation": "rad"},
-            "before": _errors(diagnosis.before),
-            "after": _errors(diagnosis.after),
-            "saved": _errors(diagnosis.saved),
+            "before": asdict(diagnosis.before),
+            "after": asdict(diagnosis.after),
+            "saved": asdict(diagnosis.saved),
             "noise": {
                 "position": diagnosis.noise.position,
                 "rotation": diagnosis.noise.rotation,
             },
-            "with_outliers": {
-                "before": _errors(diagnosis.with_outliers[0]),
-                "after": _errors(diagnosis.with_outliers[1]),
-            },
+            "with_outliers": {"before": before, "after": after},
         },
         "noise_scale": {
             "value": diagnosis.noise_scale[0],
             "std": diagnosis.noise_scale[1],
             "findings": list(diagnosis.findings),
             "normalised": diagnosis.noise.normalised,
-            "common": dict(
-                zip(KINDS, diagnosis.traced.selected.noise.common, strict=True)
-            ),
+            "common": dict(zip(KINDS, noise.common, strict=True)),
         },
-        "noise_in_time": None
-        if diagnosis.noise_in_time is None
-        else asdict(diagnosis.noise_in_time),
+        "noise_in_time": _plain(diagnosis.noise_in_time),
         "ladder": steps(diagnosis),
         "geometry": small(diagnosis, GEOMETRY),
         "springs": small(diagnosis, SPRINGS),
         "learned": learned(diagnosis),
         "held_out": {
-            "rows": int(diagnosis.held.rows.sum()),
-            "how": diagnosis.held.how,
-            "words": diagnosis.held.words,
-            "ids": ids[diagnosis.held.rows].tolist(),
+            "rows": int(held.rows.sum()),
+            "how": held.how,
+            "words": held.words,
+            "ids": ids[held.rows].tolist(),
             "uncertainty": diagnosis.uncertainty,
         },
-        "not_measured": not_measured(diagnosis.campaign),
+        "not_measured": diagnosis.campaign.not_measured,
         "lack_of_fit": {
             "rms": diagnosis.lack.rms,
             "probability": diagnosis.lack.probability,
@@ -93,13 +89,15 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
         "setup_blunders": [asdict(one) for one in diagnosis.setup],
         "outliers": ids[diagnosis.outliers].tolist(),
         "open": ids[diagnosis.open].tolist(),
-        "structure": [
-            {"against": t.against, "share": t.share, "probability": t.probability}
-            for t in diagnosis.trends
-        ],
-        "next_measurement": _next(diagnosis),
-        "calibration": None if tally is None else asdict(tally),
+        "structure": [asdict(trend) for trend in diagnosis.trends],
+        "next_measurement": _plain(diagnosis.next),
+        "calibration": _plain(tally),
     }
+
+
+def _plain(one: Any) -> dict[str, Any] | None:
+    """A dataclass as plain values, if there is one."""
+    return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -119,9 +117,6 @@ def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
-_UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
-
-
 def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
     """Geometric errors, or springs, of all frames in the public format.
 
@@ -135,28 +130,26 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         if the machine is as declared.
     """
     fit = diagnosis.fit
-    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
-    found = [(p, own) for p, own in places if isinstance(p, Small) and p.name == name]
-    if not found:
+    part = next((part for part in fit.unknowns.small if part.name == name), None)
+    if part is None:
         return None
-    ((part, own),) = found
-    share, std = fit.determined[own], np.sqrt(np.diag(fit.covariance)[own])
+    own, kind = fit.unknowns.place(part), part.axis // 3
+    share = fit.determined[own]
     frames = diagnosis.campaign.robot.frames
-    known = np.bincount(part.frame, share, minlength=len(frames))
-    sizes = {
-        kind: float(part.std[part.axis // 3 == k].max())
-        for k, kind in enumerate(KINDS) if np.any(part.axis // 3 == k)
-    }  # fmt: skip
+    known = np.bincount(part.frame, share, minlength=len(frames)).tolist()
+    listed = [
+        {"frame": f.name, "identifiable": k}
+        for f, k in zip(frames, known, strict=True) if k > _HARDLY
+    ]  # fmt: skip
     return {
-        "scale": sizes,
+        "scale": {
+            KINDS[k]: float(part.std[kind == k].max()) for k in np.unique(kind).tolist()
+        },
         "unit": dict(zip(KINDS, _UNITS[name], strict=True)),
         "unknowns": len(part),
         "identifiable": float(share.sum()),
-        "where": [f.name for i, f in enumerate(frames) if known[i] > _HARDLY],
-        "frames": [
-            {"frame": f.name, "identifiable": float(known[i])}
-            for i, f in enumerate(frames) if known[i] > _HARDLY
-        ],
+        "where": [one["frame"] for one in listed],
+        "frames": listed,
         "parameters": [
             {
                 "frame": frames[i].name, "component": SCREW[axis].lower(),
@@ -164,7 +157,7 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
                 "unit": _UNITS[name][axis // 3],
             }
             for i, axis, v, s, told
-            in zip(part.frame, part.axis, fit.x[own], std, share, strict=True)
+            in zip(part.frame, part.axis, fit.x[own], fit.std[own], share, strict=True)
         ],
     }  # fmt: skip
 
@@ -179,82 +172,67 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         Of an effect that the robot's file declares, the value is what the saved robot
         has; what was declared and the difference found are given with it.
     """
-    robot = diagnosis.campaign.robot
-    bare, shown = robot.without_effects(), []
-
-    def unit(effect: str, name: str) -> str:
-        return LIBRARY[effect].unit(bare, name)
-
-    for one in diagnosis.fit.unknowns.effects:
-        if one.device:
-            continue
-        name, h = one.hypothesis.effect, one.hypothesis
-        x, C, _ = diagnosis.fit.own(one)
-        there = robot.effects
-        if one.session is not None:
-            there = robot.session_effects.get(one.session, {})
-        declared = there.get(name, {})
-        seen = diagnosis.fit.seen(one)
-        parameters = parameters_of(bare, one, x, C, declared, seen)
-        differences = h.public(bare, x)
-        acting = {n for p, *_ in parameters for n in (p, p.rpartition(".")[0])}
+    bare, shown = diagnosis.campaign.robot.without_effects(), []
+    for one in diagnosis.fit.effects:
+        name = one.hypothesis.effect
+        parameters = parameters_of(diagnosis.fit, one)
+        acting = {n for p in parameters for n in (p.name, p.name.rpartition(".")[0])}
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
             # frames found rigid or tight have no parameter
-            "where": [frame for frame in h.where if frame in acting],
+            "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
-                _parameter(p, value, std, unit(name, p))
-                | _found(declared.get(p), differences[p], value)
-                for p, value, std in parameters
+                _parameter(p, LIBRARY[name].unit(bare, p.name)) for p in parameters
             ],
         })
     return shown
 
 
-_NAMES = {GEOMETRY: "geometric_errors", SPRINGS: "springs"}
+def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
+    """A parameter of the machine, with what was declared if it was."""
+    found = {"declared": p.declared, "difference": p.difference, "corrected": p.value}
+    return {
+        "name": p.name, "value": p.value, "std": p.std,
+        "interval_90": [p.value - _INTERVAL * p.std, p.value + _INTERVAL * p.std],
+        "unit": unit,
+        **({} if p.declared is None else {"found": found}),
+    }  # fmt: skip
 
 
 def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Geometric errors and springs, where no effect of the library is named."""
     if diagnosis.effects or diagnosis.fit.unknowns.functions:
         return []
-    found = [(name, small(diagnosis, name)) for name in (GEOMETRY, SPRINGS)]
+    found = [(words, small(diagnosis, name)) for name, words in WORDS.items()]
     return [
         {
-            "name": _NAMES[name], "where": one["where"], "probability": 1.0,
+            "name": words.replace(" ", "_"), "where": one["where"], "probability": 1.0,
             "combinations": one["identifiable"], "parameters": [],
         }
-        for name, one in found if one is not None
+        for words, one in found if one is not None
     ]  # fmt: skip
-
-
-def _parameter(name: str, value: float, std: float, unit: str) -> dict[str, Any]:
-    """A parameter of the machine."""
-    interval = [value - 1.645 * std, value + 1.645 * std]
-    return {
-        "name": name, "value": value, "std": std, "interval_90": interval, "unit": unit,
-    }  # fmt: skip
-
-
-def _found(declared: float | None, difference: float, value: float) -> dict[str, Any]:
-    """What was declared of a parameter, and the difference found for it, if it was."""
-    if declared is None:
-        return {}
-    told = {"declared": declared, "difference": difference, "corrected": value}
-    return {"found": told}
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """What was learned, in the public format: a function of a robot file each."""
-    places = [k for k, s in enumerate(diagnosis.sequence) if s.term == LEARNED]
+    sequence = diagnosis.sequence
+    places = [k for k, s in enumerate(sequence) if s.term == LEARNED]
+    places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
         # in folds fewer functions may have been found
-        at = places[min(k, len(places) - 1)] if places else len(diagnosis.sequence) - 1
-        before, after = (diagnosis.sequence[max(i, 0)].error for i in (at - 1, at))
-        parts = diagnosis.traced.selected.functions[k].range_error
+        at = places[min(k, len(places) - 1)]
+        found = diagnosis.traced.selected.functions[k]
+        same = [
+            [
+                {"where": place.where, "components": list(place.components),
+                 "variables": list(place.variables)}
+                for place in places
+            ]
+            for places in found.equivalent
+        ]  # fmt: skip
         for function in functions:
             shown.append({
                 "label": function.title,
@@ -266,33 +244,9 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "formula": formula(function),
                 "parameters": dict(function.parameters),
                 "std": dict(function.std),
-                "equivalent_places": [
-                    [{"where": p.where, "components": list(p.components),
-                      "variables": list(p.variables)} for p in parts]
-                    for parts in diagnosis.traced.selected.functions[k].equivalent
-                ],
-                "before": _errors(before),
-                "after": _errors(after),
-                "parts_of_range": None if parts is None else asdict(parts),
-            })  # fmt: skip
+                "equivalent_places": same,
+                "before": asdict(sequence[max(at - 1, 0)].error),
+                "after": asdict(sequence[at].error),
+                "parts_of_range": _plain(found.range_error),
+            })
     return shown
-
-
-def _errors(errors: Errors) -> dict[str, float]:
-    return {
-        "position": errors.position,
-        "rotation": errors.rotation,
-        "normalised": errors.normalised,
-    }
-
-
-def _next(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    if diagnosis.next is None:
-        return None
-    return {
-        "why": diagnosis.next.why,
-        "configuration": diagnosis.next.configuration,
-        "load": list(diagnosis.next.load),
-        "covariates": diagnosis.next.covariates,
-        "power": diagnosis.next.power,
-    }

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from assembly.model.function import Function
 from assembly.model.links import in_series
@@ -21,10 +22,11 @@ from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
 from stiffness.screws import SCREW
+from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.small_terms import GEOMETRY, with_error
-from validation.diagnosis.unknowns import Small, Unknowns
+from validation.diagnosis.unknowns import Small, effects_in, with_effects_in
 
-_AXES = tuple(axis.lower() for axis in SCREW)
+AXES = tuple(axis.lower() for axis in SCREW)
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
@@ -51,57 +53,45 @@ class Number:
     def of(self, robot: Robot) -> float:
         """Its value; of a compliance what was added to the file's, which is 0."""
         if self.kind == ERROR:
-            return float(robot.errors[robot.index(self.owner), _AXES.index(self.name)])
+            return float(robot.errors[robot.index(self.owner), AXES.index(self.name)])
         if self.kind == EFFECT:
-            effects = robot.effects
-            if self.session:
-                effects = robot.session_effects.get(self.session, {})
+            effects = effects_in(robot, self.session or None)
             return float(effects.get(self.owner, {}).get(self.name, 0.0))
         if self.kind == FUNCTION:
             return float(robot.functions[int(self.owner)].parameters[self.name])
         return 0.0
 
-    def _softened(self, robot: Robot, by: float) -> Robot:
-        """The robot whose joint gives more, or less, in one direction."""
-        row, axis = robot.index(self.owner), _AXES.index(self.name)
-        K = robot.frames[row].resistance
-        stiffness = np.inf if K is None else float(K[axis, axis])
-        soft = 1 / stiffness if 0.0 < stiffness < np.inf else 0.0
-        by = max(by, -(1 - _STAYS) * soft)
-        frames = list(robot.frames)
-        if by:
-            stiffer = in_series(K, axis, by)
-            frames[row] = replace(frames[row], joint_stiffness=stiffer)
-        return replace(robot, frames=tuple(frames))
-
     def moved(self, robot: Robot, by: float) -> Robot:
         """The robot in which it is larger; of a compliance something always stays."""
         if self.kind == ERROR:
-            place = np.array([robot.index(self.owner)]), _place(self.name)
-            return with_error(robot, *place, np.array([by]))
+            row, axis = robot.index(self.owner), AXES.index(self.name)
+            return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
         if self.kind == COMPLIANCE:
             return self._softened(robot, by)
         if self.kind == FUNCTION:
             functions = list(robot.functions)
             one = functions[int(self.owner)]
-            value = one.parameters[self.name] + by
-            functions[int(self.owner)] = replace(
-                one, parameters={**one.parameters, self.name: value}
-            )
+            more = {**one.parameters, self.name: one.parameters[self.name] + by}
+            functions[int(self.owner)] = replace(one, parameters=more)
             return replace(robot, functions=tuple(functions))
-        effects = robot.effects
-        if self.session:
-            effects = robot.session_effects.get(self.session, {})
+        effects = effects_in(robot, self.session or None)
         own = {**effects.get(self.owner, {}), self.name: self.of(robot) + by}
-        changed = {**effects, self.owner: own}
-        if self.session:
-            sessions = {**robot.session_effects, self.session: changed}
-            return replace(robot, session_effects=sessions)
-        return replace(robot, effects=changed)
+        return with_effects_in(
+            robot, self.session or None, {**effects, self.owner: own}
+        )
 
-
-def _place(name: str) -> NDArray:
-    return np.array([_AXES.index(name)])
+    def _softened(self, robot: Robot, by: float) -> Robot:
+        """The robot whose joint gives more, or less, in one direction."""
+        row, axis = robot.index(self.owner), AXES.index(self.name)
+        K = robot.frames[row].resistance
+        stiffness = np.inf if K is None else float(K[axis, axis])
+        soft = 1 / stiffness if 0.0 < stiffness < np.inf else 0.0
+        by = max(by, -(1 - _STAYS) * soft)
+        if not by:
+            return robot
+        frames = list(robot.frames)
+        frames[row] = replace(frames[row], joint_stiffness=in_series(K, axis, by))
+        return replace(robot, frames=tuple(frames))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,40 +106,39 @@ class SavedCovariance:
     numbers: tuple[Number, ...]
     covariance: NDArray
 
+    @property
+    def std(self) -> NDArray:
+        """(k,) standard deviations of the numbers."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
-def covariance_of(
-    unknowns: Unknowns, x: NDArray, C: NDArray, robot: Robot
-) -> SavedCovariance:
+
+def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
     """Covariance of a fitted robot's numbers.
 
     Args:
-        unknowns: what was fitted.
-        x: (k,) their values.
-        C: (k, k) their covariance.
+        fit: what was fitted.
         robot: as it is saved.
 
     Returns:
         That of the numbers of its file, to first order.
     """
-    numbers = _numbers(unknowns, robot)
-    J = np.zeros((len(numbers), len(x)))
-    springs = {n: i for i, n in enumerate(numbers) if n.kind == COMPLIANCE}
-    small = np.zeros(len(x), dtype=bool)
-    for part, own in zip(unknowns.parts, unknowns.slices, strict=True):
-        if isinstance(part, Small) and part.name != GEOMETRY:
-            small[own] = True
-            for k, (row, axis) in enumerate(zip(part.frame, part.axis, strict=True)):
-                one = Number(COMPLIANCE, robot.frames[row].name, _AXES[axis])
-                J[springs[one], own.start + k] = 1.0
+    numbers = _numbers(fit, robot)
+    J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
-    std = np.sqrt(np.maximum(np.diag(C), 0.0))
-    for k in np.flatnonzero(~small & (std > 0.0)).tolist():
-        moved = x.copy()
-        moved[k] += _STEP * std[k]
-        other = unknowns.robot_at(moved)
-        there = np.array([_value(n, other, robot) for n in numbers])
-        J[:, k] = (there - middle) / (_STEP * std[k])
-    return SavedCovariance(tuple(numbers), J @ C @ J.T)
+    for part, own in fit.unknowns.places:
+        if isinstance(part, Small) and part.name != GEOMETRY:
+            springs = [numbers.index(n) for n in _of_frames(part, robot)]
+            J[springs, np.arange(own.start, own.stop)] = 1.0
+            continue
+        for k in range(own.start, own.stop):
+            step = _STEP * fit.std[k]
+            if step > 0.0:
+                moved = fit.x.copy()
+                moved[k] += step
+                other = fit.unknowns.robot_at(moved)
+                there = np.array([_value(n, other, robot) for n in numbers])
+                J[:, k] = (there - middle) / step
+    return SavedCovariance(tuple(numbers), J @ fit.covariance @ J.T)
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
@@ -171,25 +160,28 @@ def _names(function: Function) -> tuple[object, ...]:
     return function.where, function.variables, function.form, function.kind
 
 
-def _numbers(unknowns: Unknowns, robot: Robot) -> list[Number]:
+def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
     """Numbers of a saved robot that the unknowns change."""
-    numbers = []
-    for part in unknowns.small:
-        kind = ERROR if part.name == GEOMETRY else COMPLIANCE
-        for row, axis in zip(part.frame, part.axis, strict=True):
-            numbers.append(Number(kind, robot.frames[row].name, _AXES[axis]))
-    for one in unknowns.effects:
-        effects = robot.effects
-        if one.session is not None:
-            effects = robot.session_effects.get(one.session, {})
-        for name in effects.get(one.hypothesis.effect, {}):
-            number = Number(EFFECT, one.hypothesis.effect, name, one.session or "")
+    numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
+    for one in fit.unknowns.effects:
+        effect = one.hypothesis.effect
+        for name in effects_in(robot, one.session).get(effect, {}):
+            number = Number(EFFECT, effect, name, one.session or "")
             if number not in numbers:
                 numbers.append(number)
-    first = len(unknowns.robot.functions)
+    first = len(fit.unknowns.robot.functions)
     for k, function in enumerate(robot.functions[first:], first):
         numbers += [Number(FUNCTION, str(k), name) for name in function.std]
     return numbers
+
+
+def _of_frames(part: Small, robot: Robot) -> list[Number]:
+    """Numbers of geometric errors or compliances, in the order of the unknowns."""
+    kind = ERROR if part.name == GEOMETRY else COMPLIANCE
+    return [
+        Number(kind, robot.frames[row].name, AXES[axis])
+        for row, axis in zip(part.frame, part.axis, strict=True)
+    ]
 
 
 def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
@@ -255,28 +247,15 @@ def known_covariance(robot: Robot) -> SavedCovariance:
     Raises:
         BadInput: as :func:`read_covariance`.
     """
-    saved = read_covariance(robot)
-    numbers = [] if saved is None else list(saved.numbers)
-    variance: list[float] = []
-    further = []
-    for frame in robot.frames:
-        for axis, sigma in zip(_AXES, _sigmas(frame.tolerance), strict=True):
-            further.append((Number(ERROR, frame.name, axis), sigma))
+    saved = read_covariance(robot) or SavedCovariance((), np.zeros((0, 0)))
+    further = {
+        Number(ERROR, frame.name, axis): sigma
+        for frame in robot.frames if frame.tolerance is not None
+        for axis, sigma in zip(AXES, frame.tolerance.tolist(), strict=True)
+    }  # fmt: skip
     for k, function in enumerate(robot.functions):
-        further += [(Number(FUNCTION, str(k), n), s) for n, s in function.std.items()]
-    known = set(numbers)
-    for number, sigma in further:
-        if sigma > 0.0 and number not in known:
-            numbers.append(number)
-            variance.append(sigma**2)
-    first = len(numbers) - len(variance)
-    C = np.zeros((len(numbers), len(numbers)))
-    if saved is not None:
-        C[:first, :first] = saved.covariance
-    C[first:, first:] = np.diag(variance)
-    return SavedCovariance(tuple(numbers), C)
-
-
-def _sigmas(tolerance: NDArray | None) -> list[float]:
-    """Six standard deviations, 0 where nothing is said."""
-    return [0.0] * 6 if tolerance is None else tolerance.tolist()
+        further |= {Number(FUNCTION, str(k), n): s for n, s in function.std.items()}
+    alone = {n: s for n, s in further.items() if s > 0.0 and n not in saved.numbers}
+    variance = np.diag(np.square([*alone.values()]))
+    C = block_diag(saved.covariance, variance) if alone else saved.covariance
+    return SavedCovariance((*saved.numbers, *alone), C)

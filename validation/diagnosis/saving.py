@@ -6,18 +6,18 @@ errors carry their standard deviation as ``tolerance``, functions as ``std``.
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from assembly.files.robot_file import write_robot
 from assembly.model.function import Function
 from assembly.model.robot import Robot
-from validation.campaign.campaign import READING, Campaign
+from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.learned_range import learned_range
 from validation.diagnosis.saved_covariance import covariance_of, write_covariance
 from validation.diagnosis.small_terms import GEOMETRY
@@ -34,45 +34,39 @@ def corrected(diagnosis: Diagnosis) -> Robot:
         The fitted robot with the range it was identified in, the point measured, the
         uncertainty of its geometric errors, and a record of the diagnosis.
     """
-    campaign = diagnosis.campaign
-    robot = _with_tolerances(diagnosis)
+    campaign, robot = diagnosis.campaign, _with_tolerances(diagnosis.fit)
     ranges = learned_range(campaign, ~diagnosis.outliers)
     x, y, z = campaign.reference_point.tolist()
+    learned = [f for functions in functions_of(diagnosis) for f in functions]
     return replace(
         robot,
-        functions=(*campaign.robot.functions, *_functions(diagnosis)),
+        functions=(*campaign.robot.functions, *learned),
         learned_range={**robot.learned_range, **ranges},
         reference_point=(x, y, z),
         diagnosis=_record(diagnosis),
     )
 
 
-def _functions(diagnosis: Diagnosis) -> list[Any]:
-    """Learned functions with the standard deviations of their numbers."""
-    return [f for some in functions_of(diagnosis) for f in some]
-
-
-def functions_of(diagnosis: Diagnosis) -> list[list[Any]]:
+def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
     """Functions of a robot file that were learned, with their numbers.
 
     Args:
         diagnosis: the diagnosis.
 
     Returns:
-        For every function learned one of a robot file, or several of one kind.
+        For every function learned one of a robot file, or several of one kind, with the
+        standard deviations of their numbers.
     """
-    fit, unknowns = diagnosis.fit, diagnosis.fit.unknowns
-    first = len(unknowns.parts) - len(unknowns.functions)
-    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    learned = zip(unknowns.functions, unknowns.slices[first:], strict=True)
-    if unknowns.sensitivities is None:
-        return []
-    units = diagnosis.campaign.motion_units
-    fitted = unknowns.sensitivities.fitted
-    return [
-        [_named(f, units) for f in fitted(one.candidate, fit.x[own], std[own])]
-        for one, own in learned
-    ]
+    fit, units = diagnosis.fit, diagnosis.campaign.motion_units
+    learned = []
+    for one in fit.unknowns.functions:
+        assert fit.unknowns.sensitivities is not None
+        own = fit.unknowns.place(one)
+        found = fit.unknowns.sensitivities.fitted(
+            one.candidate, fit.x[own], fit.std[own]
+        )
+        learned.append([_named(function, units) for function in found])
+    return learned
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
@@ -91,69 +85,49 @@ def _named(one: Function, units: Mapping[str, str]) -> Function:
     return replace(one, label=label)
 
 
-def _with_tolerances(diagnosis: Diagnosis) -> Robot:
+def _with_tolerances(fit: MachineFit) -> Robot:
     """The robot whose geometric errors carry how uncertain they are."""
-    # a component that the readings do not see is as uncertain as its prior, which is
-    # that of the other components of its kind
-    fit, robot = diagnosis.fit, diagnosis.robot
-    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
-    for part, own in places:
+    robot = fit.robot
+    for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        sigma = np.full((len(robot.frames), 6), np.nan)
-        sigma[part.frame, part.axis] = std[own]
-        prior = [_largest(part.std[part.axis // 3 == kind]) for kind in (0, 1)]
-        unseen = np.repeat(prior, 3)
-        declared = [f.tolerance for f in robot.frames]
-        for row, given in enumerate(declared):
-            known = unseen if given is None else given
-            sigma[row] = np.where(np.isnan(sigma[row]), known, sigma[row])
-        frames = tuple(
-            replace(f, tolerance=s) for f, s in zip(robot.frames, sigma, strict=True)
+        # a component that the readings do not see is as uncertain as its prior, which
+        # is that of the other components of its kind
+        unseen = np.repeat(
+            [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
-        robot = replace(robot, frames=frames)
+        sigma = np.array([
+            unseen if frame.tolerance is None else frame.tolerance
+            for frame in robot.frames
+        ])
+        sigma[part.frame, part.axis] = fit.std[own]
+        frames = zip(robot.frames, sigma, strict=True)
+        robot = replace(robot, frames=tuple(replace(f, tolerance=s) for f, s in frames))
     return robot
-
-
-def _largest(values: NDArray) -> float:
-    return float(values.max(initial=0.0))
 
 
 def _record(diagnosis: Diagnosis) -> dict[str, Any]:
     """What the file says of the diagnosis that made it."""
-    campaign, after = diagnosis.campaign, diagnosis.after
+    campaign, noise = diagnosis.campaign, asdict(diagnosis.noise)
     record: dict[str, Any] = {
         "campaign": campaign.name,
-        "digest": digest(campaign),
+        "digest": _digest(campaign),
         "verdict": diagnosis.verdict,
         "rows": len(campaign),
         "rows_fitted": int(diagnosis.fitted.sum()),
         "held_out": diagnosis.held.how,
         "held_out_rows": int(diagnosis.held.rows.sum()),
     }
-    sizes = {"": after, "before_": diagnosis.before}
-    for name, errors in sizes.items():
-        for kind in ("position", "rotation", "normalised"):
-            value = getattr(errors, kind)
-            if np.isfinite(value):
-                record[f"{name}{kind}"] = value
-    for kind in ("position", "rotation"):
-        if np.isfinite(getattr(diagnosis.noise, kind)):
-            record[f"noise_{kind}"] = getattr(diagnosis.noise, kind)
-    missing = not_measured(campaign)
-    if missing:
-        record["not_measured"] = missing
+    del noise["normalised"]
+    sizes = {"": asdict(diagnosis.after), "before_": asdict(diagnosis.before)}
+    for name, errors in (sizes | {"noise_": noise}).items():
+        record |= {f"{name}{k}": v for k, v in errors.items() if np.isfinite(v)}
+    if campaign.not_measured:
+        record["not_measured"] = campaign.not_measured
     return record
 
 
-def not_measured(campaign: Campaign) -> list[str]:
-    """Components of a reading that no row has."""
-    seen = np.flatnonzero(campaign.cells.any(axis=0)).tolist()
-    return [name for k, name in enumerate(READING) if k not in seen]
-
-
-def digest(campaign: Campaign) -> str:
+def _digest(campaign: Campaign) -> str:
     """What tells a campaign's rows from others: a digest of commands and readings."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
@@ -175,9 +149,7 @@ def save(diagnosis: Diagnosis, path: Path | str) -> None:
     path = Path(path)
     robot, beside = corrected(diagnosis), path.with_suffix(".npz")
     if len(diagnosis.fit.x):
-        fit = diagnosis.fit
-        known = covariance_of(fit.unknowns, fit.x, fit.covariance, robot)
-        write_covariance(known, beside)
+        write_covariance(covariance_of(diagnosis.fit, robot), beside)
         record = {**robot.diagnosis, "covariance": str(beside.resolve())}
         robot = replace(robot, diagnosis=record)
     write_robot(robot, path)

@@ -18,25 +18,28 @@ WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 def sentence(diagnosis: Diagnosis) -> str:
     """What may be said, and no more."""
-    where, after = _judged_on(diagnosis), diagnosis.after
-    unsure = ""
-    if math.isfinite(diagnosis.uncertainty):
-        unsure = f" +- {diagnosis.uncertainty:.2f}"
-    kept = f"on {where} the residual is {diagnosis.before.normalised:.2f} sigma before"
-    noise = f"{diagnosis.noise.normalised:.3g} is noise"
-    both = f"{kept}, {after.normalised:.2f}{unsure} after ({noise})"
     if diagnosis.setup:
-        return "The campaign is set up wrongly: " + "; ".join(
-            one.sentence for one in diagnosis.setup
-        )
-    small_ones = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
+        said = "; ".join(one.sentence for one in diagnosis.setup)
+        return f"The campaign is set up wrongly: {said}"
+    where = {  # which rows the errors before and after are of
+        "split": "held-out rows",
+        "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
+        "none": "the rows fitted, too few to hold any out",
+    }[diagnosis.held.how]
+    before = f"{diagnosis.before.normalised:.2f} sigma"
+    kept = f"on {where} the residual is {before} before"
+    known = math.isfinite(diagnosis.uncertainty)
+    unsure = f" +- {diagnosis.uncertainty:.2f}" if known else ""
+    after, noise = diagnosis.after.normalised, diagnosis.noise.normalised
+    both = f"{kept}, {after:.2f}{unsure} after ({noise:.3g} is noise)"
     if diagnosis.verdict == "none_needed":
         return (
             "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({diagnosis.before.normalised:.2f} sigma on {where})."
+            f"can tell ({before} on {where})."
         )
     if diagnosis.verdict == "explained":
-        names = " and ".join([*diagnosis.claimed, *small_ones])
+        small = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
+        names = " and ".join([*diagnosis.claimed, *small])
         return f"The declared model lacks {names}; {both}."
     if diagnosis.verdict == "learned":
         names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
@@ -60,16 +63,6 @@ def titles(diagnosis: Diagnosis) -> list[str]:
     """Where every learned function acts, and of what."""
     every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
-
-
-def _judged_on(diagnosis: Diagnosis) -> str:
-    """Which rows the errors before and after are of."""
-    words = {
-        "split": "held-out rows",
-        "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
-        "none": "the rows fitted, too few to hold any out",
-    }
-    return words[diagnosis.held.how]
 
 
 def calibration_text(tally: Calibration) -> str:

@@ -5,6 +5,7 @@ stands, geometric errors, springs, effects of the library, learned functions.  E
 the unknowns of those before it and is fitted as a whole; the last is the fitted robot.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +18,12 @@ from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Unknowns
 
-DECLARED, REGISTRATION = "declared", "registration"
-LIBRARY_EFFECTS, LEARNED = "library effects", "learned effects"
+LEARNED = "learned effects"
+_TERMS = (
+    "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
+)  # fmt: skip
+_DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5  # places in them
+Place = tuple[int, int]  # of a model in the sequence: its last term, learned functions
 
 
 @dataclass(frozen=True)
@@ -78,19 +83,17 @@ class Stage:
     """A model of the sequence on the rows of one fold.
 
     Attributes:
-        term: what it adds.
         unknowns: as in :class:`Step`.
         residual: (R, 6) [rad, m] of the fold's rows, NaN elsewhere.
     """
 
-    term: str
     unknowns: float
     residual: NDArray
 
 
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
-) -> list[Stage]:
+) -> dict[Place, Stage]:
     """Fit the models that lead to a fitted robot; judge each on held-out rows.
 
     Args:
@@ -100,23 +103,21 @@ def stages(
         held: (R,) bool, rows that judge.
 
     Returns:
-        One for each step that the fitted robot has; the last is ``fit`` itself.
+        One for each step that the fitted robot has, in order; the last is ``fit``.
     """
-    every = _models(fit.unknowns, campaign)
-    found = [(every[0][0], MachineFit(every[0][1], *_nothing()))]
-    for term, unknowns in every[1:]:
-        last = len(unknowns) == len(fit.unknowns)
-        start = _start(unknowns, fit)
-        fitted = fit if last else fit_machine(campaign, unknowns, rows, start)
-        found.append((term, fitted))
-    shown, known = [], 0.0
+    shown, known = dict[Place, Stage](), 0.0
     finite = _has_finite_motions(fit.unknowns)
-    for term, one in found:
+    for place, unknowns in _models(fit.unknowns).items():
+        robot, told = unknowns.robot, 0.0
+        if shown:
+            one = fit
+            if len(unknowns) != len(fit.unknowns):
+                one = fit_machine(campaign, unknowns, rows, _start(unknowns, fit))
+            robot, told, unknowns = one.robot, float(one.determined.sum()), one.unknowns
         residual = np.full(campaign.measured.shape, np.nan)
-        linear = finite and not _has_finite_motions(one.unknowns)
-        residual[held] = residual_of(campaign, one.robot, linear=linear)[held]
-        told = float(one.determined.sum())
-        shown.append(Stage(term, max(0.0, told - known), residual))
+        linear = finite and not _has_finite_motions(unknowns)
+        residual[held] = residual_of(campaign, robot, linear=linear)[held]
+        shown[place] = Stage(max(0.0, told - known), residual)
         known = told
     return shown
 
@@ -126,46 +127,34 @@ def _has_finite_motions(unknowns: Unknowns) -> bool:
     return any(LIBRARY[one.hypothesis.effect].finite for one in unknowns.effects)
 
 
-def _nothing() -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """x, covariance, slopes and residual of a model without unknowns."""
-    return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
-
-
-def _models(unknowns: Unknowns, campaign: Campaign) -> list[tuple[str, Unknowns]]:
-    """Terms and unknowns of the models up to a robot's; steps it lacks left out."""
-    nothing = replace(unknowns, effects=(), small=(), functions=())
+def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
+    """Unknowns of the models up to a robot's; steps that it lacks are left out."""
     device = tuple(one for one in unknowns.effects if one.device)
-    models = [(DECLARED, nothing)]
-    now = nothing
+    now = replace(unknowns, effects=(), small=(), functions=())
+    models = {(_DECLARED, 0): now}
     if device:
-        now = replace(now, effects=device)
-        models.append((REGISTRATION, now))
-    for name in (GEOMETRY, SPRINGS):
-        own = tuple(part for part in unknowns.small if part.name == name)
-        if own:
-            now = replace(now, small=(*now.small, *own))
-            models.append((name, now))
+        models[_REGISTRATION, 0] = now = replace(now, effects=device)
+    for part in sorted(unknowns.small, key=lambda part: _TERMS.index(part.name)):
+        now = replace(now, small=(*now.small, part))
+        models[_TERMS.index(part.name), 0] = now
     if len(device) < len(unknowns.effects):
-        now = replace(now, effects=unknowns.effects)
-        models.append((LIBRARY_EFFECTS, now))
-    for k in range(len(unknowns.functions)):
-        now = replace(now, functions=unknowns.functions[: k + 1])
-        models.append((LEARNED, now))
+        models[_LIBRARY, 0] = now = replace(now, effects=unknowns.effects)
+    for k in range(1, len(unknowns.functions) + 1):
+        models[_LEARNED, k] = replace(now, functions=unknowns.functions[:k])
     return models
 
 
 def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
     """(k,) where a smaller model begins: the fitted robot's effects, else the mean."""
     start = unknowns.mean
-    places = zip(fit.unknowns.parts, fit.unknowns.slices, strict=True)
-    values = {id(part): fit.x[own] for part, own in places}
-    for part, own in zip(unknowns.parts, unknowns.slices, strict=True):
-        if part in unknowns.effects:
-            start[own] = values[id(part)]
+    for one in unknowns.effects:
+        start[unknowns.place(one)] = fit.x[fit.unknowns.place(one)]
     return start
 
 
-def pooled(campaign: Campaign, folds: list[list[Stage]], rows: NDArray) -> list[Step]:
+def pooled(
+    campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
+) -> list[Step]:
     """The sequence judged on the rows of all folds together.
 
     Args:
@@ -176,40 +165,22 @@ def pooled(campaign: Campaign, folds: list[list[Stage]], rows: NDArray) -> list[
     Returns:
         The steps, in order; the last is the error of the diagnosis.
     """
-    order = _steps_of(folds)
     steps = []
-    for k, term in order:
-        residual = np.full(campaign.measured.shape, np.nan)
-        unknowns = []
-        for fold in folds:
-            last, own = fold[0], 0
-            for stage in fold:
-                own = own + 1 if stage.term == LEARNED else own
-                if _place(stage.term, own) > _place(term, k):
-                    break
-                last = stage
-            same = last.term == term
-            unknowns.append(last.unknowns if same else 0.0)
-            residual = np.where(np.isnan(last.residual), residual, last.residual)
-        error = errors_of(campaign, residual, rows)
-        steps.append(Step(term, float(np.mean(unknowns)), error))
+    for place in sorted(set().union(*folds)):
+        last = [max(own for own in fold if own <= place) for fold in folds]
+        reached = [fold[own] for fold, own in zip(folds, last, strict=True)]
+        unknowns = [
+            stage.unknowns if own[0] == place[0] else 0.0
+            for own, stage in zip(last, reached, strict=True)
+        ]
+        error = errors_of(campaign, joined(reached), rows)
+        steps.append(Step(_TERMS[place[0]], float(np.mean(unknowns)), error))
     return steps
 
 
-_ORDER = (DECLARED, REGISTRATION, GEOMETRY, SPRINGS, LIBRARY_EFFECTS, LEARNED)
-
-
-def _place(term: str, function: int) -> tuple[int, int]:
-    """Where a step is in the sequence; functions by their number."""
-    return _ORDER.index(term), function if term == LEARNED else 0
-
-
-def _steps_of(folds: list[list[Stage]]) -> list[tuple[int, str]]:
-    """Number (of functions) and term of every step that any fold has."""
-    places = set()
-    for fold in folds:
-        own = 0
-        for stage in fold:
-            own = own + 1 if stage.term == LEARNED else own
-            places.add(_place(stage.term, own))
-    return [(function, _ORDER[index]) for index, function in sorted(places)]
+def joined(reached: Sequence[Stage]) -> NDArray:
+    """(R, 6) [rad, m] residual of a stage of every fold, each on its own rows."""
+    residual = reached[0].residual
+    for stage in reached[1:]:
+        residual = np.where(np.isnan(stage.residual), residual, stage.residual)
+    return residual

@@ -135,7 +135,9 @@ def _needed(
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        if one.array == "loads":  # small ones are no better where springs hardly respond
+        if (
+            one.array == "loads"
+        ):  # small ones are no better where springs hardly respond
             rivals.append(judge.residual(fewer, loads=0.0))
         if min(rivals) < _NEEDED * left:
             chosen, left = fewer, without

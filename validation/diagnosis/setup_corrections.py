@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from stiffness.screws import rotation_matrix
-from validation.campaign.campaign import LOAD, Campaign
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.signatures import loaded_components
 
 _UNITS = {  # factors between units that are taken for one another
     "length": (25.4, 1e3),  # inches, millimetres
@@ -187,8 +188,8 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
     """Loads that are reactions, or in another unit."""
-    loaded = zip(LOAD, campaign.loads.any(axis=0), strict=True)
-    names = tuple(f"load.{name}" for name, acts in loaded if acts)
+    loaded = loaded_components(campaign)
+    names = tuple(f"load.{name}" for name in loaded)
     factors = [(-1.0, "with their signs reversed"), *_factors("load")]
     for factor, what in factors if names else ():
         kind = "sign" if factor < 0 else "unit"

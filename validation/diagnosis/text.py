@@ -1,128 +1,80 @@
-"""A diagnosis for a terminal."""
+"""A diagnosis for a terminal, from its table in the public format."""
 
 import math
 from typing import Any
 
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.next_measurement import NextMeasurement, load_text
-from validation.diagnosis.results import LISTED, effects, learned, small, steps
-from validation.diagnosis.saving import not_measured
-from validation.diagnosis.sentence import (
-    WORDS,
-    calibration_text,
-    open_text,
-    sentence,
-)
+from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.results import table
+from validation.diagnosis.sentence import WORDS, calibration_text, open_text
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+
+Table = dict[str, Any]
 
 
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
     """The diagnosis for a terminal."""
-    lines = [f"{diagnosis.campaign.name}: {diagnosis.verdict}", sentence(diagnosis), ""]
-    lines += _effects_text(diagnosis)
+    told = table(diagnosis, tally)
+    lines = [f"{told['campaign']}: {told['verdict']}", told["sentence"], ""]
+    for effect in told["effects"]:
+        lines += _effect_lines(effect)
     for name in (GEOMETRY, SPRINGS):
-        lines += _small_text(small(diagnosis, name), name)
-    lines += _learned_text(diagnosis)
+        lines += _small_lines(told[name], name)
+    for function in told["learned"]:
+        lines += _function_lines(function)
     lines += ["", "sets of effects, by probability:"]
-    for names, p in diagnosis.alternatives:
-        lines.append(f"  {p:6.3f}  {' + '.join(names) or 'none'}")
-    lines += ["", *_errors_text(diagnosis)]
-    lines += ["", *_sequence_text(diagnosis), *diagnosis.remarks]
-    if diagnosis.needed:
-        lines += ["", f"what would decide: {diagnosis.needed}"]
-    missing = not_measured(diagnosis.campaign)
-    if missing:
-        lines += ["", f"not measured: {', '.join(missing)}"]
-    lines += diagnosis.findings
-    if diagnosis.noise_in_time is not None:
-        noise = diagnosis.noise_in_time
+    for one in told["alternatives"]:
+        lines.append(
+            f"  {one['probability']:6.3f}  {' + '.join(one['names']) or 'none'}"
+        )
+    lines += ["", *_error_lines(told), "", *_sequence_lines(told), *told["remarks"]]
+    said = {
+        "what would decide": told["needed"],
+        "not measured": ", ".join(told["not_measured"]),
+    }
+    for what, words in said.items():
+        lines += ["", f"{what}: {words}"] if words else []
+    lines += told["noise_scale"]["findings"]
+    if told["noise_in_time"] is not None:
+        share, constant = (told["noise_in_time"][k] for k in ("share", "constant"))
         lines += [
             "",
-            f"noise is correlated in time: {100 * noise.share:.0f} % of its variance "
-            f"over {noise.constant:.3g} s; the effects' intervals are wider for it",
+            f"noise is correlated in time: {100 * share:.0f} % of its variance "
+            f"over {constant:.3g} s; the effects' intervals are wider for it",
         ]
-    if diagnosis.outliers.any():
-        ids = zip(diagnosis.campaign.ids, diagnosis.outliers, strict=True)
-        left_out = ", ".join(label for label, outlier in ids if outlier)
-        lines += ["", f"left out as outliers: {left_out}"]
-    if diagnosis.open.any():
+    if told["outliers"]:
+        lines += ["", f"left out as outliers: {', '.join(told['outliers'])}"]
+    if told["open"]:
         lines += ["", open_text(diagnosis.open)]
-    for trend in diagnosis.trends:
-        lines.append(f"left varies with {trend.against}: {100 * trend.share:.0f} %")
-    if diagnosis.next is not None:
-        lines += ["", *_next_text(diagnosis.next)]
+    for trend in told["structure"]:
+        lines.append(
+            f"left varies with {trend['against']}: {100 * trend['share']:.0f} %"
+        )
+    if told["next_measurement"] is not None:
+        lines += ["", *_next_lines(told["next_measurement"])]
     if tally is not None:
         lines += ["", calibration_text(tally)]
     return "\n".join(lines)
 
 
-def _effects_text(diagnosis: Diagnosis) -> list[str]:
-    """Effects with their parameters, where the verdict lists them."""
-    lines = []
-    for effect in effects(diagnosis) if diagnosis.verdict in LISTED else []:
-        there = f" in session {effect['session']}" if "session" in effect else ""
-        how = f"(probability {effect['probability']:.3f})"
-        lines.append(f"{effect['name']}{there}  {how}")
-        for p in effect["parameters"]:
-            line = f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
-            if "found" in p:
-                line += " (declared {declared:.6g}, found {difference:+.6g})".format(
-                    **p["found"]
-                )
-            lines.append(line)
-    return lines
-
-
-def _learned_text(diagnosis: Diagnosis) -> list[str]:
-    """Functions learned, each in two lines or three."""
-    lines = []
-    for one in learned(diagnosis):
-        lines.append(f"learned: {one['label']}")
-        formula = one["formula"]
-        lines.append(f"  {formula if len(formula) < 160 else formula[:157] + '...'}")
-        parts = one["parts_of_range"]
-        if parts is not None:
-            lines.append(
-                "  foretold in parts of {variable} left out: {after:.3g} sigma, "
-                "without it {without:.3g}".format(**parts)
+def _effect_lines(effect: Table) -> list[str]:
+    """An effect with its parameters; geometry and springs have lines of their own."""
+    if "combinations" in effect:
+        return []
+    there = f" in session {effect['session']}" if "session" in effect else ""
+    lines = [f"{effect['name']}{there}  (probability {effect['probability']:.3f})"]
+    for p in effect["parameters"]:
+        line = f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
+        if "found" in p:
+            line += " (declared {declared:.6g}, found {difference:+.6g})".format(
+                **p["found"]
             )
-        if one["equivalent_places"]:
-            lines.append(f"  {len(one['equivalent_places'])} other places do as well")
+        lines.append(line)
     return lines
 
 
-def _errors_text(diagnosis: Diagnosis) -> list[str]:
-    """A table of the errors before and after, and of the saved robot."""
-    lines = [
-        f"errors on {diagnosis.held.words}; saved: on all rows",
-        f"{'':<20}{'before':>12}{'after':>12}{'noise':>12}{'saved':>12}",
-    ]
-    columns = diagnosis.before, diagnosis.after, diagnosis.noise, diagnosis.saved
-    noise = diagnosis.noise.normalised
-    for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
-        row = [getattr(errors, name) for errors in columns]
-        shown = "".join(
-            f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row
-        )
-        lines.append(f"{name + ' [' + unit + ']':<20}{shown}")
-    if (diagnosis.outliers & diagnosis.held.rows).any():
-        cut = [f"{errors.normalised:>12.3g}" for errors in diagnosis.with_outliers]
-        lines.append(f"{'with outliers':<20}{cut[0]}{cut[1]}{noise:>12.3g}")
-    return lines
-
-
-def _next_text(following: NextMeasurement) -> list[str]:
-    """The measurement that would decide."""
-    where = ", ".join(f"{k}={v:.4g}" for k, v in following.configuration.items())
-    covariates = "".join(f", {k} {v:g}" for k, v in following.covariates.items())
-    return [
-        f"measure next: {where}; load {load_text(following.load)}{covariates}",
-        f"  {following.why}",
-    ]
-
-
-def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
+def _small_lines(one: Table | None, name: str) -> list[str]:
     """Geometry or springs in a few lines."""
     if one is None:
         return []
@@ -137,12 +89,46 @@ def _small_text(one: dict[str, Any] | None, name: str) -> list[str]:
     ]
 
 
-def _sequence_text(diagnosis: Diagnosis) -> list[str]:
+def _function_lines(one: Table) -> list[str]:
+    """A function learned, in two to four lines."""
+    formula, parts = one["formula"], one["parts_of_range"]
+    short = formula if len(formula) < 160 else f"{formula[:157]}..."
+    lines = [f"learned: {one['label']}", f"  {short}"]
+    if parts is not None:
+        lines.append(
+            "  foretold in parts of {variable} left out: {after:.3g} sigma, "
+            "without it {without:.3g}".format(**parts)
+        )
+    if one["equivalent_places"]:
+        lines.append(f"  {len(one['equivalent_places'])} other places do as well")
+    return lines
+
+
+def _error_lines(told: Table) -> list[str]:
+    """A table of the errors before and after, and of the saved robot."""
+    error, held = told["error"], told["held_out"]
+    noise = {**error["noise"], "normalised": told["noise_scale"]["normalised"]}
+    columns = error["before"], error["after"], noise, error["saved"]
+    lines = [
+        f"errors on {held['words']}; saved: on all rows",
+        f"{'':<20}{'before':>12}{'after':>12}{'noise':>12}{'saved':>12}",
+    ]
+    for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):
+        row = [errors[name] for errors in columns]
+        cells = [f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row]
+        lines.append(f"{f'{name} [{unit}]':<20}{''.join(cells)}")
+    if set(told["outliers"]) & set(held["ids"]):
+        cut = [error["with_outliers"][k]["normalised"] for k in ("before", "after")]
+        cells = [f"{v:>12.3g}" for v in (*cut, noise["normalised"])]
+        lines.append(f"{'with outliers':<20}{''.join(cells)}")
+    return lines
+
+
+def _sequence_lines(told: Table) -> list[str]:
     """The model sequence, judged on the held-out rows."""
-    rows = steps(diagnosis)
+    rows, last = told["ladder"], math.nan
     unit = rows[-1]["unit"]
     lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
-    last = math.nan
     for row in rows:
         rms, sigma = row["kept_aside_rms"], row["kept_aside_sigma"]
         reduced = f"{last - rms:>11.3g}" if math.isfinite(last) else f"{'':>11}"
@@ -151,3 +137,13 @@ def _sequence_text(diagnosis: Diagnosis) -> list[str]:
         )
         last = rms
     return lines
+
+
+def _next_lines(one: Table) -> list[str]:
+    """The measurement that would decide."""
+    where = ", ".join(f"{k}={v:.4g}" for k, v in one["configuration"].items())
+    covariates = "".join(f", {k} {v:g}" for k, v in one["covariates"].items())
+    return [
+        f"measure next: {where}; load {load_text(one['load'])}{covariates}",
+        f"  {one['why']}",
+    ]

@@ -14,7 +14,7 @@ J       ``slopes``      (R, 6, k)  change of the readings per unit of x
 ======  ==============  =========  ===================================================
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -59,6 +59,12 @@ class Small:
     def __len__(self) -> int:
         return len(self.frame)
 
+    @property
+    def bounds(self) -> tuple[NDArray, NDArray]:
+        """(k,) lower and upper; springs only add compliance."""
+        least = -np.inf if self.name == GEOMETRY else 0.0
+        return np.full(len(self), least), np.full(len(self), np.inf)
+
 
 @dataclass(frozen=True, eq=False)
 class Acting:
@@ -66,18 +72,30 @@ class Acting:
 
     Attributes:
         hypothesis: where it acts and what is unknown.
-        start: (k,) where a fit begins, and the mean of its prior.
+        mean: (k,) where a fit begins, and the mean of its prior.
         session: the only one in which it acts, None in all.
         device: whether it is the place of a measuring frame, which is always unknown.
     """
 
     hypothesis: Hypothesis
-    start: NDArray
+    mean: NDArray
     session: str | None = None
     device: bool = False
 
     def __len__(self) -> int:
         return len(self.hypothesis.slots)
+
+    @property
+    def std(self) -> NDArray:
+        """(k,) of the prior, so wide that it is flat."""
+        unknowns = [slot.unknown for slot in self.hypothesis.slots]
+        wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
+        return np.array(wide)
+
+    @property
+    def bounds(self) -> tuple[NDArray, NDArray]:
+        """(k,) lower and upper, as the library says."""
+        return self.hypothesis.bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +116,17 @@ class LearnedFunction:
     @property
     def std(self) -> NDArray:
         """(m,) or (m + 1,): last that of the number in which it is not linear."""
-        bends = _BEND * self.candidate.shape.bends
-        return np.concatenate([self.coefficients, bends])
+        return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
+
+    @property
+    def bounds(self) -> tuple[NDArray, NDArray]:
+        """(m,) or (m + 1,) lower and upper: of the last number its prior's size."""
+        upper = np.full(len(self), np.inf)
+        upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
+        return -upper, upper
+
+
+Part = Acting | Small | LearnedFunction
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,50 +148,37 @@ class Unknowns:
     sensitivities: Sensitivities | None = None
 
     def __len__(self) -> int:
-        return sum(len(part) for part in self.parts)
-
-    @property
-    def parts(self) -> tuple[Acting | Small | LearnedFunction, ...]:
-        """What x consists of, in its order."""
-        return (*self.effects, *self.small, *self.functions)
+        return sum(len(part) for part, _ in self.places)
 
     @cached_property
-    def slices(self) -> list[slice]:
-        """Where each of :attr:`parts` is in x."""
-        ends = np.cumsum([0, *(len(part) for part in self.parts)]).tolist()
-        return [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    def places(self) -> list[tuple[Part, slice]]:
+        """What x consists of, in its order, and where it is in x."""
+        parts: list[Part] = [*self.effects, *self.small, *self.functions]
+        ends = np.cumsum([len(part) for part in parts]).tolist()
+        return [
+            (p, slice(end - len(p), end)) for p, end in zip(parts, ends, strict=True)
+        ]
+
+    def place(self, part: Part) -> slice:
+        """Where one part is in x."""
+        return next(own for one, own in self.places if one is part)
 
     @property
     def mean(self) -> NDArray:
         """(k,) mean of the prior, where a fit begins."""
         zeros = np.zeros(len(self) - sum(len(one) for one in self.effects))
-        return np.concatenate([*(one.start for one in self.effects), zeros])
+        return np.concatenate([*(one.mean for one in self.effects), zeros])
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviation of the prior; of effects so wide that it is flat."""
-        wide = [
-            (_HELD if slot.unknown.upper == slot.unknown.lower else _WIDE)
-            * slot.unknown.scale
-            for e in self.effects
-            for slot in e.hypothesis.slots
-        ]
-        priors = [*(p.std for p in self.small), *(f.std for f in self.functions)]
-        return np.concatenate([np.array(wide), *priors])
+        """(k,) standard deviation of the prior."""
+        return np.concatenate([np.zeros(0), *(part.std for part, _ in self.places)])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper: of effects as the library says, compliances above 0."""
-        lower, upper = np.full(len(self), -np.inf), np.full(len(self), np.inf)
-        for part, own in zip(self.parts, self.slices, strict=True):
-            if isinstance(part, Acting):
-                lower[own], upper[own] = part.hypothesis.bounds
-            elif isinstance(part, Small) and part.name != GEOMETRY:
-                lower[own] = 0.0
-            elif isinstance(part, LearnedFunction):
-                bends = part.candidate.shape.bends
-                upper[own.stop - len(bends) : own.stop] = _BEND * bends
-                lower[own.stop - len(bends) : own.stop] = -_BEND * bends
+        """(k,) lower and upper."""
+        both = [np.zeros((2, 0)), *(np.array(part.bounds) for part, _ in self.places)]
+        lower, upper = np.hstack(both)
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
@@ -177,7 +191,7 @@ class Unknowns:
             The declared robot with them built in: what is saved, and what is judged.
         """
         robot, functions = self.robot, list(self.robot.functions)
-        for part, own in zip(self.parts, self.slices, strict=True):
+        for part, own in self.places:
             if isinstance(part, Small):
                 change = with_error if part.name == GEOMETRY else with_compliance
                 robot = change(robot, part.frame, part.axis, x[own])
@@ -186,28 +200,23 @@ class Unknowns:
                 functions += self.sensitivities.fitted(
                     part.candidate, x[own], np.zeros(len(part))
                 )
-        effects, sessions = self._effects_at(x)
-        return replace(
-            robot, effects=effects, session_effects=sessions, functions=tuple(functions)
-        )
+        robot = replace(robot, functions=tuple(functions))
+        for session, found in self._effects_at(x).items():
+            both = combined(effects_in(robot, session), found)
+            robot = with_effects_in(robot, session, both)
+        return robot
 
-    def _effects_at(
-        self, x: NDArray
-    ) -> tuple[dict[str, Values], dict[str, dict[str, Values]]]:
-        """Effects of all rows, and of each session, those of the file included."""
-        found: dict[str | None, dict[str, dict[str, float]]] = {None: {}}
-        for one, own in zip(self.effects, self.slices, strict=False):
-            values = one.hypothesis.public(self.robot.without_effects(), x[own])
+    def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
+        """Effects that are added to those of the file, of all rows or of a session."""
+        found: dict[str | None, dict[str, dict[str, float]]] = {}
+        for one in self.effects:
+            values = one.hypothesis.public(
+                self.robot.without_effects(), x[self.place(one)]
+            )
             effects = found.setdefault(one.session, {})
             if values or not one.hypothesis.slots:
                 effects.setdefault(one.hypothesis.effect, {}).update(values)
-        sessions: dict[str, dict[str, Values]] = {
-            s: dict(e) for s, e in self.robot.session_effects.items()
-        }
-        for session, effects in found.items():
-            if session is not None:
-                sessions[session] = dict(combined(sessions.get(session, {}), effects))
-        return dict(combined(self.robot.effects, found[None])), sessions
+        return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
         """Change of the readings per unknown, by the linear model at a robot.
@@ -223,25 +232,27 @@ class Unknowns:
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
         response = responses(conditions)
         J = np.zeros((len(campaign), 6, len(x)))
-        lower, upper = self.bounds
         own_rows = np.array([conditions.robot.index(f.name) for f in robot.frames])
         middle = predict(conditions).deviation if self.effects else np.zeros(0)
-        for part, own in zip(self.parts, self.slices, strict=True):
+        for part, own in self.places:
             if isinstance(part, Small):
                 rows = own_rows[part.frame]
-                columns = response.screws[:, :, rows, part.axis]
+                J[:, :, own] = response.screws[:, :, rows, part.axis]
                 if part.name != GEOMETRY:
-                    columns = columns * response.wrenches[:, None, rows, part.axis]
-                J[:, :, own] = columns
+                    J[:, :, own] *= response.wrenches[:, None, rows, part.axis]
             elif isinstance(part, LearnedFunction):
                 assert self.sensitivities is not None
                 there = self.sensitivities.about(conditions, response)
                 J[:, :, own] = there.changes(part.candidate, x[own])
             else:
-                for k in range(own.start, own.stop):
-                    if lower[k] == upper[k]:
+                for k, slot in enumerate(part.hypothesis.slots, own.start):
+                    if slot.unknown.lower == slot.unknown.upper:
                         continue
-                    moved, step = self._moved(x, k, part)
+                    step = _STEP * max(slot.unknown.scale, abs(x[k]))
+                    if x[k] + step > slot.unknown.upper:
+                        step = -step
+                    moved = x.copy()
+                    moved[k] += step
                     there_robot = replace(campaign, robot=self.robot_at(moved))
                     other = replace(conditions_of(there_robot), exact=False)
                     if conditions.rest is not None:
@@ -249,37 +260,27 @@ class Unknowns:
                     J[:, :, k] = (predict(other).deviation - middle) / step
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
-    def _moved(self, x: NDArray, k: int, part: Acting) -> tuple[NDArray, float]:
-        """X with one unknown changed by a small step, within its bounds."""
-        slot = part.hypothesis.slots[k - self.slices[self.parts.index(part)].start]
-        step = _STEP * max(slot.unknown.scale, abs(x[k]))
-        if x[k] + step > slot.unknown.upper:
-            step = -step
-        moved = x.copy()
-        moved[k] += step
-        return moved, step
-
-    def without(self, effects: Sequence[Acting]) -> "Unknowns":
-        """The same without some of its effects."""
-        kept = tuple(one for one in self.effects if not any(one is e for e in effects))
+    def without(self, effect: Acting) -> "Unknowns":
+        """The same without one of its effects."""
+        kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
-    def names(self) -> list[str]:
-        """(k,) public names: effect, frame and component of each unknown."""
-        names: list[str] = []
-        frames = self.robot.frames
-        for part in self.parts:
-            if isinstance(part, Acting):
-                h = part.hypothesis
-                names += [f"{h.effect} {' '.join(s.names)}" for s in h.slots]
-            elif isinstance(part, Small):
-                names += [
-                    f"{part.name} {frames[i].name} {a}"
-                    for i, a in zip(part.frame, part.axis, strict=True)
-                ]
-            else:
-                names += [f"function {k + 1}" for k in range(len(part))]
-        return names
+
+def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
+    """Effects of a robot's file in all rows, or those of one session alone."""
+    if session is None:
+        return robot.effects
+    return robot.session_effects.get(session, {})
+
+
+def with_effects_in(
+    robot: Robot, session: str | None, effects: Mapping[str, Values]
+) -> Robot:
+    """A robot with other effects in all rows, or in one session alone."""
+    if session is None:
+        return replace(robot, effects=effects)
+    sessions = {**robot.session_effects, session: effects}
+    return replace(robot, session_effects=sessions)
 
 
 def _linear(conditions: Conditions) -> Conditions:

@@ -1,7 +1,5 @@
 """From probabilities to a verdict."""
 
-from dataclasses import dataclass
-
 from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.selected import Selected
 
@@ -31,29 +29,17 @@ def by_names(selected: Selected) -> Sets:
     return tuple((names, p) for names, p in listed if p >= _LISTED)
 
 
-@dataclass(frozen=True)
-class Kept:
-    """What of the best model the fitted machine has.
-
-    Attributes:
-        effects: of the library, those that the readings support.
-        functions: whether there are any.
-        small: whether there are geometric errors or springs.
-    """
-
-    effects: tuple[str, ...]
-    functions: bool
-    small: bool
-
-
 def verdict(
-    selected: Selected, kept: Kept, more_than_noise: bool
-) -> tuple[str, tuple[str, ...]]:
+    selected: Selected, names: tuple[str, ...], *, functions: bool, small: bool,
+    more_than_noise: bool,
+) -> tuple[str, tuple[str, ...]]:  # fmt: skip
     """The verdict, and which effects it claims.
 
     Args:
         selected: models with their probabilities.
-        kept: what of the best one the fitted machine has.
+        names: of the library's effects that the fitted machine has.
+        functions: whether it has functions.
+        small: whether it has geometric errors or springs.
         more_than_noise: whether it leaves more than noise.
 
     Returns:
@@ -62,25 +48,20 @@ def verdict(
     """
     if more_than_noise:
         return "outside_library", ()
-    names = kept.effects
-    functions = sum(m.probability for m in selected.models if m.functions)
+    likely = sum(m.probability for m in selected.models if m.functions)
     sure = tuple(n for n in names if selected.probability.get(n, 0.0) >= CLAIM)
     rivals = [
         name for name, p in selected.probability.items()
         if RIVAL <= p < CLAIM or (p >= CLAIM and name not in names)
     ]  # fmt: skip
-    if kept.functions:
-        decided = functions >= CLAIM and not rivals and set(sure) == set(names)
-        return ("learned", sure) if decided else ("ambiguous", ())
-    if not names and functions >= RIVAL:
+    decided = set(sure) == set(names) and not rivals
+    if functions:
+        return ("learned", sure) if decided and likely >= CLAIM else ("ambiguous", ())
+    if names:
+        return ("explained", sure) if decided else ("ambiguous", ())
+    nothing = sum(
+        m.probability for m in selected.models if not m.effects and not m.functions
+    )
+    if likely >= RIVAL or (nothing < RIVAL and rivals):
         return "ambiguous", ()
-    if not names:
-        nothing = sum(
-            m.probability for m in selected.models if not m.effects and not m.functions
-        )
-        if nothing < RIVAL and rivals:
-            return "ambiguous", ()
-        return ("explained" if kept.small else "none_needed"), ()
-    if set(sure) == set(names) and not rivals:
-        return "explained", sure
-    return "ambiguous", ()
+    return ("explained" if small else "none_needed"), ()

@@ -46,11 +46,9 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
     """Components never measured, stuck, rounded, or suspiciously large."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
-    absent = [n for n, c in zip(READING, campaign.cells.T, strict=True) if not c.any()]
+    absent = ", ".join(campaign.not_measured)
     if absent:
-        text = (
-            f"Never measured: {', '.join(absent)}. What only they would show is lost."
-        )
+        text = f"Never measured: {absent}. What only they would show is lost."
         remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]

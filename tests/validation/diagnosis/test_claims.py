@@ -21,8 +21,8 @@ from tests.bar_for_tests import (
     numbers,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.claims import parameters_of, supported
-from validation.diagnosis.fit import fit_machine
+from validation.diagnosis.claims import supported
+from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Acting, Small, Unknowns
@@ -101,6 +101,14 @@ def test_what_has_no_number_and_where_a_device_stands_are_not_in_question():
     assert supported(fit, replace(fit.unknowns.effects[0], device=True))
 
 
+def softer(robot, x, variance):
+    """The bar's fit of 1 / factor - 1 of its link's modulus."""
+    one = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
+    unknowns = Unknowns(robot, (Acting(one, np.zeros(1)),))
+    C, nothing = np.array([[variance]]), np.zeros((0, 1))
+    return MachineFit(unknowns, np.array([x]), C, nothing, np.zeros(0))
+
+
 @pytest.mark.parametrize(("declared", "value", "std"), [
     # a factor 0.8 of which 0.9 is left: 0.72, and 0.8 times as unsure
     (0.8, 0.72, 0.8 * 0.81 * 1e-3),
@@ -110,22 +118,21 @@ def test_a_parameter_is_as_sure_as_the_machine_s_and_not_the_difference_s(
     declared, value, std
 ):
     """1 / factor - 1 is fitted: of factor f its uncertainty is f squared times."""
-    softer = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
-    one = Acting(softer, np.zeros(1))
-    given = {} if declared is None else {"tip": declared}
-    ((name, found, sigma),) = parameters_of(
-        bar(link=BEAM).robot, one, np.array([1 / 0.9 - 1]), np.array([[1e-6]]), given
-    )
+    robot = bar(link=BEAM).robot
+    if declared is not None:
+        robot = replace(robot, effects={"modulus_scale": {"tip": declared}})
+    fit = softer(robot, 1 / 0.9 - 1, 1e-6)
+    ((name, found, sigma),) = numbers(fit)
     assert (name, found) == ("tip", pytest.approx(value))
     assert sigma == pytest.approx(std, rel=1e-6)
 
 
 def test_what_no_reading_depends_on_is_no_parameter_found():
-    softer = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
-    one, robot = Acting(softer, np.zeros(1)), bar(link=BEAM).robot
-    for seen in (True, False):
-        found = parameters_of(robot, one, np.zeros(1), np.eye(1), seen=np.array([seen]))
-        assert len(found) == int(seen)
+    """Then it is as uncertain as before anything was read."""
+    robot = bar(link=BEAM).robot
+    prior = softer(robot, 0.0, 1.0).unknowns.std[0] ** 2
+    assert numbers(softer(robot, 0.0, prior)) == []
+    assert len(numbers(softer(robot, 0.0, 0.5 * prior))) == 1
 
 
 def test_a_spring_that_would_be_negative_changes_nothing():

@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from tests.planar_arm_for_tests import measured
+from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.plausible import implausible, impossible_rows
-from validation.diagnosis.unknowns import Small
+from validation.diagnosis.registration import device_frame
+from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
 def found(effects, small=()):
     """A machine with numbers of effects, by their public names."""
     parts = [
         SimpleNamespace(
-            device=False,
             session=None,
             hypothesis=SimpleNamespace(effect=name, public=lambda robot, x: x),
             values=values,
@@ -23,7 +25,8 @@ def found(effects, small=()):
         for name, values in effects.items()
     ]
     return SimpleNamespace(
-        unknowns=SimpleNamespace(effects=parts, small=small),
+        effects=parts,
+        unknowns=SimpleNamespace(small=small),
         own=lambda one: (one.values, None, None),
         robot=SimpleNamespace(effects=effects),
     )
@@ -80,11 +83,13 @@ def test_the_softest_spring_gives_a_fifth_under_the_largest_load(
 
 
 def test_the_place_of_a_device_may_be_anywhere(campaign):
-    fit = found({"registration": {"base.tx": 29.0}})
-    assert len(implausible(campaign, fit)) == 1
-    (frame,) = fit.unknowns.effects
-    frame.device = True
-    assert implausible(campaign, fit) == ()
+    frame, C = device_frame(conditions_of(campaign)), np.eye(6)
+    x = np.array([0.0, 0.0, 0.0, 29.0, 0.0, 0.0])
+    for device, doubted in ((False, 1), (True, 0)):
+        acting = Acting(frame, np.zeros(6), None, device)
+        unknowns = Unknowns(campaign.robot, (acting,))
+        fit = MachineFit(unknowns, x, C, np.zeros((0, 6)), np.zeros(0))
+        assert len(implausible(campaign, fit)) == doubted
 
 
 def test_a_temperature_that_no_sensor_has_is_flagged(campaign):

@@ -7,44 +7,54 @@ import pytest
 
 from validation.diagnosis import text as module
 from validation.diagnosis.diagnosis import Diagnosis
-from validation.diagnosis.next_measurement import NextMeasurement, load_text
-from validation.diagnosis.noise_in_time import NoiseInTime
-from validation.diagnosis.sequence import Errors, Step
-from validation.diagnosis.structure import Trend
+from validation.diagnosis.next_measurement import load_text
 
-BEFORE, AFTER = Errors(3e-5, 2e-6, 7.0), Errors(1e-5, float("nan"), 1.5)
+NONE = float("nan")
+
+
+def errors(position, rotation, normalised):
+    return {"position": position, "rotation": rotation, "normalised": normalised}
+
+
+def step(term, unknowns, rms, sigma, unit="m"):
+    return {
+        "term": term, "unknowns": unknowns, "kept_aside_rms": rms, "unit": unit,
+        "kept_aside_sigma": sigma,
+    }  # fmt: skip
 
 
 def made(**changes):
-    """Four rows of which the last two were held out, and nothing found."""
-    return SimpleNamespace(**{
-        "campaign": SimpleNamespace(
-            name="arm", ids=("m0", "m1", "m2", "m3"), cells=np.ones((4, 6), bool)
-        ),
-        "verdict": "none_needed",
-        "alternatives": ((("drift",), 0.75), ((), 0.25)),
-        "held": SimpleNamespace(rows=np.arange(4) > 1, words="2 rows, drawn once"),
-        "before": BEFORE, "after": AFTER, "noise": Errors(5e-6, 1e-6, 1.2),
-        "saved": Errors(8e-6, 3e-6, 1.0),
-        "with_outliers": (Errors(2e-5, 1e-6, 8.0), Errors(9e-6, 1e-6, 2.25)),
-        "noise_scale": (1.0, 0.05), "findings": (), "noise_in_time": None,
-        "lack": SimpleNamespace(sigma_too_small=False, repeats=1.0), "needed": "",
-        "outliers": np.zeros(4, bool), "open": np.zeros(4, bool),
-        "sequence": (Step("declared", 0, BEFORE), Step("geometry", 4.6, AFTER)),
-        "trends": (), "next": None, "remarks": (),
-    } | changes)  # fmt: skip
+    """The table of four rows of which the last two were held out; nothing found."""
+    return {
+        "campaign": "arm", "verdict": "none_needed", "sentence": "Enough.",
+        "effects": [], "geometry": None, "springs": None, "learned": [],
+        "alternatives": [
+            {"names": ["drift"], "probability": 0.75},
+            {"names": [], "probability": 0.25},
+        ],
+        "held_out": {"ids": ["m2", "m3"], "words": "2 rows, drawn once"},
+        "error": {
+            "before": errors(3e-5, 2e-6, 7.0), "after": errors(1e-5, NONE, 1.5),
+            "saved": errors(8e-6, 3e-6, 1.0),
+            "noise": {"position": 5e-6, "rotation": 1e-6},
+            "with_outliers": {"before": errors(2e-5, 1e-6, 8.0),
+                              "after": errors(9e-6, 1e-6, 2.25)},
+        },
+        "noise_scale": {"findings": [], "normalised": 1.2}, "noise_in_time": None,
+        "needed": "", "not_measured": [], "outliers": [], "open": [],
+        "ladder": [step("declared", 0, 3e-5, 7.0), step("geometry", 4.6, 1e-5, 1.5)],
+        "structure": [], "next_measurement": None, "remarks": [],
+    } | changes  # fmt: skip
 
 
 @pytest.fixture
 def shown(monkeypatch):
-    """Lines of a diagnosis without small terms, effects and functions."""
-    for name in ("effects", "learned"):
-        monkeypatch.setattr(module, name, lambda diagnosis: [])
-    monkeypatch.setattr(module, "small", lambda diagnosis, name: None)
-    monkeypatch.setattr(module, "sentence", lambda diagnosis: "Enough.")
+    """Lines of a diagnosis of four rows with a given table."""
 
     def lines(**changes):
-        return module.text(made(**changes)).splitlines()
+        monkeypatch.setattr(module, "table", lambda diagnosis, tally: made(**changes))
+        rows = [name in changes.get("open", []) for name in ("m0", "m1", "m2", "m3")]
+        return module.text(SimpleNamespace(open=np.array(rows))).splitlines()
 
     return lines
 
@@ -72,8 +82,8 @@ def test_what_is_not_there_is_not_said(shown):
 
 def test_one_step_alone_reduces_nothing(shown):
     """Where only rotations were read its rms is one of angles."""
-    declared = Step("declared", 0, Errors(float("nan"), 2e-6, 7.0))
-    assert [line.split() for line in shown(sequence=(declared,))[-2:]] == [
+    declared = step("declared", 0, 2e-6, 7.0, "rad")
+    assert [line.split() for line in shown(ladder=[declared])[-2:]] == [
         ["model", "unknowns", "rad", "sigma", "reduction"],
         ["declared", "0", "2e-06", "7"],
     ]
@@ -81,10 +91,10 @@ def test_one_step_alone_reduces_nothing(shown):
 
 def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
     """An outlier among the rows fitted is named all the same."""
-    fitted = shown(outliers=np.array([False, True, False, False]))
+    fitted = shown(outliers=["m1"])
     assert "left out as outliers: m1" in fitted
     assert not any(line.startswith("with outliers") for line in fitted)
-    aside = shown(outliers=np.array([False, True, False, True]))
+    aside = shown(outliers=["m1", "m3"])
     assert "left out as outliers: m1, m3" in aside
     (more,) = [line for line in aside if line.startswith("with outliers")]
     assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
@@ -92,10 +102,8 @@ def test_errors_with_outliers_are_given_where_one_was_held_out(shown):
 
 def test_components_that_no_row_has_are_named(shown):
     """Not as 0 +- 0: they were not measured."""
-    cells = np.zeros((4, 6), bool)
-    cells[1, [3, 5]] = True
-    campaign = SimpleNamespace(name="arm", ids=("m0", "m1", "m2", "m3"), cells=cells)
-    assert "not measured: rx, ry, rz, ty" in shown(campaign=campaign)
+    missing = ["rx", "ry", "rz", "ty"]
+    assert "not measured: rx, ry, rz, ty" in shown(not_measured=missing)
     assert not any("not measured" in line for line in shown())
 
 
@@ -105,23 +113,24 @@ def test_rows_that_would_decide_are_said(shown):
 
 def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
     assert not any("scatter" in line or "correlated" in line for line in shown())
-    assert "the residual is large" in shown(findings=("the residual is large",))
+    large = {"findings": ["the residual is large"], "normalised": 1.0}
+    assert "the residual is large" in shown(noise_scale=large)
     (line,) = [
         line
-        for line in shown(noise_in_time=NoiseInTime(0.35, 60.0, 1e-9))
+        for line in shown(noise_in_time={"share": 0.35, "constant": 60.0})
         if "correlated" in line
     ]
     assert "35 % of its variance over 60 s" in line
 
 
 def test_what_is_left_and_what_to_measure_is_said_last(shown):
-    following = NextMeasurement(
-        "a and b differ", {"q.one": 0.5}, (0.0, 0, 0, 10.0, 0, 0), {"temperature": 5.0},
-        12.0,
-    )  # fmt: skip
+    following = {
+        "why": "a and b differ", "configuration": {"q.one": 0.5},
+        "load": [0.0, 0, 0, 10.0, 0, 0], "covariates": {"temperature": 5.0},
+    }  # fmt: skip
     said = shown(
-        trends=(Trend("cov.bed", 0.42, 1e-9),), next=following, remarks=("odd",),
-        open=np.array([True, False, False, False]),
+        structure=[{"against": "cov.bed", "share": 0.42}], next_measurement=following,
+        remarks=["odd"], open=["m0"],
     )  # fmt: skip
     assert "odd" in said
     assert any("free in 1 of 4 rows" in line for line in said)
@@ -139,18 +148,17 @@ def test_the_best_known_frames_of_small_terms_are_named_six_at_most():
         "scale": {"rotation": 2e-3}, "unit": {"rotation": "rad", "translation": "m"},
         "frames": frames, "identifiable": 3.6, "unknowns": 48,
     }  # fmt: skip
-    assert module._small_text(None, module.GEOMETRY) == []
-    assert module._small_text(one, module.GEOMETRY) == [
+    assert module._small_lines(None, module.GEOMETRY) == []
+    assert module._small_lines(one, module.GEOMETRY) == [
         "geometric errors  (size 0.002 rad)",
         "  3.6 of 48 known: f8 0.8, f7 0.7, f6 0.6, f5 0.5, f4 0.4, f3 0.3",
     ]
-    declared = module._small_text(one | {"scale": {}}, module.SPRINGS)
+    declared = module._small_lines(one | {"scale": {}}, module.SPRINGS)
     assert declared[0] == "springs  (size as the tolerances say)"
 
 
-@pytest.mark.parametrize("verdict", ["explained", "none_needed"])
-def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdict):
-    """Effects where the verdict lists them; a long formula is cut at 160 letters."""
+def test_effects_and_functions_are_listed_with_their_numbers(shown):
+    """Geometry has lines of its own; a long formula is cut at 160 letters."""
     number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
     effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
     function = {
@@ -158,18 +166,13 @@ def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdic
         "formula": "x" * 200, "equivalent_places": [[], []],
         "parts_of_range": {"variable": "q.j1", "without": 5.0, "after": 1.25},
     }  # fmt: skip
-    monkeypatch.setattr(module, "effects", lambda diagnosis: [effect])
-    monkeypatch.setattr(module, "learned", lambda diagnosis: [function])
-    said = module._effects_text(made(verdict=verdict))
-    assert [line.split() for line in said] == (
-        []
-        if verdict == "none_needed"
-        else [
-            ["encoder_offset", "(probability", "0.980)"],
-            ["one", "2e-05", "+-", "1e-06", "rad"],
-        ]
-    )
-    assert module._learned_text(None) == [
+    geometry = {"name": "geometric_errors", "combinations": 2.0, "parameters": []}
+    said = shown(effects=[effect, geometry], learned=[function])[3:9]
+    assert [line.split() for line in said[:2]] == [
+        ["encoder_offset", "(probability", "0.980)"],
+        ["one", "2e-05", "+-", "1e-06", "rad"],
+    ]
+    assert said[2:] == [
         "learned: tool tx, ty of q.one",
         f"  {'x' * 157}...",
         "  foretold in parts of q.j1 left out: 1.25 sigma, without it 5",
@@ -178,8 +181,13 @@ def test_effects_and_functions_are_listed_with_their_numbers(monkeypatch, verdic
 
 
 def test_the_figures_of_a_diagnosis_name_the_three_likeliest():
-    one = made(claimed=(), probability={"a": 0.2, "b": 0.9, "c": 0.3, "d": 0.1})
-    one.campaign = type("Rows", (), {"name": "arm", "__len__": lambda self: 4})()
+    rows = type("Rows", (), {"name": "arm", "__len__": lambda self: 4})()
+    error = SimpleNamespace(normalised=1.0)
+    one = SimpleNamespace(
+        campaign=rows, verdict="ambiguous", claimed=(), outliers=np.zeros(4, bool),
+        probability={"a": 0.2, "b": 0.9, "c": 0.3, "d": 0.1},
+        before=error, after=error, noise=error,
+    )  # fmt: skip
     figures = Diagnosis._figures(one)
     assert figures["likeliest"] == "b 0.900, c 0.300, a 0.200"
     assert figures["claimed"] == "none"

@@ -7,7 +7,7 @@ import pytest
 
 from tests.planar_arm_for_tests import SIGMA, measured
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.scene import assembled, worst_robot, worst_row
+from validation.diagnosis.figures import assembled, worst_robot, worst_row
 
 
 @pytest.fixture(scope="module")
