@@ -72,8 +72,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
     """The robot whose functions say how uncertain their numbers are now."""
     functions = list(robot.functions)
-    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0)).tolist()
-    for number, sigma in zip(known.numbers, std, strict=True):
+    for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:
             one = functions[int(number.owner)]
             own = {**one.std, number.name: sigma}

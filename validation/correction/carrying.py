@@ -31,6 +31,7 @@ from validation.correction.session_unknowns import (
     session_unknowns,
     without_session,
 )
+from validation.diagnosis.unknowns import effects_in, with_effects_in
 
 _MACHINE = "the robot's own numbers"
 
@@ -214,12 +215,8 @@ def carried_robot(carried: CarriedRobot) -> Robot:
         effects = one.unknowns.effects(values)
         functions = one.unknowns.functions_with(values, one.session)
         robot = replace(robot, functions=(*robot.functions, *functions))
-        if one.session is None:
-            robot = replace(robot, effects=_added(robot.effects, effects))
-        else:
-            before = robot.session_effects.get(one.session, {})
-            sessions = {**robot.session_effects, one.session: _added(before, effects)}
-            robot = replace(robot, session_effects=sessions)
+        both = _added(effects_in(robot, one.session), effects)
+        robot = with_effects_in(robot, one.session, both)
     return robot
 
 

@@ -87,8 +87,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
     known = known_covariance(robot)
     own = np.array([_is_shared(n, robot) for n in known.numbers], dtype=bool)
     C = known.covariance[np.ix_(own, own)]
-    std = np.sqrt(np.maximum(np.diag(C), 0.0))
-    unit = np.where(std > 0.0, std, 1.0)
+    unit = np.where(known.std > 0.0, known.std, 1.0)[own]
     values, vectors = np.linalg.eigh(C / np.outer(unit, unit))
     shown = values > _RANK * values.max(initial=0.0)
     root = unit[:, None] * vectors[:, shown] * np.sqrt(values[shown])

@@ -18,6 +18,7 @@ from validation.correction.spread import deviation_spread
 from validation.diagnosis.learned_range import beyond_by_row
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import register
+from validation.diagnosis.sequence import rms
 
 _MOVED = 3.0  # times as large a residual: the measuring device has been moved
 
@@ -80,7 +81,7 @@ class Foretold:
 
 def _both(values: NDArray) -> dict[str, float]:
     """Root mean squares of positions and of rotations."""
-    return {"position": _rms(values[:, 3:]), "rotation": _rms(values[:, :3])}
+    return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 
 def foretell(commands: Campaign) -> Foretold:
@@ -186,13 +187,7 @@ def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:
     """
     left = campaign.measured - deviation
     parts = left[:, 3:], left[:, :3], left / campaign.sigma
-    return np.array([_rms(part) for part in parts])
-
-
-def _rms(values: NDArray) -> float:
-    """Root mean square of what is known; NaN of nothing."""
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+    return np.array([rms(part) for part in parts])
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:

@@ -40,13 +40,13 @@ from validation.diagnosis.gaussian import leave_block_out, marginalise
 from validation.diagnosis.noise import scale
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import coarse_frame
+from validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
 _SETTLED = 1e-3  # [sigma of the value] a step that changes nothing
 _WIDENED = 4.0 ** np.arange(8)  # k that are tried
 _SURE = 1.0  # standard errors by which a larger k must predict better
 _MATTERS = 0.03  # of the noise's variance
-_RANK = 1e-9  # relative singular value of a value that others do as well
 _AT_ONCE = 1000  # rows, so that memory stays small
 
 
@@ -286,9 +286,7 @@ def _widened(
     z, A = np.concatenate(zs), np.vstack(rows)
     precision = np.concatenate([np.zeros(0), *(s.unknowns.prior for s in sessions)])
     flat = np.append(precision == 0.0, np.zeros(len(machine), dtype=bool))
-    norm = np.maximum(np.linalg.norm(A[:, flat], axis=0), 1e-300)
-    Q, size, _ = np.linalg.svd(A[:, flat] / norm, full_matrices=False)
-    Q = Q[:, size > _RANK * size.max(initial=0.0)]
+    Q = orthonormal_basis(A[:, flat])
     z, A = z - Q @ (Q.T @ z), (A - Q @ (Q.T @ A))[:, ~flat]
     known = precision[precision > 0.0] ** -0.5
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])

@@ -15,7 +15,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.model.function import PLACES, Function
 from assembly.model.robot import Robot
-from stiffness.screws import SCREW
+from validation.campaign.campaign import READING
 from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.saved_covariance import (
     COMPLIANCE,
@@ -25,7 +25,6 @@ from validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-_AXES = tuple(axis.lower() for axis in SCREW)
 _STEP = 0.1  # standard deviations of a number, for its derivative
 
 
@@ -45,8 +44,7 @@ def deviation_spread(
     conditions = conditions_for(robot)
     if not known.numbers:
         return np.zeros((len(conditions), 6))
-    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    J = number_slopes(robot, conditions, known.numbers, std, conditions_for)
+    J = number_slopes(robot, conditions, known.numbers, known.std, conditions_for)
     variance = np.einsum("rik,kl,ril->ri", J, known.covariance, J, optimize=True)
     return np.sqrt(np.maximum(variance, 0.0))
 
@@ -72,7 +70,7 @@ def number_slopes(
     middle: NDArray | None = None
     for k, number in enumerate(numbers):
         if number.kind in {ERROR, COMPLIANCE}:
-            row, axis = conditions.robot.index(number.owner), _AXES.index(number.name)
+            row, axis = conditions.robot.index(number.owner), READING.index(number.name)
             J[:, :, k] = response.screws[:, :, row, axis]
             if number.kind == COMPLIANCE:
                 J[:, :, k] *= response.wrenches[:, row, axis, None]
@@ -118,7 +116,7 @@ def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
     """(R, 6) change of the deviation per unit of one component of a function."""
-    axis = _AXES.index(component)
+    axis = READING.index(component)
     if function.where == "reading":
         return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))
     if function.where == "base":

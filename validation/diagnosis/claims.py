@@ -13,20 +13,15 @@ from scipy.stats import chi2
 
 from assembly.effects.combine import combined
 from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.unknowns import Acting, effects_in
+from validation.diagnosis.lack_of_fit import UNLIKELY
+from validation.diagnosis.separability import orthonormal_basis
+from validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-_CHANCE = 1e-3  # probability of as large an effect where there is none
 _AT_BOUND = 1e-3  # of a bound: the unknown is at the bound
-_RANK = 1e-9  # relative singular value of a direction that others do as well
-_STEP = 1e-4  # of an unknown's size, for derivatives of public parameters
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
-    """Whether the readings support an effect.
-
-    Args:
-        fit: of the machine that has it.
-        one: the effect.
+    """Whether the readings support an effect, one of the fitted machine's.
 
     Returns:
         True for the place of the measuring frame, which is always there.
@@ -51,7 +46,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
         return False
     inverse = np.linalg.pinv(C[np.ix_(seen, seen)], hermitian=True)
     wald = float(moved[seen] @ inverse @ moved[seen])
-    return float(chi2.sf(wald, int(seen.sum()))) < _CHANCE
+    return float(chi2.sf(wald, int(seen.sum()))) < UNLIKELY
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
@@ -59,10 +54,7 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
-    flat = np.hstack(own)
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-    Q, size, _ = np.linalg.svd(flat, full_matrices=False)
-    Q = Q[:, size > _RANK * size.max(initial=0.0)]
+    Q = orthonormal_basis(np.hstack(own))
     return slopes - Q @ (Q.T @ slopes)
 
 
@@ -91,15 +83,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Parameters of an effect that was found.
-
-    Args:
-        fit: of the machine that has it.
-        one: the effect.
-
-    Returns:
-        Those on which some reading depends.
-    """
+    """Parameters of an effect that was found, on which some reading depends."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)
@@ -113,7 +97,7 @@ def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
     J = np.zeros((len(value), len(x)))
     phase = np.array([name.endswith(".phase") for name in value], dtype=bool)
     for i, slot in enumerate(h.slots):
-        step = _STEP * max(abs(x[i]), 1e-3 * slot.unknown.scale)
+        step = STEP * max(abs(x[i]), 1e-3 * slot.unknown.scale)
         ends = []
         for sign in (1.0, -1.0):
             moved = x.copy()

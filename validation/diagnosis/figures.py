@@ -165,11 +165,8 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
     """The held-out row at which the declared model errs most.
 
-    Args:
-        diagnosis: the diagnosis.
-
     Returns:
-        The row and what of it is largest, ``"position"``, or ``"rotation"`` where no
+        The row, and what of it is largest: ``"position"``, or ``"rotation"`` where no
         position was measured; -1 and an empty text without such a row.
     """
     aside = diagnosis.held.rows & ~diagnosis.outliers

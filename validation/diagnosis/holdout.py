@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from validation.campaign.campaign import Campaign
 
-_FEWEST = 8  # configurations from which blocks are configurations, else spans of time
+FEWEST = 8  # blocks of rows by which something can be judged
 _SPLIT = 60  # configurations from which one split judges
 _SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
 _ENOUGH = 60  # blocks held out that judge well, however many there are
@@ -44,9 +44,6 @@ class HeldOut:
 def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the rows that judge a diagnosis.
 
-    Args:
-        campaign: of R rows.
-
     Returns:
         The same for the same campaign; ``"none"`` where there are fewer than two
         blocks, of which all rows are judged by the fit to themselves.
@@ -76,47 +73,28 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """The campaign without the readings of some rows.
-
-    Args:
-        campaign: of R rows.
-        rows: (R,) bool, rows whose readings become NaN; their commands stay.
-
-    Returns:
-        The campaign; what is computed from it cannot depend on those readings.
-    """
+    """The campaign whose readings in some rows (R,) bool are NaN; commands stay."""
     return replace(
         campaign, measured=np.where(rows[:, None], np.nan, campaign.measured)
     )
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Some rows, drawn once; the points of a row of the file stay together.
-
-    Args:
-        visit: (R,) the same for rows that are measured at once.
-        most: rows that are wanted, about.
-
-    Returns:
-        (R,) bool; all where there are no more.
-    """
+    """(R,) bool, about ``most`` rows drawn once, those of one visit (R,) together."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """What rows that are foretold must not share with rows that are fitted.
-
-    Args:
-        campaign: of R rows.
+    """What rows that are predicted must not share with rows that are fitted.
 
     Returns:
         (R,) number of the configuration, or of a span of time where there are too few;
         and which of the two, in words.
     """
     blocks = campaign.configuration
-    if len(np.unique(blocks)) >= _FEWEST:
+    if len(np.unique(blocks)) >= FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
     # points that are measured at once share the span
@@ -124,5 +102,5 @@ def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
         campaign.measured_at_once, return_index=True, return_inverse=True
     )
     order = np.argsort(np.argsort(time[first], kind="stable"))[visit]
-    count = min(2 * _FEWEST, len(first))
+    count = min(2 * FEWEST, len(first))
     return order * count // len(first), SPANS

@@ -11,8 +11,9 @@ from assembly.measurement.predict import predict
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit, fit_machine
-from validation.diagnosis.holdout import HeldOut, blocks_of
+from validation.diagnosis.holdout import FEWEST, HeldOut, blocks_of
 from validation.diagnosis.lack_of_fit import (
+    OUTLIERS,
     SIGNIFICANT,
     LackOfFit,
     lack_of_fit,
@@ -30,10 +31,8 @@ from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import NOT_ENOUGH, by_names, verdict
 from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
-BLUNDERS = 20  # one row in so many may be called a blunder, in all
 _LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
 _SHARE = 0.5  # of the readings that may be determined unknowns
-_DECISIVE = 8  # blocks of rows; with fewer, held-out rows that fail say "too few"
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +162,7 @@ def _outlying_held(
     outliers = np.zeros(len(campaign), dtype=bool)
     judged = campaign.take(held.rows)
     whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
-    most = len(campaign) // BLUNDERS - int(traced.outliers.sum())
+    most = len(campaign) // OUTLIERS - int(traced.outliers.sum())
     outliers[held.rows] = outlying(judged, whitened, max(0, most))
     return outliers
 
@@ -218,7 +217,7 @@ def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) 
     """Whether so few rows decide nothing."""
     blocks = len(np.unique(blocks_of(campaign)[0][used]))
     many = determined > _SHARE * int(campaign.cells[used].sum())
-    return many or (fails and blocks <= _DECISIVE)
+    return many or (fails and blocks <= FEWEST)
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
@@ -226,7 +225,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
-    count = int(np.ceil(max(wanted, 2.0 * blocks, 2.0 * _DECISIVE)))
+    count = int(np.ceil(max(wanted, 2.0 * blocks, 2.0 * FEWEST)))
     return (
         f"about {count} configurations spread over the range of every drive, some of "
         "them loaded and some repeated; there are "

@@ -13,10 +13,11 @@ from scipy.stats import chi2, f
 
 from validation.campaign.campaign import Campaign, number_rows
 
-SIGNIFICANT = 1e-4  # probability by chance below which a lack of fit is believed
+SIGNIFICANT = 1e-4  # probability by chance below which noise is not believed
+UNLIKELY = 1e-3  # likewise, of one among many things that are looked for
+OUTLIERS = 20  # one row in so many may be called an outlier
 _LEVELS = 30  # of a covariate's range within which rows are alike
 _OUTLYING = 5.5  # rms of a row, in medians of all rows
-_NEARLY = 0.7  # of the farthest row's
 
 
 @dataclass(frozen=True)
@@ -111,17 +112,13 @@ def _alike(campaign: Campaign) -> NDArray:
     return number_rows(*parts)
 
 
-def outlying(
-    campaign: Campaign, residual: NDArray, most: int | None = None, worst: bool = False
-) -> NDArray:
+def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
     """Rows that stand far off all others.
 
     Args:
         campaign: of R rows, N measured cells.
         residual: (N,) whitened.
         most: how many may be called so; one row in twenty if not said.
-        worst: only those nearly as far off as the farthest.  A blunder pulls the fit,
-            and others look off until it is left out.
 
     Returns:
         (R,) bool.
@@ -136,10 +133,7 @@ def outlying(
     rms = np.sqrt(squares / np.maximum(cells, 1))
     # a row of few cells is noisier: compared with what noise of its size may reach
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
-    most = len(campaign) // 20 if most is None else most
+    most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
-        first = np.argsort(-rms)[:most]
-        far &= np.isin(np.arange(len(campaign)), first)
-    if worst:
-        far &= rms >= _NEARLY * rms.max()
+        far &= np.isin(np.arange(len(campaign)), np.argsort(-rms)[:most])
     return far

@@ -38,14 +38,7 @@ _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """Rows with a temperature that no sensor reads beside a machine at work.
-
-    Args:
-        campaign: of R rows.
-
-    Returns:
-        (R,) bool.
-    """
+    """(R,) bool, rows with a temperature that no sensor reads beside a machine."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:
@@ -54,15 +47,7 @@ def impossible_rows(campaign: Campaign) -> NDArray:
 
 
 def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
-    """What of a fitted machine no machine has.
-
-    Args:
-        campaign: that was fitted.
-        fit: the machine.
-
-    Returns:
-        One sentence each; none where everything may be.
-    """
+    """What of a fitted machine no machine has, in one sentence each."""
     return tuple(f"{one}: {_LIKELY}" for one in _implausible(campaign, fit))
 
 

@@ -38,10 +38,10 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 
 
 def predicted(campaign: Campaign, robot: Robot | None = None) -> Prediction:
-    """What a robot reads for the commands of a campaign.
+    """What a robot reads for the commands of a campaign; its readings are not used.
 
     Args:
-        campaign: of R rows; its readings are not used.
+        campaign: of R rows.
         robot: other than the campaign's, of the same frames and closures.
 
     Returns:

@@ -1,9 +1,4 @@
-"""Where the measuring device stands, found before anything else when it is not known.
-
-Sources:
-    Kabsch (1976), A solution for the best rotation to relate two sets of vectors, Acta
-    Crystallographica A32, 922.
-"""
+"""Where the measuring device stands, found first of all when it is not known."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,20 +16,14 @@ from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
+from validation.exchange.device_frame import fit_frame
 
 _FEWEST_POINTS = 3
 
 
-def device_frame(robot_unknowns: Conditions) -> Hypothesis:
-    """The hypothesis that the measuring frame is turned and shifted, the tool right.
-
-    Args:
-        robot_unknowns: conditions of the campaign's robot.
-
-    Returns:
-        Six unknowns, fitted in every model of a campaign whose device stands anywhere.
-    """
-    unknowns = LIBRARY["registration"].unknowns(robot_unknowns.robot)
+def device_frame(declared: Conditions) -> Hypothesis:
+    """The hypothesis of six unknowns that a measuring frame is turned and shifted."""
+    unknowns = LIBRARY["registration"].unknowns(declared.robot)
     slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
     return Hypothesis("registration", (), tuple(slots))
 
@@ -55,9 +44,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
     """
     own = with_second_order(conditions_of(campaign))
     if campaign.session is None or conditions.session is None:
-        for values in _device(campaign, own):
-            conditions = apply_effects(conditions, {"registration": values})
-        return conditions
+        return apply_effects(conditions, _device(campaign, own))
     for session in dict.fromkeys(conditions.session.tolist()):
         rows = campaign.session == session
         if not rows.any():
@@ -65,29 +52,28 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
                 f'{campaign.name}: session "{session}" has no row from which its '
                 "registration could be found; expected some"
             )
-        for values in _device(campaign.take(rows), own.take(rows)):
-            turned = apply_effects(conditions, {"registration": values})
-            conditions = in_session_alone(conditions, turned, session)
+        device = _device(campaign.take(rows), own.take(rows))
+        turned = apply_effects(conditions, device)
+        conditions = in_session_alone(conditions, turned, session)
     return conditions
 
 
-def _device(campaign: Campaign, own: Conditions) -> list[dict[str, float]]:
-    """Parameters of the measuring frame that fits the declared model best."""
+def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
+    """The measuring frame that fits the declared model best, as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
     fit = fit_machine(campaign, unknowns, np.ones(len(campaign), dtype=bool))
-    return [dict(zip(BASE, fit.x.tolist(), strict=True))]
+    return {"registration": dict(zip(BASE, fit.x.tolist(), strict=True))}
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
     """A first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
-    full = np.isfinite(campaign.measured[:, 3:]).all(axis=1)
-    full &= np.isfinite(model).all(axis=1)
-    turned = np.isfinite(campaign.measured[:, :3]).all(axis=1)
-    turned &= np.isfinite(model).all(axis=1)
+    answered = np.isfinite(model).all(axis=1)
+    full = answered & np.isfinite(campaign.measured[:, 3:]).all(axis=1)
+    turned = answered & np.isfinite(campaign.measured[:, :3]).all(axis=1)
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not _spread(thought):
@@ -120,11 +106,7 @@ def device_rotation(
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    U, _, Vt = np.linalg.svd(
-        (points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0))
-    )
-    R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
-    return np.asarray(R)
+    return fit_frame(points, seen).rotation
 
 
 def _spread(points: NDArray) -> bool:

@@ -56,16 +56,7 @@ def report_page(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> str:
-    """The page as HTML with its charts inside.
-
-    Args:
-        diagnosis: the diagnosis.
-        tally: how often it is right on this design, if that was simulated.
-        provenance: command and files.
-
-    Returns:
-        The whole page.
-    """
+    """The page as HTML with its charts inside; see :func:`write_report`."""
     campaign, told = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
         section("Before and after", figures.error_chart(diagnosis)),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from assembly.effects import LIBRARY
-from stiffness.screws import SCREW
+from validation.campaign.campaign import READING
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.claims import Parameter, parameters_of
 from validation.diagnosis.diagnosis import Diagnosis
@@ -23,15 +23,7 @@ _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """The diagnosis in the public format.
-
-    Args:
-        diagnosis: a diagnosis.
-        tally: how often it is right on this design, if that was simulated.
-
-    Returns:
-        Plain values.
-    """
+    """The diagnosis in the public format, with a tally if one was simulated."""
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -125,9 +117,8 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         name: ``"geometry"`` or ``"springs"``.
 
     Returns:
-        The sizes of the prior, how many combinations the readings say, and of every
-        unknown its value, standard deviation and the share that the readings say; None
-        if the machine is as declared.
+        Sizes of the prior, how many combinations the readings say, and every unknown
+        with the share that they say; None if the machine is as declared.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -152,7 +143,7 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         "frames": listed,
         "parameters": [
             {
-                "frame": frames[i].name, "component": SCREW[axis].lower(),
+                "frame": frames[i].name, "component": READING[axis],
                 "value": float(v), "std": float(s), "identified": float(told),
                 "unit": _UNITS[name][axis // 3],
             }
@@ -164,9 +155,6 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Effects of the machine found with their parameters, as in the public format.
-
-    Args:
-        diagnosis: a diagnosis.
 
     Returns:
         Of an effect that the robot's file declares, the value is what the saved robot

@@ -21,16 +21,14 @@ from assembly.model.links import in_series
 from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
-from stiffness.screws import SCREW
+from validation.campaign.campaign import READING
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.small_terms import GEOMETRY, with_error
-from validation.diagnosis.unknowns import Small, effects_in, with_effects_in
+from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_in
 
-AXES = tuple(axis.lower() for axis in SCREW)
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-_STEP = 1e-4  # of an unknown's standard deviation, for derivatives of the numbers
 _STAYS = 1e-3  # of a compliance, whatever is taken from it
 
 
@@ -53,7 +51,9 @@ class Number:
     def of(self, robot: Robot) -> float:
         """Its value; of a compliance what was added to the file's, which is 0."""
         if self.kind == ERROR:
-            return float(robot.errors[robot.index(self.owner), AXES.index(self.name)])
+            return float(
+                robot.errors[robot.index(self.owner), READING.index(self.name)]
+            )
         if self.kind == EFFECT:
             effects = effects_in(robot, self.session or None)
             return float(effects.get(self.owner, {}).get(self.name, 0.0))
@@ -64,7 +64,7 @@ class Number:
     def moved(self, robot: Robot, by: float) -> Robot:
         """The robot in which it is larger; of a compliance something always stays."""
         if self.kind == ERROR:
-            row, axis = robot.index(self.owner), AXES.index(self.name)
+            row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
         if self.kind == COMPLIANCE:
             return self._softened(robot, by)
@@ -82,7 +82,7 @@ class Number:
 
     def _softened(self, robot: Robot, by: float) -> Robot:
         """The robot whose joint gives more, or less, in one direction."""
-        row, axis = robot.index(self.owner), AXES.index(self.name)
+        row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
         soft = 1 / stiffness if 0.0 < stiffness < np.inf else 0.0
@@ -113,15 +113,7 @@ class SavedCovariance:
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Covariance of a fitted robot's numbers.
-
-    Args:
-        fit: what was fitted.
-        robot: as it is saved.
-
-    Returns:
-        That of the numbers of its file, to first order.
-    """
+    """Covariance of the numbers of a fitted robot's file, to first order."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -131,7 +123,7 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
             J[springs, np.arange(own.start, own.stop)] = 1.0
             continue
         for k in range(own.start, own.stop):
-            step = _STEP * fit.std[k]
+            step = STEP * fit.std[k]
             if step > 0.0:
                 moved = fit.x.copy()
                 moved[k] += step
@@ -179,17 +171,13 @@ def _of_frames(part: Small, robot: Robot) -> list[Number]:
     """Numbers of geometric errors or compliances, in the order of the unknowns."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
-        Number(kind, robot.frames[row].name, AXES[axis])
+        Number(kind, robot.frames[row].name, READING[axis])
         for row, axis in zip(part.frame, part.axis, strict=True)
     ]
 
 
 def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
-    """Write a covariance as a file of arrays.
-
-    Args:
-        saved: numbers and covariance.
-        path: with the ending ``.npz``.
+    """Write a covariance as a file of arrays, with the ending ``.npz``.
 
     Raises:
         BadInput: it cannot be written.
@@ -203,10 +191,7 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """The covariance that a robot file names.
-
-    Args:
-        robot: of the file.
+    """The covariance that a robot's file names.
 
     Returns:
         None where the file names none.
@@ -235,10 +220,7 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
 
 
 def known_covariance(robot: Robot) -> SavedCovariance:
-    """All that a robot file says of the uncertainty of its numbers.
-
-    Args:
-        robot: of the file.
+    """All that a robot's file says of the uncertainty of its numbers.
 
     Returns:
         The covariance that the file names; of numbers that it lacks, ``tolerance`` of
@@ -251,7 +233,7 @@ def known_covariance(robot: Robot) -> SavedCovariance:
     further = {
         Number(ERROR, frame.name, axis): sigma
         for frame in robot.frames if frame.tolerance is not None
-        for axis, sigma in zip(AXES, frame.tolerance.tolist(), strict=True)
+        for axis, sigma in zip(READING, frame.tolerance.tolist(), strict=True)
     }  # fmt: skip
     for k, function in enumerate(robot.functions):
         further |= {Number(FUNCTION, str(k), n): s for n, s in function.std.items()}

@@ -27,9 +27,6 @@ from validation.diagnosis.unknowns import Small
 def corrected(diagnosis: Diagnosis) -> Robot:
     """The machine found, as it is saved.
 
-    Args:
-        diagnosis: the diagnosis.
-
     Returns:
         The fitted robot with the range it was identified in, the point measured, the
         uncertainty of its geometric errors, and a record of the diagnosis.
@@ -48,14 +45,10 @@ def corrected(diagnosis: Diagnosis) -> Robot:
 
 
 def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
-    """Functions of a robot file that were learned, with their numbers.
-
-    Args:
-        diagnosis: the diagnosis.
+    """Functions that were learned, with their numbers and standard deviations.
 
     Returns:
-        For every function learned one of a robot file, or several of one kind, with the
-        standard deviations of their numbers.
+        For every function learned one of a robot file, or several of one kind.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []

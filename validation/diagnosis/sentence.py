@@ -80,14 +80,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """In which rows clearances leave the pose undetermined, and what is then predicted.
-
-    Args:
-        open_: (R,) bool, by row.
-
-    Returns:
-        One line.
-    """
+    """In how many rows (R,) bool clearances leave the pose free, in one line."""
     return (
         f"clearances leave the pose free in {int(open_.sum())} of {len(open_)} rows "
         "(marked open): of the poses of least energy one is predicted there, in a "

@@ -21,12 +21,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 LIKE = 0.98  # cosine above which a design cannot separate
 SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
 TRACE = 1e-3  # [sigma] a signature shorter than this is none
-_RANK = 1e-3  # relative singular value below which columns are one: they are secants
+ROUNDING = 1e-9  # relative singular value of a direction that others do as well
+_RANK = 1e-3  # likewise, of secants
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,10 +119,10 @@ def compare_signatures(
     names = tuple(columns)
     left = dict(columns)
     if nuisance is not None:
-        out = _basis(nuisance)
+        out = _basis(nuisance, np.linalg.norm(nuisance, axis=0).max(initial=0.0))
         left = {e: A - out @ (out.T @ A) for e, A in columns.items()}
-    bases = {e: _basis(left[e], float(np.linalg.norm(columns[e]))) for e in names}
     sizes = np.array([np.linalg.norm(columns[e]) for e in names])
+    bases = {e: _basis(left[e], size) for e, size in zip(names, sizes, strict=True)}
     cosine, shared = np.eye(len(names)), np.eye(len(names))
     for i, e in enumerate(names):
         size = np.linalg.norm(left[e])
@@ -141,12 +142,27 @@ def compare_signatures(
     )
 
 
-def _basis(columns: NDArray, whole: float | None = None) -> NDArray:
-    """(N, rank) orthonormal basis; ``whole`` is the size that counts as large."""
+def _basis(columns: NDArray, whole: float) -> NDArray:
+    """(N, r) orthonormal basis; ``whole`` is the size that counts as large."""
+    return orthonormal_basis(columns, _RANK, _RANK * whole)
+
+
+def orthonormal_basis(
+    columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
+) -> NDArray:
+    """Basis of what columns span, whatever their units.
+
+    Args:
+        columns: (N, k).
+        rank: relative singular value below which normalised columns are one.
+        floor: length up to which a column is none; one, or (k,).
+
+    Returns:
+        (N, r) orthonormal.
+    """
     size = np.linalg.norm(columns, axis=0)
-    floor = _RANK * (size.max(initial=0.0) if whole is None else whole)
     kept = columns[:, size > floor] / size[size > floor]
     if not kept.size:
         return np.zeros((len(columns), 0))
     U, s, _ = np.linalg.svd(kept, full_matrices=False)
-    return U[:, s > _RANK * s[0]]
+    return U[:, s > rank * s[0]]

@@ -42,23 +42,15 @@ class Errors:
 
 
 def errors_of(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
-    """Root mean squares of a residual.
-
-    Args:
-        campaign: of R rows.
-        residual: (R, 6) [rad, m].
-        rows: mask (R,).
-
-    Returns:
-        Over the measured cells of those rows; NaN where nothing was measured.
-    """
+    """Rms of a residual (R, 6) [rad, m] in rows (R,) bool; NaN of what no row has."""
     z = np.where(campaign.cells, residual, np.nan)[rows]
-
-    def rms(values: NDArray) -> float:
-        known = values[np.isfinite(values)]
-        return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
-
     return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))
+
+
+def rms(values: NDArray) -> float:
+    """Root mean square of what is finite; NaN of nothing."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 @dataclass(frozen=True)
@@ -155,15 +147,11 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
 ) -> list[Step]:
-    """The sequence judged on the rows of all folds together.
-
-    Args:
-        campaign: of R rows.
-        folds: stages of each fold; a fold without a step has the one before it there.
-        rows: (R,) bool, rows that are counted.
+    """The sequence judged on rows (R,) bool of all folds together.
 
     Returns:
-        The steps, in order; the last is the error of the diagnosis.
+        The steps, in order; the last is the error of the diagnosis.  A fold without a
+        step has the one before it there.
     """
     steps = []
     for place in sorted(set().union(*folds)):

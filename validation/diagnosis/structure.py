@@ -19,8 +19,9 @@ from scipy.stats import f
 from assembly.kinematics.posture import POSE, pose_components
 from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import LOAD, Campaign
+from validation.diagnosis.lack_of_fit import UNLIKELY
+from validation.diagnosis.separability import orthonormal_basis
 
-_SEEN = 1e-3  # probability by chance below which something is reported
 _MOST = 6
 
 
@@ -55,7 +56,7 @@ def trends(
     z = residual / campaign.sigma
     tried = list(_candidates(campaign, conditions))
     tested = [_test(name, X, z, len(tried)) for name, X in tried]
-    seen = [t for t in tested if t is not None and t.probability < _SEEN]
+    seen = [t for t in tested if t is not None and t.probability < UNLIKELY]
     return sorted(seen, key=lambda t: -t.share)[:_MOST]
 
 
@@ -107,15 +108,11 @@ def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
         known = np.isfinite(column)
         if known.sum() < X.shape[1] + 3:
             continue
-        y = column[known]
         varied = X[known] - X[known].mean(axis=0)
-        size = np.linalg.norm(varied, axis=0)
-        varied = varied[:, size > 1e-12 * np.abs(X).max(axis=0)]
-        if not varied.shape[1]:
+        u = orthonormal_basis(varied, floor=1e-12 * np.abs(X).max(axis=0))
+        if not u.shape[1]:
             continue
-        y = y - y.mean()
-        u, s, _ = np.linalg.svd(varied / np.linalg.norm(varied, axis=0), False)
-        u = u[:, s > 1e-9 * s[0]]
+        y = column[known] - column[known].mean()
         left = y - u @ (u.T @ y)
         before += float(y @ y)
         after += float(left @ left)

@@ -65,19 +65,23 @@ class Traced:
     Attributes:
         campaign: of R rows; sigma is as large as the search believed, of a blunder
             many times as large, and so is the noise in common.
-        conditions: of all rows, registered, with what finite geometric errors add.
+        unregistered: conditions of all rows, before any registration.
+        conditions: the same, registered, with what finite geometric errors add.
         used: (R,) bool, rows that were fitted.
         outliers: (R,) bool, rows whose readings are blunders, left out.
         selected: models with their probabilities.
         columns: of the campaign's cells.
+        finite: whether motions of the declared model are finite.
     """
 
     campaign: Campaign
+    unregistered: Conditions
     conditions: Conditions
     used: NDArray
     outliers: NDArray
     selected: Selected
     columns: Columns
+    finite: bool
 
     @property
     def fitting(self) -> Campaign:
@@ -176,10 +180,10 @@ def trace(
     Raises:
         BadInput: the measuring frame is not known and cannot be found.
     """
-    conditions = conditions_of(campaign)
-    finite = finite or conditions.exact
+    declared = conditions_of(campaign)
+    finite = finite or declared.exact
     complete = with_finite_motions if finite else with_second_order
-    conditions = complete(conditions)
+    declared = conditions = complete(declared)
     fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
         conditions = register(campaign.take(fitted), conditions)
@@ -187,7 +191,7 @@ def trace(
         # where clearances of closed chains rest is found row by row, once
         conditions = with_rest_positions(conditions)
     sample = hidden(campaign, ~_searched_rows(campaign, fitted))
-    conditions = _with_its_errors(sample, conditions, fitted, complete)
+    conditions = _with_its_errors(sample, declared, conditions, fitted, complete)
     columns = Columns(sample, conditions, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     for turn in range(_TURNS):
@@ -197,8 +201,9 @@ def trace(
         cells &= np.isfinite(z)
         selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
-            campaign, conditions, fitted & ~blunders, cells, selected, columns
-        )
+            campaign, declared, conditions, fitted & ~blunders, cells, selected,
+            columns, finite,
+        )  # fmt: skip
         traced = replace(traced, outliers=traced.outliers | blunders)
         fit = _fitted(traced)
         gross = _gross(campaign, fit, traced.used)
@@ -235,7 +240,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 
 
 def _with_its_errors(
-    campaign: Campaign, conditions: Conditions, fitted: NDArray,
+    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
     complete: Callable[[Conditions], Conditions],
 ) -> Conditions:  # fmt: skip
     """Conditions with what finite geometric errors add, before anything is searched."""
@@ -247,7 +252,9 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - read)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        traced = _traced(campaign, conditions, fitted, known, selected, columns)
+        traced = _traced(
+            campaign, declared, conditions, fitted, known, selected, columns, False
+        )
         fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
         bent = _with_errors(conditions, fit, complete)
         if bent is None or not _differs(campaign, bent, read, fitted):
@@ -281,8 +288,8 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
 
 
 def _traced(
-    campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
-    selected: Selected, columns: Columns,
+    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
+    cells: NDArray, selected: Selected, columns: Columns, finite: bool,
 ) -> Traced:  # fmt: skip
     """What was found, with the sigma that was believed and rows that are blunders."""
     weights = np.ones(len(columns.row))
@@ -301,11 +308,13 @@ def _traced(
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
         campaign=replace(campaign, sigma=sigma, common=common),
+        unregistered=declared,
         conditions=conditions,
         used=fitted & ~outliers,
         outliers=outliers,
         selected=selected,
         columns=columns,
+        finite=finite,
     )
 
 

@@ -37,7 +37,7 @@ from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_err
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
 _BEND = 0.5  # of a number in which a function is not linear, likewise; and its bound
 _HELD = 1e-12  # plausible sizes, of an unknown whose value the file declares
-_STEP = 1e-4  # of an unknown's size, for its derivative
+STEP = 1e-4  # of a number's size, for its derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,14 +182,7 @@ class Unknowns:
         return lower, upper
 
     def robot_at(self, x: NDArray) -> Robot:
-        """The robot that has these numbers.
-
-        Args:
-            x: (k,).
-
-        Returns:
-            The declared robot with them built in: what is saved, and what is judged.
-        """
+        """The robot with numbers x (k,) built in: what is saved, and what is judged."""
         robot, functions = self.robot, list(self.robot.functions)
         for part, own in self.places:
             if isinstance(part, Small):
@@ -219,11 +212,7 @@ class Unknowns:
         return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
-        """Change of the readings per unknown, by the linear model at a robot.
-
-        Args:
-            campaign: of R rows.
-            x: (k,) where it is taken.
+        """Change of the readings per unknown, by the linear model at x (k,).
 
         Returns:
             (R, 6, k) [rad, m] per unit of x; zero where the model has no answer.
@@ -248,7 +237,7 @@ class Unknowns:
                 for k, slot in enumerate(part.hypothesis.slots, own.start):
                     if slot.unknown.lower == slot.unknown.upper:
                         continue
-                    step = _STEP * max(slot.unknown.scale, abs(x[k]))
+                    step = STEP * max(slot.unknown.scale, abs(x[k]))
                     if x[k] + step > slot.unknown.upper:
                         step = -step
                     moved = x.copy()

@@ -12,14 +12,10 @@ Sets = tuple[tuple[tuple[str, ...], float], ...]
 
 
 def by_names(selected: Selected) -> Sets:
-    """Probabilities of models by the effects that they have.
-
-    Args:
-        selected: models with their probabilities.
+    """Probabilities of models by the effects that they have, likeliest first.
 
     Returns:
-        Names and probabilities, likeliest first; ``"function of X"`` of a model that
-        has a function.
+        Names and probabilities; of a model that has a function, ``"function"`` is last.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:

@@ -4,12 +4,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.lack_of_fit import UNLIKELY
 from validation.inspection.measuring_order import Revisits, session_clock
 from validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from validation.inspection.repeats import MOST, RepeatNoise
 
 _FEW = 20  # degrees of freedom below which noise is known worse than to +-30 %
-_SELDOM = 1e-3  # chance below which something is no coincidence
 _SEVERAL = 4  # suspects that may form a pattern
 
 
@@ -50,20 +50,20 @@ def on_repeats(
     low, high = noise.interval
     size = f"{noise.ratio:.2f} times the stated sigma ({low:.2f} ... {high:.2f})"
     squares = noise.degrees * noise.ratio**2
-    if chi2.sf(squares, noise.degrees) < _SELDOM:
+    if chi2.sf(squares, noise.degrees) < UNLIKELY:
         text = (
             f"Repeats scatter {size}: sigma is stated too small, or something changes "
             "in between that is neither time, temperature nor approach."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
-    elif chi2.cdf(squares, noise.degrees) < _SELDOM:
+    elif chi2.cdf(squares, noise.degrees) < UNLIKELY:
         text = (
             f"Repeats scatter only {size}: sigma is stated too large, or repeats share "
             "an error."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     for name, chance in noise.taken_out.items():
-        if chance < _SELDOM:
+        if chance < UNLIKELY:
             text = f"Repeats change with {name}, more than noise does."
             remarks.append(Remark("repeats", CAREFUL, text))
     return remarks + _on_suspects(campaign, noise)

@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f, t
 
 from validation.campaign.campaign import READING, Campaign
+from validation.diagnosis.separability import orthonormal_basis
 from validation.inspection.measuring_order import session_clock
 
 _LEVEL = 0.01  # chance that a sound campaign has a suspect row
 MOST = 20  # suspects that are looked for
-_RANK = 1e-9  # relative singular value below which columns are one
 
 
 @dataclass(frozen=True)
@@ -256,13 +256,7 @@ class _RepeatFit:
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
     """(rows, rank) orthonormal basis of all columns."""
-    columns = np.column_stack([np.zeros((rows, 0)), *blocks])
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0] / size[size > 0]
-    if not columns.size:
-        return np.zeros((rows, 0))
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    return U[:, s > _RANK * s[0]]
+    return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 
 def _interval(degrees: float) -> tuple[float, float]:

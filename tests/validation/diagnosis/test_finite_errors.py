@@ -66,7 +66,7 @@ def test_large_errors_of_frames_are_explained_as_finite_motions(found):
     assert found.before.normalised > 500
     assert found.after.normalised == pytest.approx(1.0, abs=0.3)
     assert not found.lack.significant
-    (part,) = found.fit.unknowns.parts
+    ((part, _),) = found.fit.unknowns.places
     assert part.name == "geometry"
 
 

@@ -93,7 +93,7 @@ def by_least_squares(X, z):
 
 
 def test_every_trend_is_an_f_test_of_what_its_name_says(varied, monkeypatch):
-    monkeypatch.setattr(structure, "_SEEN", 2.0)
+    monkeypatch.setattr(structure, "UNLIKELY", 2.0)
     monkeypatch.setattr(structure, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
     every = functions(varied)
