@@ -58,13 +58,13 @@ def predict(
     write_json(table, json)
     if json != "-":
         print(f"{output}: {len(prediction.commands)} readings")
-        position, rotation, sigma = prediction.error
-        if position == position:
-            print(f"rms of measured minus predicted: {1e6 * position:.4g} um")
-        if rotation == rotation:
-            print(f"  rotation: {1e6 * rotation:.4g} urad")
-        if sigma == sigma:
-            print(f"  in sigma: {sigma:.4g}")
+        error = prediction.error
+        if error.position == error.position:
+            print(f"rms of measured minus predicted: {1e6 * error.position:.4g} um")
+        if error.rotation == error.rotation:
+            print(f"  rotation: {1e6 * error.rotation:.4g} urad")
+        if error.normalised == error.normalised:
+            print(f"  in sigma: {error.normalised:.4g}")
         print("\n".join(_about(table)))
         for row in table["without_answer"]:
             print(f"{row['id']}: {row['reason']}")

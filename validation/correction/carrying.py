@@ -10,6 +10,7 @@ Where the covariance lets the other rows move by more than the set-up rows are o
 the robot as it was saved, the set-up rows do not suffice.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,7 +23,6 @@ from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, quoted
 from validation.campaign.campaign import Campaign
 from validation.correction.machine_numbers import machine_numbers, unchanging
-from validation.correction.prediction import error_of
 from validation.correction.session_fit import SessionsFit, SetUp, fit_sessions
 from validation.correction.session_unknowns import (
     DRIFT,
@@ -31,6 +31,7 @@ from validation.correction.session_unknowns import (
     session_unknowns,
     without_session,
 )
+from validation.diagnosis.sequence import Errors, errors_of
 from validation.diagnosis.unknowns import effects_in, with_effects_in
 
 _MACHINE = "the robot's own numbers"
@@ -46,8 +47,8 @@ class Carried:
         values: (k,) [rad, m].
         std: (k,) of them.
         rows: numbers of set-up rows and of others.
-        error: (3,) rms over the other rows: position [m], rotation [rad], in sigma.
-        declared: (3,) the same of the campaign's own robot, fitted alike.
+        error: over the other rows.
+        declared: the same of the campaign's own robot, fitted alike.
         uncertainty: [m] by which the set-up rows leave the other rows' points open,
             rms.
         left: [m] rms of what they leave unexplained in themselves.
@@ -62,8 +63,8 @@ class Carried:
     values: NDArray
     std: NDArray
     rows: tuple[int, int]
-    error: NDArray
-    declared: NDArray
+    error: Errors
+    declared: Errors
     uncertainty: float
     left: float
     held: float
@@ -80,8 +81,8 @@ class Carried:
     @property
     def better(self) -> bool:
         """Whether the robot foretells the other rows better than the declared one."""
-        known = np.isfinite(self.declared)
-        return bool(np.all(self.error[known][-1:] <= self.declared[known][-1:]))
+        error, declared = self.error.normalised, self.declared.normalised
+        return math.isnan(declared) or error <= declared
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +191,8 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
         values=values,
         std=np.sqrt(np.diag(C)),
         rows=(int(setup.sum()), int((~setup).sum())),
-        error=error_of(campaign.take(~setup), read[~setup]),
-        declared=error_of(alike.campaign.take(~setup), declared[~setup]),
+        error=errors_of(campaign, campaign.measured - read, ~setup),
+        declared=errors_of(campaign, campaign.measured - declared, ~setup),
         uncertainty=float(np.sqrt(variance)),
         left=off[0],
         held=off[1],

@@ -1,10 +1,10 @@
 """Sessions to which a robot was carried, for machines and people."""
 
+from dataclasses import asdict
 from typing import Any
 
-from numpy.typing import NDArray
-
 from validation.correction.carrying import CarriedRobot
+from validation.diagnosis.sequence import Errors
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
@@ -25,8 +25,8 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
                 "left_in_setup": one.left,
                 "held_in_setup": one.held,
                 "left_behind": list(one.left_behind),
-                "error": _error(one.error),
-                "declared": _error(one.declared),
+                "error": asdict(one.error),
+                "declared": asdict(one.declared),
                 "parameters": [
                     {"effect": effect, "name": name, "value": value, "std": std}
                     for (effect, name), value, std in zip(
@@ -41,11 +41,6 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
         ],
         "unit": {"position": "m", "rotation": "rad", "uncertainty": "m"},
     }
-
-
-def _error(error: NDArray) -> dict[str, float]:
-    position, rotation, normalised = error.tolist()
-    return {"position": position, "rotation": rotation, "normalised": normalised}
 
 
 def text(carried: CarriedRobot) -> str:
@@ -80,13 +75,10 @@ def text(carried: CarriedRobot) -> str:
     return "\n".join(lines)
 
 
-def _said(error: NDArray) -> str:
+def _said(error: Errors) -> str:
     """What of an error is known."""
-    parts = [
-        f"{size * factor:.4g} {unit}"
-        for size, factor, unit in zip(
-            error.tolist(), (1e6, 1e6, 1.0), ("um", "urad", "sigma"), strict=True
-        )
-        if size == size
-    ]
-    return ", ".join(parts)
+    sizes = (
+        (1e6 * error.position, "um"), (1e6 * error.rotation, "urad"),
+        (error.normalised, "sigma"),
+    )  # fmt: skip
+    return ", ".join(f"{size:.4g} {unit}" for size, unit in sizes if size == size)

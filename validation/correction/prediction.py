@@ -1,7 +1,7 @@
 """Readings that a robot predicts for commands, measured or not."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from validation.correction.spread import deviation_spread
 from validation.diagnosis.learned_range import beyond_by_row
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import register
-from validation.diagnosis.sequence import rms
+from validation.diagnosis.sequence import Errors, errors_of, rms
 
 _MOVED = 3.0  # times as large a residual: the measuring device has been moved
 
@@ -30,8 +30,7 @@ class Foretold:
     Attributes:
         commands: what was commanded, of R rows.
         prediction: what the robot reads there.
-        error: (3,) rms of measured minus predicted: position [m], rotation [rad] and in
-            sigma; NaN where nothing was measured.
+        error: of measured minus predicted; NaN where nothing was measured.
         spread: (R, 6) [rad, m] standard deviation of the prediction, by what the
             robot's file says of its own uncertainty.
         noise: (R, 6) [rad, m] standard deviation of a reading about the machine's own
@@ -45,7 +44,7 @@ class Foretold:
 
     commands: Campaign
     prediction: Prediction
-    error: NDArray
+    error: Errors
     spread: NDArray
     noise: NDArray
     extrapolated: NDArray
@@ -56,7 +55,6 @@ class Foretold:
 
     def table(self) -> dict[str, Any]:
         """For machines."""
-        position, rotation, sigma = self.error.tolist()
         rows = zip(self.commands.ids, self.prediction.reason, strict=True)
         far = zip(self.commands.ids, self.extrapolated, strict=True)
         missing = list(self.commands.robot.diagnosis.get("not_measured", []))
@@ -74,7 +72,7 @@ class Foretold:
             "not_measured": missing,
             "error": {
                 "unit": {"position": "m", "rotation": "rad"},
-                "position": position, "rotation": rotation, "normalised": sigma,
+                **asdict(self.error),
             },
         }  # fmt: skip
 
@@ -115,7 +113,7 @@ def foretell(commands: Campaign) -> Foretold:
     return Foretold(
         commands=commands,
         prediction=prediction,
-        error=error_of(commands, prediction.deviation),
+        error=errors_of(commands, commands.measured - prediction.deviation),
         spread=deviation_spread(robot, placed),
         noise=_noise(commands),
         extrapolated=beyond_by_row(robot, commands),
@@ -143,7 +141,8 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
     except BadInput:
         return conditions, "of the robot file"
     errors = [
-        error_of(commands, predict(one).deviation)[2] for one in (conditions, again)
+        rms((commands.measured - predict(one).deviation) / commands.sigma)
+        for one in (conditions, again)
     ]
     if errors[0] > _MOVED * errors[1]:
         return again, _FITTED
@@ -172,22 +171,6 @@ def _noise(commands: Campaign) -> NDArray:
     factor = max(1.0, more) if isinstance(more, float) else 1.0
     stated = np.where(np.isfinite(commands.sigma), commands.sigma, np.repeat(sizes, 3))
     return np.asarray(factor * stated)
-
-
-def error_of(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Rms of measured minus predicted.
-
-    Args:
-        campaign: R rows.
-        deviation: (R, 6) [rad, m] predicted.
-
-    Returns:
-        (3,) position [m], rotation [rad], and all readings in sigma; NaN where there
-        is nothing to compare.
-    """
-    left = campaign.measured - deviation
-    parts = left[:, 3:], left[:, :3], left / campaign.sigma
-    return np.array([rms(part) for part in parts])
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:

@@ -50,33 +50,31 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
-    if len(names) < 2:
+    count = len(names)
+    if count < 2:
         every = np.ones(len(campaign), dtype=bool)
         return HeldOut("none", (every,), "no rows held out: too few to spare")
-    if len(names) >= _SPLIT:
-        count = max(
-            min(round(_SHARES[0] * len(names)), _ENOUGH), round(_SHARES[1] * len(names))
-        )
-        held = np.isin(blocks, names[:count])
+    if count >= _SPLIT:
+        quarter, tenth = (round(share * count) for share in _SHARES)
+        chosen = max(min(quarter, _ENOUGH), tenth)
+        held = np.isin(blocks, names[:chosen])
         words = (
-            f"{int(held.sum())} rows of {count} of {len(names)} {kind}, drawn once, "
+            f"{int(held.sum())} rows of {chosen} of {count} {kind}, drawn once, "
             "held out from every choice and every fit"
         )
         return HeldOut("split", (held,), words)
-    parts = np.array_split(names, min(_FOLDS, len(names)))
-    folds = tuple(np.isin(blocks, part) for part in parts)
+    parts = np.array_split(names, min(_FOLDS, count))
     words = (
-        f"{len(parts)} folds over {len(names)} {kind}: in each the whole diagnosis is "
+        f"{len(parts)} folds over {count} {kind}: in each the whole diagnosis is "
         "made without its rows"
     )
-    return HeldOut("folds", folds, words)
+    return HeldOut("folds", tuple(np.isin(blocks, part) for part in parts), words)
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
     """The campaign whose readings in some rows (R,) bool are NaN; commands stay."""
-    return replace(
-        campaign, measured=np.where(rows[:, None], np.nan, campaign.measured)
-    )
+    readings = np.where(rows[:, None], np.nan, campaign.measured)
+    return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:

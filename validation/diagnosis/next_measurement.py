@@ -85,32 +85,27 @@ def next_measurement(
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
-            return _measurement(campaign, tried, best, float(powers[best]), fit, rival)
+            power = float(powers[best])
+            return _measurement(campaign, tried, best, power, (fit, rival))
     return None
 
 
 def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
-    fit: MachineFit, rival: MachineFit,
+    fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
     """One of the conditions tried, in words and numbers."""
-    names = [
-        " + ".join(sorted({e.hypothesis.effect for e in one.effects})) or "nothing"
-        for one in (fit, rival)
-    ]
-    covariates = {
-        name: float(getattr(tried, name)[best])
-        for name in ("temperature", "approach")
-        if np.isfinite(getattr(tried, name)[best])
-    }
+    sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
+    names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
         f"{names[0]} and {names[1]} then differ by {np.sqrt(power):.1f} "
         "standard deviations in one reading"
     )
-    return NextMeasurement(
-        why, _configuration(campaign, tried, best),
-        tuple(tried.load[best].tolist()), covariates, power,
-    )  # fmt: skip
+    known = {name: getattr(tried, name)[best] for name in ("temperature", "approach")}
+    covariates = {name: float(v) for name, v in known.items() if np.isfinite(v)}
+    load = tuple(tried.load[best].tolist())
+    configuration = _configuration(campaign, tried, best)
+    return NextMeasurement(why, configuration, load, covariates, power)
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:

@@ -113,17 +113,17 @@ def widened(
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
     """Every component of every point in every session: its times, and its cells."""
-    time = campaign.covariates["time"]
     rows, columns = np.nonzero(campaign.cells)
-    names = [np.zeros(len(campaign), dtype=int)]
-    for labels in (campaign.session, campaign.point):
-        if labels is not None:
-            names.append(np.unique(labels, return_inverse=True)[1])
-    group = np.column_stack([*(n[rows] for n in names), columns])
+    time = campaign.covariates["time"][rows]
+    own = [
+        label[rows] for label in (campaign.session, campaign.point) if label is not None
+    ]
+    numbers = [np.unique(names, return_inverse=True)[1] for names in (*own, columns)]
+    group = np.column_stack(numbers)
     for one in np.unique(group, axis=0):
-        own = np.flatnonzero((group == one).all(axis=1))
-        own = own[np.argsort(time[rows[own]], kind="stable")]
-        yield time[rows[own]], own
+        cells = np.flatnonzero((group == one).all(axis=1))
+        cells = cells[np.argsort(time[cells], kind="stable")]
+        yield time[cells], cells
 
 
 def _innovations(

@@ -26,13 +26,9 @@ from validation.diagnosis.small_terms import (
 )
 
 _GIVES = 0.2  # [rad, sizes] that nothing gives under the largest load
-_MADE = {"rotation": 0.1, "translation": 0.02}  # [rad, sizes] nobody makes worse
+_MADE = (0.1, 0.02)  # [rad, sizes] geometric errors: nobody makes frames worse
 _HOT = 150.0  # [K] away from calibration: no machine is measured there
 _G = 9.81  # [m/s^2]
-_RANGES = {
-    "1/K": (-5e-4, 5e-4, "engineering materials stay below 3e-4"),
-    "m/s^2": (-12.0, 12.0, "weight is 9.8"),
-}
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}
 _LIKELY = "check the declared stiffness, the units and the registration"
 
@@ -53,40 +49,35 @@ def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
 
 def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
     """Statements on numbers that no machine has."""
-    robot = campaign.robot
-    size = size_of(robot)
+    robot, size = campaign.robot, size_of(campaign.robot)
     force = float(np.abs(campaign.loads[:, 3:]).max())
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
-    softest = {"N/m": force / (_GIVES * size), "N m/rad": moment / _GIVES}
-    largest = {"rad": LARGEST_TURN, "m": LARGEST_SHIFT * size}
+    reach = ", under which the loads would move it out of reach"
+    shift = LARGEST_SHIFT * size
+    ranges = {  # by unit: least, largest, and what is said beyond them
+        "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
+        "m": (-shift, shift, f", larger than {shift:.2g}"),
+        "N/m": (force / (_GIVES * size), np.inf, reach),
+        "N m/rad": (moment / _GIVES, np.inf, reach),
+        "1/K": (-5e-4, 5e-4, ": engineering materials stay below 3e-4"),
+        "m/s^2": (-12.0, 12.0, ": weight is 9.8"),
+    }
     for effect, name, value in _parameters(campaign, fit):
         unit = LIBRARY[effect].unit(robot, name)
-        statement = f"{effect} {name} = {value:.3g} {unit}"
-        if name.endswith(".phase"):
-            continue
-        if abs(value) > largest.get(unit, np.inf):
-            yield f"{statement}, larger than {largest[unit]:.2g}"
-        if value < softest.get(unit, -np.inf):
-            yield f"{statement}, under which the loads would move it out of reach"
-        low, high, why = _RANGES.get(unit, (-np.inf, np.inf, ""))
-        if not low <= value <= high:
-            yield f"{statement}: {why}"
+        low, high, why = ranges.get(unit, (-np.inf, np.inf, ""))
         if unit == "1" and effect in _FACTORS:
             low, high = _FACTORS[effect]
-            if not low <= value <= high:
-                yield f"{statement}, expected {low:g} to {high:g}"
+            why = f", expected {low:g} to {high:g}"
+        if not name.endswith(".phase") and not low <= value <= high:
+            yield f"{effect} {name} = {value:.3g} {unit}{why}"
     for part in fit.unknowns.small:
-        if part.name != GEOMETRY:
-            continue
-        for k, (kind, unit) in enumerate(zip(KINDS, ("rad", "m"), strict=True)):
+        kinds = zip(KINDS, ("rad", "m"), (_MADE[0], _MADE[1] * size), strict=True)
+        for k, (kind, unit, most) in enumerate(kinds):
             scale = float(part.std[part.axis // 3 == k].max(initial=0.0))
-            most = _MADE[kind] * (size if unit == "m" else 1.0)
-            if scale > most:
-                yield (
-                    f"geometric errors of {scale:.2g} {unit} in {kind}, "
-                    f"larger than {most:.2g}"
-                )
+            if part.name == GEOMETRY and scale > most:
+                sizes = f"geometric errors of {scale:.2g} {unit} in {kind}"
+                yield f"{sizes}, larger than {most:.2g}"
 
 
 def _parameters(

@@ -37,33 +37,24 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
     return with_finite_motions(conditions)
 
 
-def predicted(campaign: Campaign, robot: Robot | None = None) -> Prediction:
-    """What a robot reads for the commands of a campaign; its readings are not used.
+def predicted(
+    campaign: Campaign, robot: Robot | None = None, *, linear: bool = False
+) -> Prediction:
+    """What a robot reads for the commands of a campaign.
 
     Args:
-        campaign: of R rows.
+        campaign: of R rows; its readings are not used.
         robot: other than the campaign's, of the same frames and closures.
+        linear: whether motions are small, as of a model that lacks finite ones.
 
     Returns:
         The readings, with the registration that the robot carries.
     """
-    if robot is not None:
-        campaign = replace(campaign, robot=robot)
-    return predict(finite_conditions(campaign))
+    campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
+    return predict((conditions_of if linear else finite_conditions)(campaign))
 
 
 def residual_of(campaign: Campaign, robot: Robot, *, linear: bool = False) -> NDArray:
-    """Readings minus what a robot reads.
-
-    Args:
-        campaign: of R rows.
-        robot: of the same frames and closures as the campaign's.
-        linear: whether motions are small, as of a model that lacks finite ones.
-
-    Returns:
-        (R, 6) [rad, m]; NaN where not measured.
-    """
-    if linear:
-        conditions = conditions_of(replace(campaign, robot=robot))
-        return np.asarray(campaign.measured - predict(conditions).deviation)
-    return np.asarray(campaign.measured - predicted(campaign, robot).deviation)
+    """(R, 6) [rad, m] readings minus what :func:`predicted` is; NaN not measured."""
+    deviation = predicted(campaign, robot, linear=linear).deviation
+    return np.asarray(campaign.measured - deviation)

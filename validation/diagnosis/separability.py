@@ -19,6 +19,7 @@ Sources:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,27 +117,24 @@ def compare_signatures(
     Returns:
         The comparison.
     """
-    names = tuple(columns)
-    left = dict(columns)
+    names, left = tuple(columns), dict(columns)
     if nuisance is not None:
         out = _basis(nuisance, np.linalg.norm(nuisance, axis=0).max(initial=0.0))
         left = {e: A - out @ (out.T @ A) for e, A in columns.items()}
     sizes = np.array([np.linalg.norm(columns[e]) for e in names])
-    bases = {e: _basis(left[e], size) for e, size in zip(names, sizes, strict=True)}
-    cosine, shared = np.eye(len(names)), np.eye(len(names))
-    for i, e in enumerate(names):
-        size = np.linalg.norm(left[e])
-        for j, f in enumerate(names):
-            if i != j and bases[e].shape[1] and bases[f].shape[1]:
-                cosine[i, j] = np.linalg.norm(bases[e].T @ bases[f], 2)
-                shared[i, j] = np.linalg.norm(bases[f].T @ left[e]) / size
     rest = np.array([np.linalg.norm(left[e]) for e in names])
+    bases = [_basis(left[e], size) for e, size in zip(names, sizes, strict=True)]
+    cosine, shared = np.eye(len(names)), np.eye(len(names))
+    for i, j in permutations(range(len(names)), 2):
+        if bases[i].shape[1] and bases[j].shape[1]:
+            cosine[i, j] = np.linalg.norm(bases[i].T @ bases[j], 2)
+            shared[i, j] = np.linalg.norm(bases[j].T @ left[names[i]]) / rest[i]
     return Separability(
         names=names,
         strength=sizes,
         left=np.divide(rest, sizes, out=np.zeros(len(names)), where=sizes > 0),
         unknowns=np.array([columns[e].shape[1] for e in names], dtype=int),
-        rank=np.array([bases[e].shape[1] for e in names], dtype=int),
+        rank=np.array([basis.shape[1] for basis in bases], dtype=int),
         cosine=np.minimum(cosine, 1.0),
         shared=np.minimum(shared, 1.0),
     )

@@ -41,7 +41,9 @@ class Errors:
     normalised: float
 
 
-def errors_of(campaign: Campaign, residual: NDArray, rows: NDArray) -> Errors:
+def errors_of(
+    campaign: Campaign, residual: NDArray, rows: NDArray | slice = slice(None)
+) -> Errors:
     """Rms of a residual (R, 6) [rad, m] in rows (R,) bool; NaN of what no row has."""
     z = np.where(campaign.cells, residual, np.nan)[rows]
     return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))

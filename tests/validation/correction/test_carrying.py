@@ -105,7 +105,7 @@ def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
         assert abs(value - turn[k]) < 5 * std
     # what was written foretells the day by itself
     again = foretell(read_commands(folder, load_robot(out)))
-    assert again.error[0] < 1.3 * SIGMA
+    assert again.error.position < 1.3 * SIGMA
 
 
 def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
@@ -150,7 +150,7 @@ def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):
     write_robot(corrected(diagnose(read_campaign(folder))), machine / "found.toml")
     again = read_commands(folder, load_robot(machine / "found.toml"))
     error = foretell(replace(again, registration="known")).error
-    assert 0.8 < error[2] < 1.1
+    assert 0.8 < error.normalised < 1.1
 
 
 def test_sessions_are_carried_one_by_one(machine, run):

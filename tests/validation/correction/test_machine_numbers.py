@@ -73,8 +73,8 @@ def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
     saved, declared = wet_post([a] * 8 + [0.0] * 8, wet, C, tmp_path)
     carried = carry(saved, declared, np.arange(16) < 8, ())
     (day,) = carried.sessions
-    assert day.error[0] < 0.01 * a
-    assert day.declared[0] == 0.0
+    assert day.error.position < 0.01 * a
+    assert day.declared.position == 0.0
     numbers = carried.fit.robot.functions[0].parameters
     assert numbers["0"] == pytest.approx(a, rel=0.01)
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
@@ -89,7 +89,7 @@ def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
     carried = carry(saved, declared, np.arange(40) < 20, ())
     assert carried.fit.widened > 16
     (day,) = carried.sessions
-    assert day.error[0] < 0.05 * y
+    assert day.error.position < 0.05 * y
     assert day.held == pytest.approx(y)
     assert day.suffices
 
@@ -101,7 +101,9 @@ def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
     save(carried, tmp_path / "carried.toml")
     robot = read_robot(tmp_path / "carried.toml")
     again = foretell(replace(saved, robot=robot).take(np.arange(8, 12)))
-    assert again.error[0] == pytest.approx(carried.sessions[0].error[0], rel=1e-9)
+    assert again.error.position == pytest.approx(
+        carried.sessions[0].error.position, rel=1e-9
+    )
     assert again.spread[:, 3] == pytest.approx(carried.sessions[0].uncertainty)
 
 
@@ -192,7 +194,7 @@ def test_a_spring_that_became_softer_is_found_by_twenty_rows(tmp_path):
     carried = carry(rows, read_campaign(days["tuesday"]), np.arange(len(rows)) < 20)
     (day,) = carried.sessions
     assert day.suffices
-    assert day.error[2] < 1.2
+    assert day.error.normalised < 1.2
     save(carried, tmp_path / "carried.toml")
     robot = read_robot(tmp_path / "carried.toml")
     known = read_covariance(robot)

@@ -117,4 +117,4 @@ def test_sessions_are_registered_one_by_one(tmp_path):
     )  # fmt: skip
     found = foretell(read_commands(folder, robot))
     assert len(nominal) == 16
-    assert found.error[0] < 1e-9
+    assert found.error.position < 1e-9

@@ -101,7 +101,7 @@ def hidden(tmp_path):
         found = diagnose(campaigns[0])
         save(found, tmp_path / "robot.toml")
         saved = read_robot(tmp_path / "robot.toml")
-        assert foretell(replace(campaigns[1], robot=saved)).error[2] < 1.1
+        assert foretell(replace(campaigns[1], robot=saved)).error.normalised < 1.1
         return table(found), made.effects[0].parameters
 
     return find

@@ -80,7 +80,7 @@ def assert_saved_predicts(found, tmp_path):
     save(found, tmp_path / "robot.toml")
     robot = read_robot(tmp_path / "robot.toml")
     told = foretell(replace(found.campaign, robot=robot).take(~found.outliers))
-    assert told.error[2] == pytest.approx(found.saved.normalised, rel=1e-6)
+    assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-6)
 
 
 def test_a_robot_saved_with_geometric_errors_reads_the_same(inaccurate, tmp_path):

@@ -66,9 +66,9 @@ def with_gain(campaign, gain):
 
 def test_a_known_gain_leaves_noise(rocking):
     """1 mrad at 0.7 m is some twenty sigma; 0.2 mrad of it too much, some four."""
-    assert foretell(rocking).error[2] > 8
-    assert 0.85 < foretell(with_gain(rocking, GAIN)).error[2] < 1.15
-    assert foretell(with_gain(rocking, 1.0)).error[2] > 2
+    assert foretell(rocking).error.normalised > 8
+    assert 0.85 < foretell(with_gain(rocking, GAIN)).error.normalised < 1.15
+    assert foretell(with_gain(rocking, 1.0)).error.normalised > 2
 
 
 def test_an_unknown_gain_is_learned(rocking):

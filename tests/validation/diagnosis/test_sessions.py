@@ -106,7 +106,9 @@ def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
     robot = read_robot(tmp_path / "found.toml")
     assert set(robot.session_effects) == set(ZEROS)
     again = foretell(read_commands(folder, robot))
-    assert again.error[2] == pytest.approx(found["error"]["saved"]["normalised"])
+    assert again.error.normalised == pytest.approx(
+        found["error"]["saved"]["normalised"]
+    )
 
 
 @pytest.mark.slow
@@ -144,7 +146,7 @@ def test_every_session_drifts_in_its_own_way(tmp_path):
     assert diagnosis.after.normalised < 1.1
     save(diagnosis, tmp_path / "found.toml")
     again = foretell(read_commands(folder, read_robot(tmp_path / "found.toml")))
-    assert again.error[2] == pytest.approx(diagnosis.saved.normalised)
+    assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
 @pytest.mark.slow
@@ -205,7 +207,7 @@ def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
     assert [f.session for f in robot.functions] == ["wet"]
     assert diagnosis.after.normalised < 1.2
     again = foretell(read_commands(folder, robot))
-    assert again.error[2] == pytest.approx(diagnosis.saved.normalised)
+    assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
 def test_a_covariate_of_one_table_alone_is_no_matter_where_nothing_depends_on_it(
