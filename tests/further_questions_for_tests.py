@@ -39,8 +39,8 @@ from tests.part_questions_for_tests import FUNCTIONS
 from tests.robots_for_tests import random_robot
 from tests.solids_for_tests import cylinder
 from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.lack_of_fit import trends
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.structure import trends
 
 TESTS = Path(__file__).parent
 

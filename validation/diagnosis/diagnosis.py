@@ -16,12 +16,11 @@ from forcefit.inputs.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut
-from validation.diagnosis.lack_of_fit import LackOfFit
+from validation.diagnosis.lack_of_fit import LackOfFit, Trend
 from validation.diagnosis.next_measurement import NextMeasurement
 from validation.diagnosis.noise_in_time import NoiseInTime
 from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.setup_blunders import SetupBlunder
-from validation.diagnosis.structure import Trend
 from validation.diagnosis.trace import Traced
 
 

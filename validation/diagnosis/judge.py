@@ -18,6 +18,7 @@ from validation.diagnosis.lack_of_fit import (
     LackOfFit,
     lack_of_fit,
     outlying,
+    trends,
 )
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.noise_in_time import NoiseInTime, noise_in_time, widened
@@ -25,7 +26,6 @@ from validation.diagnosis.plausible import implausible, impossible_rows
 from validation.diagnosis.prediction import predicted, residual_of
 from validation.diagnosis.sequence import errors_of, joined, pooled, stages
 from validation.diagnosis.signatures import whiten
-from validation.diagnosis.structure import trends
 from validation.diagnosis.text import text
 from validation.diagnosis.trace import FINITE, Traced
 from validation.diagnosis.verdict import NOT_ENOUGH, by_names, verdict

@@ -6,15 +6,15 @@ from scipy.stats import binom, f, kstest
 
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis import structure
+from validation.diagnosis import lack_of_fit as module
 from validation.diagnosis.lack_of_fit import (
     SIGNIFICANT,
     LackOfFit,
     lack_of_fit,
     outlying,
+    trends,
 )
 from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.structure import trends
 
 # is what is left noise?
 
@@ -223,14 +223,14 @@ def test_the_chance_of_a_trend_by_hand(rng):
     x, y = x - x.mean(), y - y.mean(axis=0)
     gone = np.sum((x @ y) ** 2) / (x @ x)
     ratio = (gone / 6) / ((np.sum(y**2) - gone) / (6 * 18))
-    tried = len(list(structure._candidates(campaign, here)))
+    tried = len(list(module._candidates(campaign, here)))
     chance = found["cov.humidity"].probability
     assert chance == pytest.approx(tried * f.sf(ratio, 6, 108), rel=1e-6)
 
 
 def test_noise_shows_a_trend_as_rarely_as_stated(rng, monkeypatch):
     """Over all trends tried; at 5 % instead of 0.1 %, so that 100 campaigns tell."""
-    monkeypatch.setattr(structure, "UNLIKELY", 0.05)
+    monkeypatch.setattr(module, "UNLIKELY", 0.05)
     alarms = 0
     for _ in range(100):
         campaign = varied(rng, 20)

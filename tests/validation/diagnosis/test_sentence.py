@@ -10,6 +10,7 @@ from assembly.model.function import Function
 from validation.diagnosis import sentence as module
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.holdout import HeldOut
+from validation.diagnosis.lack_of_fit import Trend
 from validation.diagnosis.report import _tiles
 from validation.diagnosis.sentence import (
     calibration_text,
@@ -17,7 +18,6 @@ from validation.diagnosis.sentence import (
     open_text,
     sentence,
 )
-from validation.diagnosis.structure import Trend
 
 
 def test_a_product_of_two_variables_names_both():

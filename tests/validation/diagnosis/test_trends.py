@@ -10,9 +10,9 @@ from scipy.stats import f
 from assembly.kinematics.posture import place_robot
 from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import bar
-from validation.diagnosis import structure
+from validation.diagnosis import lack_of_fit as module
+from validation.diagnosis.lack_of_fit import trends
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.structure import trends
 
 ROWS = 30
 
@@ -56,7 +56,7 @@ def functions(campaign):
     }  # fmt: skip
     for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):
         every[f"load.{name}"] = loads[:, k]
-    squares = {f"pose.{n}": p for n, p in zip(structure.POSE, pose.T, strict=True)}
+    squares = {f"pose.{n}": p for n, p in zip(module.POSE, pose.T, strict=True)}
     squares |= {"q.turn": turn, "q.slide": slide}
     for name, values in campaign.covariates.items():
         every[f"cov.{name}"] = values
@@ -93,8 +93,8 @@ def by_least_squares(X, z):
 
 
 def test_every_trend_is_an_f_test_of_what_its_name_says(varied, monkeypatch):
-    monkeypatch.setattr(structure, "UNLIKELY", 2.0)
-    monkeypatch.setattr(structure, "_MOST", 100)
+    monkeypatch.setattr(module, "UNLIKELY", 2.0)
+    monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
     every = functions(varied)
     # what stays zero is no function of the rows
@@ -124,18 +124,18 @@ def test_a_trend_knows_no_units(units, rng):
     """Each column may have its own; what is constant but for rounding is none."""
     x, y = rng.normal(size=(2, 9, 1))
     z = x + 0.5 * y + 0.1 * rng.normal(size=(9, 1))
-    expected = structure._test("x", np.hstack([x, y]), z, 1)
-    found = structure._test("x", np.hstack([units * x, y]), z, 1)
+    expected = module._test("x", np.hstack([x, y]), z, 1)
+    found = module._test("x", np.hstack([units * x, y]), z, 1)
     assert found.share == pytest.approx(expected.share, rel=1e-9)
     assert found.probability == pytest.approx(expected.probability, rel=1e-6)
-    assert structure._test("x", np.full((9, 1), units / 3), z, 1) is None
+    assert module._test("x", np.full((9, 1), units / 3), z, 1) is None
 
 
 def test_a_square_is_seen_however_far_from_zero(rng):
     """A megakelvin and up to one more, or half a second of time."""
     x = rng.uniform(0, 1, 40)
     z = ((x - 0.5) ** 2)[:, None]
-    assert structure._test("x", structure._powers(1e6 + x), z, 1).share > 1 - 1e-6
+    assert module._test("x", module._powers(1e6 + x), z, 1).share > 1 - 1e-6
     campaign = bar(rows=40, time=0.5 * x)
     rest = np.sin(2 * np.pi * x)[:, None] * campaign.sigma
     found = trends(campaign, conditions_of(campaign), rest)
@@ -144,7 +144,7 @@ def test_a_square_is_seen_however_far_from_zero(rng):
 
 def test_rows_of_one_moment_have_no_waves():
     campaign = bar(rows=9, time=np.full(9, 3.0))
-    names = [n for n, _ in structure._candidates(campaign, conditions_of(campaign))]
+    names = [n for n, _ in module._candidates(campaign, conditions_of(campaign))]
     assert "cov.time" in names
     assert "cov.time, slow waves" not in names
 
@@ -156,6 +156,6 @@ def test_what_cannot_be_tested_is_no_trend():
         (x[:3], x[:3] ** 2), (np.ones((5, 1)), x**2), (x, np.zeros((5, 1))),
         (x, np.full((5, 1), np.nan)),
     ):  # fmt: skip
-        assert structure._test("x", X, z, 1) is None
+        assert module._test("x", X, z, 1) is None
     # one more reading than that; so small that squares are less than one
-    assert structure._test("x", x[:4], 1e-3 * x[:4] ** 2, 1).share > 0.9
+    assert module._test("x", x[:4], 1e-3 * x[:4] ** 2, 1).share > 0.9
