@@ -19,6 +19,7 @@ from validation.diagnosis.learned_range import beyond_by_row
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import register
 from validation.diagnosis.sequence import Errors, errors_of, rms
+from validation.diagnosis.unknowns import effects_in, with_effects_in
 
 _MOVED = 3.0  # times as large a residual: the measuring device has been moved
 
@@ -151,15 +152,12 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
 
 def _unplaced(robot: Robot) -> Robot:
     """The robot without the place of any measuring frame."""
-
-    def without(effects: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
-        kept = {name: dict(values) for name, values in effects.items()}
+    for session in (None, *robot.session_effects):
+        effects = {name: dict(v) for name, v in effects_in(robot, session).items()}
         for name in BASE:
-            kept.get("registration", {}).pop(name, None)
-        return kept
-
-    sessions = {s: without(effects) for s, effects in robot.session_effects.items()}
-    return replace(robot, effects=without(robot.effects), session_effects=sessions)
+            effects.get("registration", {}).pop(name, None)
+        robot = with_effects_in(robot, session, effects)
+    return robot
 
 
 def _noise(commands: Campaign) -> NDArray:

@@ -33,7 +33,7 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
-from validation.correction.machine_numbers import MachineNumbers
+from validation.correction.machine_numbers import MachineNumbers, unchanging
 from validation.correction.session_unknowns import SessionUnknowns, without_session
 from validation.correction.spread import number_slopes
 from validation.diagnosis.gaussian import leave_block_out, marginalise
@@ -222,10 +222,9 @@ def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> Sessions
     Returns:
         The most probable values, by Gauss-Newton's method.
     """
-    fixed = replace(machine, numbers=(), root=np.zeros((0, 0)))
     told = [one.told for one in sessions]
     x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
-    held, _ = _settled(sessions, fixed, x, told, 1.0)
+    held, _ = _settled(sessions, unchanging(machine.robot), x, told, 1.0)
     widened, tau = _widened(sessions, machine, held, told)
     told = [max(one.told * tau**2, one.repeated) for one in sessions]
     x, C = _settled(

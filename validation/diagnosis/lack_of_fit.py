@@ -19,6 +19,7 @@ from scipy.stats import chi2, f
 from assembly.kinematics.posture import POSE, pose_components
 from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import LOAD, Campaign, number_rows
+from validation.diagnosis.noise import repeat_scatter
 from validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # probability by chance below which noise is not believed
@@ -35,7 +36,6 @@ class LackOfFit:
 
     Attributes:
         rms: [-] of the whitened residual, degrees of freedom counted.
-        freedom: [-] degrees of freedom.
         probability: that noise of the stated sigma leaves as much.
         repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
         repeats_freedom: [-] its degrees of freedom.
@@ -45,7 +45,6 @@ class LackOfFit:
     """
 
     rms: float
-    freedom: int
     probability: float
     repeats: float
     repeats_freedom: int
@@ -82,31 +81,23 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     """
     rss = float(residual @ residual)
     freedom = max(1, len(residual) - unknowns)
-    squares, between = _repeats(campaign, residual)
-    repeats = np.sqrt(squares / between) if between else np.nan
+    rows, columns = np.nonzero(campaign.cells)
+    group = np.ravel_multi_index(
+        (_alike(campaign)[rows], columns), campaign.cells.shape
+    )
+    repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # what repeats do not share with the rest: lack of fit over pure error, which
+        # what repeats do not share with the others: lack of fit over pure error, which
         # is nothing where a device rounds and repeats are equal
-        excess, pure = (rss - squares) / (freedom - between), squares / between
-        ratio = excess / pure if pure else (np.inf if excess > 0 else 0.0)
+        excess = (rss - between * repeats**2) / (freedom - between)
+        ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
     return LackOfFit(
-        float(np.sqrt(rss / freedom)), freedom, float(chi2.sf(rss, freedom)),
-        float(repeats), between, against, campaign.common is not None,
+        float(np.sqrt(rss / freedom)), float(chi2.sf(rss, freedom)),
+        repeats if between else float("nan"), between, against,
+        campaign.common is not None,
     )  # fmt: skip
-
-
-def _repeats(campaign: Campaign, residual: NDArray) -> tuple[float, int]:
-    """Squares between repeats under one condition, and their number."""
-    rows, columns = np.nonzero(campaign.cells)
-    alike = _alike(campaign)[rows], columns
-    group = np.ravel_multi_index(alike, campaign.cells.shape)
-    order = np.argsort(group, kind="stable")
-    _, start, count = np.unique(group[order], return_index=True, return_counts=True)
-    mean = np.add.reduceat(residual[order], start) / count
-    squares = np.add.reduceat((residual[order] - np.repeat(mean, count)) ** 2, start)
-    return float(squares[count > 1].sum()), int((count[count > 1] - 1).sum())
 
 
 def _alike(campaign: Campaign) -> NDArray:

@@ -1,16 +1,9 @@
 """Which effects a campaign's design can tell apart, before anything is fitted.
 
-An effect shows in the readings as a combination of its signature's columns.  Nuisances
-(an unknown registration) are projected out first: what they can imitate is lost.
-
-======  ============  =========  ==================================================
-symbol  code          shape      meaning
-======  ============  =========  ==================================================
-A_e     ``columns``   (N, k)     signature of effect e: change of the readings, in
-                                 sigma, at plausible sizes of its unknowns
-Q_e     ``basis``     (N, r)     orthonormal basis of what nuisances leave of A_e
-c_ef    ``shared``    (m, m)     share of e that f can imitate, |P_f A_e| / |A_e|
-======  ============  =========  ==================================================
+An effect shows in the readings as a combination of its signature's columns A.  What
+nuisances (an unknown registration) can imitate is lost: they are projected out first.
+With P_f the projection on the signature of effect f, |P_f A_e| / |A_e| is the share of
+effect e that f can imitate.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear

@@ -1,17 +1,8 @@
-r"""The unknown numbers of a machine, and the robot that has them.
+"""The unknown numbers of a machine, and the robot that has them.
 
 A diagnosis finds which numbers a robot file lacks: effects of the library, geometric
 errors, compliances of joints, functions.  Side by side they are a vector x, and every
 x is a robot, the one that can be saved.
-
-======  ==============  =========  ===================================================
-symbol  code            shape      meaning
-======  ==============  =========  ===================================================
-x       ``x``           (k,)       effects, geometric errors, compliances, functions
-m       ``mean``        (k,)       mean of the prior
-s       ``std``         (k,)       standard deviation of the prior, in the unit of x
-J       ``slopes``      (R, 6, k)  change of the readings per unit of x
-======  ==============  =========  ===================================================
 """
 
 from collections.abc import Mapping

@@ -48,7 +48,6 @@ def test_scatter_between_repeats_by_hand():
     found = lack_of_fit(campaign, whiten(campaign, seen), 1)
     assert found.repeats == pytest.approx(np.sqrt(2))
     assert found.repeats_freedom == 1
-    assert found.freedom == 2
     assert found.rms == pytest.approx(np.sqrt(2510 / 2))
 
 
@@ -70,14 +69,14 @@ def test_without_repeats_nothing_is_said_of_them():
     assert np.isnan(found.repeats)
     assert (found.repeats_freedom, found.against_repeats) == (0, 1.0)
     assert not found.sigma_too_small
-    assert (found.freedom, found.rms) == (27, pytest.approx(np.sqrt(30 / 27)))
-    assert lack_of_fit(campaign, np.ones(30), 40).freedom == 1
+    assert found.rms == pytest.approx(np.sqrt(30 / 27))
+    assert lack_of_fit(campaign, np.ones(30), 40).rms == pytest.approx(np.sqrt(30))
 
 
 @pytest.mark.parametrize(("repeats", "surely"), [(1.6, False), (1.8, True)])
 def test_repeats_speak_against_sigma_beyond_one_in_ten_thousand(repeats, surely):
     """20 degrees of freedom: 52.4 are exceeded that often; 51.2 and 64.8 are there."""
-    judged = LackOfFit(1.0, 90, 0.5, repeats, 20, 0.5)
+    judged = LackOfFit(1.0, 0.5, repeats, 20, 0.5)
     assert judged.sigma_too_small == surely
 
 
