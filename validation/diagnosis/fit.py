@@ -35,14 +35,14 @@ from scipy.optimize import lsq_linear
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.prediction import residual_of
+from validation.diagnosis.separability import ROUNDING
 from validation.diagnosis.unknowns import Acting, Unknowns
 from validation.diagnosis.whitening import whitening_of
 
-_STEPS = 20
+_STEPS = 20  # Gauss-Newton's, at most: most fits settle within ten
 _SLOPES = 6  # steps for which slopes are computed again
 _SHORTEST = 1 / 64  # of a step
 _SETTLED = 1e-3  # decrease of F that is none; F counts squared standard deviations
-_SEEN = 1e-9  # share of an unknown that the readings say and not its prior: none at all
 _NO_ANSWER = 1e3  # [sigma] residual of a reading for which the robot has no answer
 
 
@@ -92,7 +92,7 @@ class MachineFit:
 
     def seen(self, part: Acting) -> NDArray:
         """(k,) bool, unknowns of one effect that some reading depends on."""
-        return self.determined[self.unknowns.place(part)] > _SEEN
+        return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
 def fit_machine(

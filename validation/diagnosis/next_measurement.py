@@ -28,8 +28,8 @@ from validation.diagnosis.fit import MachineFit
 
 _TRIED = 240  # conditions looked at
 _FURTHER = 1.5  # of the range of loads and covariates used so far
-_STEP = 1e-3
-_AS_GOOD = 0.97
+_STEP = 1e-3  # of a standard deviation, for derivatives
+_AS_GOOD = 0.97  # of the largest non-centrality
 _DECIDES = 1.0  # [-] least non-centrality worth a measurement
 
 

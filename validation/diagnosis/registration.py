@@ -18,7 +18,7 @@ from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
 from validation.exchange.device_frame import fit_frame
 
-_FEWEST_POINTS = 3
+_FEWEST_POINTS = 3  # that fix a frame
 
 
 def device_frame(declared: Conditions) -> Hypothesis:

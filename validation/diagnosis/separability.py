@@ -17,11 +17,12 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from validation.diagnosis.signatures import UNSEEN
+
 LIKE = 0.98  # cosine above which a design cannot separate
 SEEN = 3.0  # [sigma] length a signature needs to stand out of the noise
-TRACE = 1e-3  # [sigma] a signature shorter than this is none
-ROUNDING = 1e-9  # relative singular value of a direction that others do as well
-_RANK = 1e-3  # likewise, of secants
+ROUNDING = 1e-9  # relative size of what is rounding: a direction that others do as well
+_RANK = 1e-3  # likewise of signatures, which are secants
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Separability:
     @property
     def traced(self) -> NDArray:
         """(m,) bool: would show if it were large enough."""
-        return (self.strength * self.left >= TRACE) & (self.rank > 0)
+        return (self.strength * self.left >= UNSEEN) & (self.rank > 0)
 
     @property
     def shows_at(self) -> NDArray:
