@@ -147,16 +147,24 @@ class Campaign:
         return np.array([places[name] for name in self.point])
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """R labels of rows of the file; rows that read points of one share it."""
+        if self.point is None:
+            return self.ids
+        pairs = zip(self.ids, self.point.tolist(), strict=True)
+        return tuple(i.removesuffix(f":{name}") if name else i for i, name in pairs)
+
+    @property
     def measured_at_once(self) -> NDArray:
         """(R,) int, the same for rows that read several points of one row of a file."""
-        labels = self.ids
-        if self.point is not None:
-            pairs = zip(labels, self.point.tolist(), strict=True)
-            labels = tuple(
-                i.removesuffix(f":{name}") if name else i for i, name in pairs
-            )
         number = dict[str, int]()
-        return np.array([number.setdefault(i, len(number)) for i in labels], dtype=int)
+        rows = [number.setdefault(label, len(number)) for label in self.labels]
+        return np.array(rows, dtype=int)
+
+    def in_session(self, session: str | None) -> NDArray:
+        """(R,) bool, rows of a session; of None all."""
+        every = np.ones(len(self), dtype=bool)
+        return every if session is None else np.asarray(self.session == session)
 
     def take(self, rows: ArrayLike | slice) -> "Campaign":
         """Some of the rows; ``configuration`` and ``repeat`` keep their numbers.

@@ -148,9 +148,7 @@ def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
     """(R,) bool, rows of a session, of which some but not all are set-up rows."""
-    own = np.ones(len(campaign), dtype=bool)
-    if session is not None:
-        own = np.asarray(campaign.session == session)
+    own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
     which = f"session {quoted(session)}" if session is not None else campaign.name

@@ -153,13 +153,9 @@ def _each_once(targets: Campaign) -> Campaign:
     """The commands without a row for each point read."""
     if targets.point is None:
         return targets
-    labels = [
-        label.removesuffix(f":{point}") if point else label
-        for label, point in zip(targets.ids, targets.point, strict=True)
-    ]
-    first = [labels.index(label) for label in dict.fromkeys(labels)]
-    chosen = replace(targets.take(first), points={}, point=None)
-    return replace(chosen, ids=tuple(dict.fromkeys(labels)))
+    labels = tuple(dict.fromkeys(targets.labels))
+    first = [targets.labels.index(label) for label in labels]
+    return replace(targets.take(first), points={}, point=None, ids=labels)
 
 
 def _driven(robot: Robot) -> NDArray:

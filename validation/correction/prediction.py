@@ -215,9 +215,9 @@ def reading_table(foretold: Foretold) -> str:
     more = {"std": foretold.spread, "noise": foretold.noise}
     more = {k: v for k, v in more.items() if foretold.spread.any()}
     values: dict[str, dict[str, object]] = {}
-    for i, full in enumerate(commands.ids):
+    for i, label in enumerate(commands.labels):
         point = "" if commands.point is None else str(commands.point[i])
-        row = values.setdefault(full.removesuffix(f":{point}") if point else full, {})
+        row = values.setdefault(label, {})
         for name, at, k in columns:
             if at == point:
                 row[name] = float(deviations[i, k])

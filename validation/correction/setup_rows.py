@@ -21,7 +21,7 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
     Raises:
         BadInput: neither a number of rows nor rows that are there.
     """
-    labels = [_label(campaign, i) for i in range(len(campaign))]
+    labels = list(campaign.labels)
     order = list(dict.fromkeys(labels))
     parts = [part.strip() for part in text.split(",")]
     if len(parts) == 1 and parts[0].isascii() and parts[0].isdigit():
@@ -31,22 +31,13 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
     return np.array([label in chosen for label in labels])
 
 
-def _label(campaign: Campaign, row: int) -> str:
-    """The label of a row in the file, the point taken off."""
-    point = "" if campaign.point is None else str(campaign.point[row])
-    return campaign.ids[row].removesuffix(f":{point}") if point else campaign.ids[row]
-
-
 def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
     """The first rows of every session."""
     chosen: set[str] = set()
-    sessions = campaign.session
     for session in campaign.sessions or (None,):
-        own = [
-            label for i, label in enumerate(labels)
-            if sessions is None or sessions[i] == session
-        ]  # fmt: skip
-        chosen |= set(list(dict.fromkeys(own))[:count])
+        own = zip(labels, campaign.in_session(session), strict=True)
+        there = dict.fromkeys(label for label, is_own in own if is_own)
+        chosen |= set(list(there)[:count])
     return chosen
 
 

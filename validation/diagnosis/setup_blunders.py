@@ -193,14 +193,13 @@ class _Judge:
         platform = moved.postures.platform[:, :3, :3]
         turns = rotation_matrix(deviation[:, :3]) @ platform
         left = np.full((len(points), 6), np.nan)
-        names = self.campaign.session
         for session in self.campaign.sessions or (None,):
-            own = slice(None) if names is None else names == session
+            own = self.campaign.in_session(session)
             R, shift = self._device(setup, points, turns, own)
             left[own, 3:] = setup.points[own] - points[own] @ R.T - shift
             gap = setup.turns[own] @ np.swapaxes(R @ turns[own], 1, 2)
             known = np.isfinite(gap).all(axis=(1, 2))
-            left[own, :3][known] = rotation_vector(gap[known])
+            left[np.flatnonzero(own)[known], :3] = rotation_vector(gap[known])
         sigma = self.given.sigma if stated else setup.sigma
         sizes = np.sort(np.abs(left / sigma)[self.cells])
         if not np.isfinite(sizes).all():
@@ -233,7 +232,7 @@ class _Judge:
         )
 
     def _device(
-        self, setup: SetUp, points: NDArray, turns: NDArray, own: slice | NDArray
+        self, setup: SetUp, points: NDArray, turns: NDArray, own: NDArray
     ) -> tuple[NDArray, NDArray]:
         """Rotation (3, 3) and shift (3,) [m] of the device, fitted where not known."""
         if self.campaign.registration == "known":

@@ -290,3 +290,16 @@ def test_commanded_places_in_another_unit_are_named(rng):
     (one,) = found(commanded_by_pose(machine, change))
     assert (one.kind, one.columns) == ("unit", ("pose.tx", "pose.ty", "pose.tz"))
     assert "times 0.03937" in one.sentence
+
+
+def test_orientations_alone_of_two_sessions_show_a_reversed_joint(rng):
+    """The device stands elsewhere in the second; no position was read."""
+    machine = Machine(rng, unknown=True)
+    machine.q[:, 4] *= -1
+    first = np.arange(ROWS) < 12
+    machine.turns[~first] = DEVICE.as_matrix() @ machine.turns[~first]
+    campaign = machine.campaign(rotations=True)
+    turns = np.where(np.arange(6) < 3, campaign.measured, np.nan)
+    session = np.where(first, "monday", "tuesday")
+    both = replace(campaign, measured=turns, session=session)
+    assert said(both) == {("sign", ("q.joint5",))}
