@@ -75,7 +75,8 @@ def judge(
     )
     outliers = traced.outliers | _outlying_held(campaign, traced, held, after)
     rows = held.rows & ~outliers
-    errors = [errors_of(campaign, residual, rows) for residual in (before, after)]
+    steps = pooled(campaign, every, rows)
+    errors = steps[first].error, steps[-1].error
     fit, correlated = _with_noise_in_time(traced.fitting, fit)
     left = residual_of(campaign, fit.robot)
     noisy = _noisy(campaign, traced)
@@ -130,7 +131,7 @@ def judge(
         uncertainty=_uncertainty(campaign, after, rows),
         noise_scale=(noise.tau, noise.tau_std),
         noise_in_time=correlated,
-        sequence=tuple(pooled(campaign, every, rows)),
+        sequence=tuple(steps),
         held=held,
         outliers=outliers,
         conditions=traced.conditions,
