@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from assembly.model.robot import Robot
@@ -121,8 +121,7 @@ def fit_machine(
         return whiten(unknowns.slopes(campaign, x)[cells] / sigma[:, None])
 
     x, A, left = _minimum(unknowns, residual, slopes, start)
-    root = _root(A * unknowns.std)
-    C = cho_solve((root, True), np.eye(len(x)), check_finite=False)
+    C = np.linalg.inv(_information(A * unknowns.std))
     covariance = C * np.outer(unknowns.std, unknowns.std)
     return MachineFit(unknowns, x, covariance, A, left)
 
@@ -165,7 +164,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     """(k,) Gauss-Newton step within the bounds, unknowns in units of their prior."""
     std = unknowns.std
     B = A * std
-    L = _root(B)
+    L = cholesky(_information(B), lower=True, check_finite=False)
     wanted = B.T @ left - (x - unknowns.mean) / std
     y = solve_triangular(L, wanted, lower=True, check_finite=False)
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
@@ -179,8 +178,8 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     return step * std
 
 
-def _root(B: NDArray) -> NDArray:
-    """(k, k) lower L with L L' = B'B + 1, for unknowns in units of their prior."""
+def _information(B: NDArray) -> NDArray:
+    """(k, k) B'B + 1, the inverse of C for unknowns in units of their prior."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
-    return cholesky(M, lower=True, check_finite=False)
+    return np.asarray(M)

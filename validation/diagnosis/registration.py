@@ -16,7 +16,6 @@ from validation.diagnosis.fit import fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.unknowns import Acting, Unknowns
-from validation.exchange.device_frame import fit_frame
 
 _FEWEST_POINTS = 3  # that fix a frame
 
@@ -76,7 +75,7 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     turned = answered & np.isfinite(campaign.measured[:, :3]).all(axis=1)
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
-    if not turned.any() and not _spread(thought):
+    if not turned.any() and not off_one_line(thought):
         raise BadInput(
             f"{campaign.name}: registration is unknown, and there are no rotations "
             f"nor {_FEWEST_POINTS} measured points off one line; expected either"
@@ -95,7 +94,7 @@ def device_rotation(
     """Rotation of a device by what it sees: the mean of rotations, else Kabsch's.
 
     Args:
-        points: (P, 3) [m] in the base's axes.
+        points: (P, 3) [m] in the base's axes, off one line if there are no rotations.
         seen: (P, 3) [m] the same in the device's.
         turns: (T, 3, 3) orientations in the base's axes.
         seen_turns: (T, 3, 3) the same in the device's.
@@ -106,11 +105,13 @@ def device_rotation(
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    return fit_frame(points, seen).rotation
+    # of two sets of points it is enough to centre one
+    centred = points - points.mean(axis=0)
+    return Rotation.align_vectors(seen, centred)[0].as_matrix()
 
 
-def _spread(points: NDArray) -> bool:
-    """Whether points lie off one line."""
+def off_one_line(points: NDArray) -> bool:
+    """Whether (P, 3) points fix a frame."""
     if len(points) < _FEWEST_POINTS:
         return False
     size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

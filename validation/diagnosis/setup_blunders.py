@@ -16,7 +16,7 @@ from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.registration import device_rotation
+from validation.diagnosis.registration import device_rotation, off_one_line
 from validation.diagnosis.setup_corrections import (
     Correction,
     SetUp,
@@ -243,7 +243,7 @@ class _Judge:
         turned = np.isfinite(setup.turns[own] + turns[own]).all(axis=(1, 2))
         both = turns[own][turned], setup.turns[own][turned]
         R = np.eye(3)
-        if turned.any() or len(seen) > 2:
+        if turned.any() or off_one_line(read):
             R = device_rotation(read, seen, *both)
         shift = np.median(seen - read @ R.T, axis=0) if len(seen) else np.zeros(3)
         return R, shift

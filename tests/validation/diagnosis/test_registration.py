@@ -10,9 +10,9 @@ from assembly.effects.registration import BASE
 from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import LENGTH, along, bar
 from validation.diagnosis.registration import (
-    _spread,
     coarse_frame,
     device_frame,
+    off_one_line,
     register,
 )
 from validation.diagnosis.signatures import conditions_of
@@ -98,9 +98,9 @@ def test_points_lie_off_a_line_by_a_thousandth_of_their_length(width, off, lengt
     """A rectangle anywhere, of any size: a plane's two sizes are its sides."""
     corners = length * np.array([[x, y, 0] for x in (0, 1.0) for y in (0, width)])
     turn = Rotation.from_rotvec([0.5, 0.2, -0.7])
-    assert _spread(turn.apply(corners) + [3.0, -2.0, 5.0]) is off
-    assert not _spread(corners[:2])
-    assert not _spread(np.zeros((0, 3)))
+    assert off_one_line(turn.apply(corners) + [3.0, -2.0, 5.0]) is off
+    assert not off_one_line(corners[:2])
+    assert not off_one_line(np.zeros((0, 3)))
 
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])
