@@ -36,7 +36,6 @@ _FAR = 10.0  # times the spread of the readings: no unit that places could have
 _NOISE = 3.0  # [sigma] of residual, below which nothing is looked for
 _LEAST = 100.0  # by which chi-square must fall for each blunder
 
-
 Corrections = tuple[Correction, ...]
 
 
@@ -135,9 +134,8 @@ def _needed(
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        if (
-            one.array == "loads"
-        ):  # small ones are no better where springs hardly respond
+        # where springs hardly respond, small loads are no better than none
+        if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
         if min(rivals) < _NEEDED * left:
             chosen, left = fewer, without

@@ -188,8 +188,7 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
     """Loads that are reactions, or in another unit."""
-    loaded = loaded_components(campaign)
-    names = tuple(f"load.{name}" for name in loaded)
+    names = tuple(f"load.{name}" for name in loaded_components(campaign))
     factors = [(-1.0, "with their signs reversed"), *_factors("load")]
     for factor, what in factors if names else ():
         kind = "sign" if factor < 0 else "unit"
