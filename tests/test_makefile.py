@@ -13,12 +13,13 @@ OWN = "{}.{}".format(*sys.version_info[:2])
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
 
 
-def commands(folder, stamp):
-    """What `make test` would do with an environment that has this stamp."""
-    for name in ("Makefile", "pyproject.toml"):
-        shutil.copy(ROOT / name, folder)
+def commands(folder, *stamps):
+    """What `make test` would do with an environment that has these stamps."""
+    for name in ("Makefile", "pyproject.toml", "CMakeLists.txt"):
+        shutil.copyfile(ROOT / name, folder / name)
     (folder / ".venv").mkdir()
-    (folder / ".venv" / stamp).touch()
+    for stamp in stamps:
+        (folder / ".venv" / stamp).touch()
     # where make itself runs the tests, its variables are not those of this call
     outer = ("MAKEFLAGS", "MAKEOVERRIDES", "MFLAGS", "PYTHON", "VENV")
     own = {name: value for name, value in os.environ.items() if name not in outer}
@@ -34,9 +35,16 @@ def test_an_environment_of_another_python_is_made_anew(tmp_path, stamp):
 
 
 def test_the_environment_of_the_same_python_is_kept(tmp_path):
-    found = commands(tmp_path, f"ready-{OWN}")
+    found = commands(tmp_path, f"empty-{OWN}", f"ready-{OWN}")
     assert "venv --clear" not in found
+    assert "pip install" not in found
     assert "pytest" in found
+
+
+def test_the_package_is_built_again_where_its_sources_are_newer(tmp_path):
+    found = commands(tmp_path, f"empty-{OWN}")
+    assert "venv --clear" not in found
+    assert "pip install" in found
 
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
