@@ -97,17 +97,14 @@ class Candidate:
 class Sensitivities:
     """How readings respond to a component at any place; the rows' variables."""
 
-    def __init__(
-        self, conditions: Conditions, robot: Robot, response: Responses
-    ) -> None:
+    def __init__(self, conditions: Conditions, response: Responses) -> None:
         """Keep what candidates are made of.
 
         Args:
             conditions: R rows as declared.
-            robot: the campaign's.
             response: of the readings there.
         """
-        self.conditions, self.robot, self._response = conditions, robot, response
+        self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
         self.basis = lru_cache(maxsize=None)(self._basis)

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY, apply_effects
-from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_second_order
 from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import Sensitivities
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import SPANS, blocks_of, drawn
@@ -24,7 +23,6 @@ from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declare
 from validation.diagnosis.joint_functions import joint_functions
 from validation.diagnosis.nuisance import Nuisance, nuisance
 from validation.diagnosis.registration import device_frame
-from validation.diagnosis.responses import responses
 from validation.diagnosis.session_hypotheses import (
     in_one_session,
     sessions_of,
@@ -66,7 +64,7 @@ class Columns:
     """
 
     def __init__(
-        self, campaign: Campaign, conditions: Conditions,
+        self, campaign: Campaign, derivatives: Derivatives,
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
@@ -74,26 +72,28 @@ class Columns:
 
         Args:
             campaign: of ``measured``, only the pattern of NaN is used.
-            conditions: of its rows, registered, with the second-order part.
+            derivatives: of its rows, registered, with the second-order part.
             update: progress callback: stage, steps done, steps in total.
             odds: factors on the prior odds of effects, of ``"function"``, and of
                 ``"geometry"`` and ``"springs"``, by name; 0 leaves something out.
         """
         self.odds = odds
-        self.campaign, self.conditions = campaign, conditions
+        self.campaign, self.conditions = campaign, derivatives.conditions
         self.row = np.nonzero(campaign.cells)[0]
         self.block = blocks_of(campaign)[0][self.row]
         self.visit = campaign.measured_at_once[self.row]
-        self.tangents = Tangents(campaign, conditions)
+        self.tangents = Tangents(campaign, derivatives)
         unknown = campaign.registration == "unknown"
-        self.device: Hypothesis | None = device_frame(conditions) if unknown else None
+        self.device: Hypothesis | None = (
+            device_frame(self.conditions) if unknown else None
+        )
         self.library = self._library(update)
-        self.response = responses(conditions)
-        self.motions = platform_motions(campaign, self.response.reading)
-        terms = small_terms(campaign, conditions, self.response)
+        response = derivatives.response
+        self.motions = platform_motions(campaign, response.reading)
+        terms = small_terms(campaign, self.conditions, response)
         terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
         self.nuisance: Nuisance = nuisance(terms, self._named())
-        self.sensitivities = Sensitivities(conditions, campaign.robot, self.response)
+        self.sensitivities = derivatives.sensitivities
         rows = np.unique(self.row)
         rows = rows[drawn(campaign.measured_at_once[rows], _SAMPLE)]
         self.sampled = np.isin(self.row, rows)

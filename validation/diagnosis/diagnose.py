@@ -29,7 +29,7 @@ from validation.diagnosis.judge import Judged, judge
 from validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
-from validation.diagnosis.trace import Traced, trace
+from validation.diagnosis.trace import Traced, declared, trace
 
 Update = Callable[[str, int, int], None]
 
@@ -73,6 +73,7 @@ def diagnose(
         BadInput: the measuring frame is not known and cannot be found.
     """
     held = hold_out(campaign)
+    design = declared(campaign, finite=finite)  # the same in all folds
 
     def found(rows: NDArray) -> _Found:
         part = hidden(campaign, ~rows)
@@ -81,7 +82,7 @@ def diagnose(
         # where there are some, anything else that is found would stand for them
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
-        return _Found(*trace(part, rows, update, finite=finite, odds=own), setup)
+        return _Found(*trace(part, design, rows, update, odds=own), setup)
 
     folds = []
     for k, rows in enumerate(held.folds):

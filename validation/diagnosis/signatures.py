@@ -16,22 +16,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects, apply_known
+from assembly.effects import apply_effects, apply_known
 from assembly.effects.effect import Values
 from assembly.effects.functions import covariates_of
 from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.measurement.variables import with_history
 from forcefit.inputs.errors import BadInput
 from validation.campaign.campaign import LOAD, Campaign
+from validation.diagnosis.derivatives import STEP, Derivatives
 from validation.diagnosis.hypotheses import Hypothesis, Slot
 
 _PROBED = 4  # rows
 _HARDLY = 2.0  # squared whitened change of all readings together
 UNSEEN = 1e-3  # [sigma] over all readings, of an unknown's own size
-_STEP = 1e-3  # of an unknown's plausible size, for its first derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,21 +103,19 @@ class Tangents:
 
     Attributes:
         campaign: of R rows, N measured cells.
-        conditions: as declared, with the registration if that was fitted.
-        declared: (N,) what they predict, whitened.
+        derivatives: of what is read in its rows.
+        declared: (N,) what is read without effects, whitened.
     """
 
-    def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
-        """Predict what the declared model reads.
+    def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
+        """Read what the declared model predicts.
 
         Args:
             campaign: what was measured.
-            conditions: under which conditions.
+            derivatives: of its conditions.
         """
-        self.campaign, self.conditions = campaign, conditions
-        prediction = predict(conditions)
-        self.declared = whiten(campaign, prediction.deviation)
-        self._columns: dict[object, NDArray] = {}
+        self.campaign, self.derivatives = campaign, derivatives
+        self.declared = whiten(campaign, derivatives.declared)
 
     @cached_property
     def residual(self) -> NDArray:
@@ -126,19 +123,8 @@ class Tangents:
         return whiten(self.campaign, self.campaign.measured) - self.declared
 
     def model(self, effects: Mapping[str, Values]) -> NDArray:
-        """What is read with effects, to first order in clearances.
-
-        Args:
-            effects: parameters by their public names, by effect.
-
-        Returns:
-            (N,) whitened; NaN where the model has no answer.
-        """
-        changed = apply_effects(self.conditions, effects)
-        settles = any(LIBRARY[name].clearance for name in effects)
-        if settles and changed.rest is None and not changed.exact:
-            changed, _ = with_clearances_taken_up(changed)
-        return whiten(self.campaign, predict(changed).deviation)
+        """(N,) whitened, what is read with effects; see :meth:`.Derivatives.model`."""
+        return whiten(self.campaign, self.derivatives.model(effects))
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
         """A hypothesis to first order where it begins to differ from what is declared.
@@ -171,13 +157,14 @@ class Tangents:
     def _invisible(self, hypothesis: Hypothesis) -> bool:
         """Whether an effect without unknowns hardly shows where loads are largest."""
         # the exact model is a hundred times slower than the linear one
-        load = np.linalg.norm(self.conditions.load, axis=1)
-        size = np.linalg.norm(predict(self.conditions).deviation[:, :3], axis=1)
+        conditions = self.derivatives.conditions
+        load = np.linalg.norm(conditions.load, axis=1)
+        size = np.linalg.norm(self.derivatives.declared[:, :3], axis=1)
         read = np.asarray(self.campaign.cells.any(axis=1))
         load, size = np.where(read, load, -1.0), np.where(read, size, -1.0)
         rows = np.unique([*np.argsort(-load)[:_PROBED], *np.argsort(-size)[:_PROBED]])
         rows = rows[read[rows]]
-        some, part = self.campaign.take(rows), self.conditions.take(rows)
+        some, part = self.campaign.take(rows), conditions.take(rows)
         changed = apply_effects(part, {hypothesis.effect: {}})
         change = predict(changed).deviation - predict(part).deviation
         size = whiten(some, change)
@@ -187,15 +174,8 @@ class Tangents:
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
         """(N,) derivative in one slot of one effect, where the effect begins."""
-        key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
-        if key not in self._columns:
-            step = _STEP * slot.unknown.scale
-            start = slot.unknown.start + step
-            values = {**shapes, **dict.fromkeys(slot.names, start)}
-            public = LIBRARY[effect].public(self.conditions.robot, values)
-            column = (self.model({effect: public}) - self.declared) / step
-            self._columns[key] = _seen(column, slot)
-        return self._columns[key]
+        begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
+        return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
@@ -210,7 +190,7 @@ class Tangents:
         Returns:
             The tangent.
         """
-        robot = self.conditions.robot
+        robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
             own = {hypothesis.effect: hypothesis.public(robot, values)}
@@ -221,7 +201,7 @@ class Tangents:
         columns = np.zeros((len(middle), len(x)))
         for k, slot in enumerate(hypothesis.slots):
             moved = x.copy()
-            step = _STEP * max(slot.unknown.scale, abs(x[k]))
+            step = STEP * max(slot.unknown.scale, abs(x[k]))
             moved[k] += step if moved[k] + step <= slot.unknown.upper else -step
             column = (model(moved) - middle) / (moved[k] - x[k])
             columns[:, k] = _seen(column, slot)

@@ -31,6 +31,7 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
 from validation.diagnosis.common_noise import NONE
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import drawn, hidden
 from validation.diagnosis.hypotheses import Hypothesis
@@ -161,17 +162,64 @@ def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
     return [Acting(there, values[places], s) for (there, places), s in own]
 
 
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """What a machine reads as its file declares it; no reading is asked.
+
+    Attributes:
+        conditions: of all rows, before any registration.
+        finite: whether motions of the declared model are finite.
+    """
+
+    conditions: Conditions
+    finite: bool
+
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Of what is read there, clearances of closed chains where they rest."""
+        return Derivatives(_at_rest(self.conditions))
+
+    def complete(self, conditions: Conditions) -> Conditions:
+        """Changed conditions with what finite motions add."""
+        complete = with_finite_motions if self.finite else with_second_order
+        return complete(conditions)
+
+
+def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
+    """What the file of a campaign's robot says of its rows.
+
+    Args:
+        campaign: of R rows.
+        finite: whether motions of the declared model are finite; they are too if the
+            file says so.
+
+    Returns:
+        The same whichever readings of the campaign are hidden.
+    """
+    conditions = conditions_of(campaign)
+    finite = finite or conditions.exact
+    whole = with_finite_motions if finite else with_second_order
+    return Declared(whole(conditions), finite)
+
+
+def _at_rest(conditions: Conditions) -> Conditions:
+    """Conditions with clearances of closed chains where they rest, found once."""
+    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
+        return with_rest_positions(conditions)
+    return conditions
+
+
 def trace(
-    campaign: Campaign, fitted: NDArray, update: Update, *, finite: bool = False,
+    campaign: Campaign, declared: Declared, fitted: NDArray, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Traced, MachineFit]:  # fmt: skip
     """Search for the effects and functions that a declared model lacks.
 
     Args:
         campaign: of R rows.
+        declared: of these rows.
         fitted: (R,) bool, the rows that are read.
         update: told what is done, how much of it and of how much.
-        finite: whether motions of the declared model are finite.
         odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
 
     Returns:
@@ -180,19 +228,16 @@ def trace(
     Raises:
         BadInput: the measuring frame is not known and cannot be found.
     """
-    declared = conditions_of(campaign)
-    finite = finite or declared.exact
-    complete = with_finite_motions if finite else with_second_order
-    declared = conditions = complete(declared)
     fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
-        conditions = register(campaign.take(fitted), conditions)
-    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
-        # where clearances of closed chains rest is found row by row, once
-        conditions = with_rest_positions(conditions)
+        registered = register(campaign.take(fitted), declared.conditions)
+        derivatives = Derivatives(_at_rest(registered))
+    else:
+        derivatives = declared.derivatives
     sample = hidden(campaign, ~_searched_rows(campaign, fitted))
-    conditions = _with_its_errors(sample, declared, conditions, fitted, complete)
-    columns = Columns(sample, conditions, update, odds)
+    derivatives = _with_its_errors(sample, declared, derivatives, fitted)
+    conditions = derivatives.conditions
+    columns = Columns(sample, derivatives, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     for turn in range(_TURNS):
         cells = (fitted & ~blunders)[columns.row]
@@ -202,7 +247,7 @@ def trace(
         selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
             campaign, declared, conditions, fitted & ~blunders, cells, selected,
-            columns, finite,
+            columns,
         )  # fmt: skip
         traced = replace(traced, outliers=traced.outliers | blunders)
         fit = _fitted(traced)
@@ -211,7 +256,7 @@ def trace(
         if gross.any() and few and turn < _TURNS - 1:
             blunders = blunders | gross
             continue
-        bent = _with_errors(conditions, fit, complete) if bends < _BENDS else None
+        bent = _with_errors(conditions, fit, declared) if bends < _BENDS else None
         if bent is None or not _differs(campaign, bent, read, fitted):
             break
         conditions, bends = bent, bends + 1
@@ -240,12 +285,12 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 
 
 def _with_its_errors(
-    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
-    complete: Callable[[Conditions], Conditions],
-) -> Conditions:  # fmt: skip
+    campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
+) -> Derivatives:
     """Conditions with what finite geometric errors add, before anything is searched."""
+    conditions = derivatives.conditions
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
-    columns = Columns(campaign, conditions, odds=alone)
+    columns = Columns(campaign, derivatives, odds=alone)
     cells = fitted[columns.row]
     for _ in range(_BENDS + 1):
         read = predict(conditions).deviation
@@ -253,14 +298,15 @@ def _with_its_errors(
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
         traced = _traced(
-            campaign, declared, conditions, fitted, known, selected, columns, False
+            campaign, declared, conditions, fitted, known, selected, columns
         )
         fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
-        bent = _with_errors(conditions, fit, complete)
+        bent = _with_errors(conditions, fit, declared)
         if bent is None or not _differs(campaign, bent, read, fitted):
             break
         conditions = bent
-    return conditions
+    same = conditions is derivatives.conditions
+    return derivatives if same else Derivatives(conditions)
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
@@ -288,8 +334,8 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
 
 
 def _traced(
-    campaign: Campaign, declared: Conditions, conditions: Conditions, fitted: NDArray,
-    cells: NDArray, selected: Selected, columns: Columns, finite: bool,
+    campaign: Campaign, declared: Declared, conditions: Conditions, fitted: NDArray,
+    cells: NDArray, selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
     """What was found, with the sigma that was believed and rows that are blunders."""
     weights = np.ones(len(columns.row))
@@ -308,13 +354,13 @@ def _traced(
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
         campaign=replace(campaign, sigma=sigma, common=common),
-        unregistered=declared,
+        unregistered=declared.conditions,
         conditions=conditions,
         used=fitted & ~outliers,
         outliers=outliers,
         selected=selected,
         columns=columns,
-        finite=finite,
+        finite=declared.finite,
     )
 
 
@@ -337,9 +383,8 @@ def _size(fit: MachineFit, one: Acting) -> float:
 
 
 def _with_errors(
-    conditions: Conditions, fit: MachineFit,
-    complete: Callable[[Conditions], Conditions],
-) -> Conditions | None:  # fmt: skip
+    conditions: Conditions, fit: MachineFit, declared: Declared
+) -> Conditions | None:
     """Conditions with what finite motions add to the geometric errors found."""
     if not any(part.name == GEOMETRY for part in fit.unknowns.small):
         return None
@@ -347,7 +392,7 @@ def _with_errors(
     own = [conditions.robot.index(frame.name) for frame in frames]
     errors = conditions.errors.copy()
     errors[:, own] += fit.robot.errors - fit.unknowns.robot.errors
-    added = complete(replace(conditions, errors=errors)).second_order
+    added = declared.complete(replace(conditions, errors=errors)).second_order
     return replace(conditions, second_order=added)
 
 

@@ -10,6 +10,7 @@ from assembly.effects import LIBRARY
 from assembly.effects.registration import BASE
 from forcefit.inputs.table import BadInput
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis, hypotheses
 from validation.diagnosis.registration import register
 from validation.diagnosis.signatures import Tangents, conditions_of, loaded_components
@@ -58,7 +59,7 @@ def design_signatures(
             conditions = register(campaign, conditions)
         except BadInput as error:
             unregistered = str(error)
-    tangents = Tangents(campaign, conditions)
+    tangents = Tangents(campaign, Derivatives(conditions))
     shown = _one_each(hypotheses(conditions, loaded_components(campaign)))
     columns, untestable = {}, {}
     for done, name in enumerate(LIBRARY):
@@ -143,7 +144,7 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
             scale = slot.unknown.scale
             size = slot.start + scale if effect.linear else scale
             values = {**rest, **shapes, **dict.fromkeys(slot.names, size)}
-            public = effect.public(tangents.conditions.robot, values)
+            public = effect.public(tangents.derivatives.conditions.robot, values)
             columns.append(tangents.model({effect.name: public}) - tangents.declared)
     return np.column_stack(columns)
 

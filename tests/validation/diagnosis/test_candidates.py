@@ -35,7 +35,7 @@ def arm_sensitivities(folder, bend):
     (folder / "arm.toml").write_text(ARM)
     campaign = read_commands(table, read_robot(folder / "arm.toml"))
     conditions = conditions_of(campaign)
-    return Sensitivities(conditions, campaign.robot, responses(conditions)), q
+    return Sensitivities(conditions, responses(conditions)), q
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_a_power_that_is_the_one_below_it_but_for_rounding_is_left_out(width, ke
     """Of 1 + w and 1 - w, whose sine to a constant is w; a hundred millionth counts."""
     campaign = bar(rows=36, temperature=1.0 + width * np.tile([-1.0, 1.0], 18))
     conditions = conditions_of(campaign)
-    s = Sensitivities(conditions, campaign.robot, responses(conditions))
+    s = Sensitivities(conditions, responses(conditions))
     columns, mixed = s.basis(("cov.temperature",), LINE)
     assert mixed.shape == (2, kept)
     np.testing.assert_allclose(columns.T @ columns / 36, np.eye(kept), atol=1e-5)
@@ -178,7 +178,7 @@ def test_what_a_component_does_by_place(axis):
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
     response = responses(conditions)
-    s = Sensitivities(conditions, campaign.robot, response)
+    s = Sensitivities(conditions, response)
     place, name = LENGTH * along(campaign), AXES[axis]
     unit = np.tile(np.eye(6)[axis], (8, 1))
     unit[:, 3:] += np.cross(unit[:, :3], place)
@@ -198,7 +198,7 @@ def test_a_column_has_mean_square_one_in_any_unit(units):
     heat = units * np.array([3.0, -1, 2, 0.5, 4, -2, 1, 0.1])
     campaign = bar(temperature=heat)
     conditions = conditions_of(campaign)
-    s = Sensitivities(conditions, campaign.robot, responses(conditions))
+    s = Sensitivities(conditions, responses(conditions))
     columns, _ = s.basis(("cov.temperature",), CandidateShape("powers", ("1",)))
     expected = heat / np.sqrt(np.mean(heat**2))
     np.testing.assert_allclose(columns[:, 0], expected, rtol=1e-12)

@@ -12,6 +12,7 @@ from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_po
 from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign import number_rows
 from validation.diagnosis.columns import Columns
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.lack_of_fit import lack_of_fit
 from validation.diagnosis.results import table
@@ -49,7 +50,7 @@ CAMPAIGN = three_points(time=60.0 * np.random.default_rng(0).permutation(VISITS)
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
 
 
 def moved(campaign, sizes, rng):
@@ -95,7 +96,7 @@ def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
 def test_points_measured_at_once_are_drawn_together():
     """Of 600 rows some 500 score functions first: all three of a measurement."""
     campaign = three_points(200)
-    columns = Columns(campaign, with_second_order(conditions_of(campaign)))
+    columns = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
     rows = np.unique(columns.row[columns.sampled])
     visits, count = np.unique(campaign.measured_at_once[rows], return_counts=True)
     assert 480 < len(rows) <= 500

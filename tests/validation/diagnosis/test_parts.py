@@ -19,6 +19,7 @@ from tests.bar_for_tests import (
     bar,
     fit_of,
 )
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.registration import coarse_frame, register
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import Tangents, conditions_of, whiten
@@ -117,7 +118,7 @@ def test_each_session_has_a_device_of_its_own():
 def test_a_length_has_the_same_tangent_about_any_value(x):
     """1 / sigma along the bar, and nothing at zero; another length beside it too."""
     campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     expected = whiten(campaign, fit_of(campaign, 1.0))
     beside = {"encoder_offset": {"drive": 1e-9}}
     for found in (
@@ -133,7 +134,7 @@ def test_a_tangent_about_an_upper_bound_is_taken_below_it():
     """Of an expansion: the bar's length times 5 K, and never more than allowed."""
     heat = {"temperature": np.full(8, 5.0)}
     campaign = bar(link=BEAM, **heat)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     model, tried = tangents.model, []
 
     def watched(effects):

@@ -8,6 +8,7 @@ import pytest
 from assembly.measurement.predict import with_second_order
 from tests.bar_for_tests import BEAM, LENGTH, bar
 from validation.diagnosis.columns import Columns
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.relinearise import Relinearisation
 from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.states import Fitting
@@ -18,7 +19,7 @@ CAMPAIGN = bar(link=BEAM, rows=20, spread=5.0)
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
 
 
 def moved():
@@ -71,7 +72,7 @@ def test_a_model_finds_values_that_a_linear_one_misses(columns):
 
 def test_a_spring_that_is_a_drives_compliance_is_no_nuisance(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
-    known = Columns(loaded, with_second_order(conditions_of(loaded)))
+    known = Columns(loaded, Derivatives(with_second_order(conditions_of(loaded))))
     small, robot = known.nuisance, CAMPAIGN.robot
     springs = {
         (robot.frames[f].name, int(axis))

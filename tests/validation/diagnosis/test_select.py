@@ -8,6 +8,7 @@ import pytest
 from assembly.measurement.predict import with_second_order
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from validation.diagnosis.columns import Columns
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.elements import Dense
 from validation.diagnosis.noise import FREEDOM
 from validation.diagnosis.search import Search
@@ -23,7 +24,7 @@ ACROSS = np.cross([0, 0, 1], along(CAMPAIGN))
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, with_second_order(conditions_of(CAMPAIGN)))
+    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
 
 
 def turned(angle):
@@ -88,7 +89,7 @@ def test_blunders_are_left_out(columns):
 
 def test_no_reading_is_looked_at_but_those_given(columns):
     other = replace(CAMPAIGN, measured=np.full((ROWS, 6), 1.0))
-    same = Columns(other, with_second_order(conditions_of(other)))
+    same = Columns(other, Derivatives(with_second_order(conditions_of(other))))
     readings = turned(np.full(ROWS, 3e-4))
     one, two = found(columns, readings), found(same, readings)
     assert one.models == two.models
@@ -116,7 +117,7 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
     campaign = replace(campaign, measured=measured)
-    known = Columns(campaign, with_second_order(conditions_of(campaign)))
+    known = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
     assert (("drive", "rz", "screw"),) not in known.functions.places.names
     assert (("tip", "tx", "screw"),) in known.functions.places.names + [
         p for equal in known.functions.places.equal for p in equal

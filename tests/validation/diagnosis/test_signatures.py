@@ -11,6 +11,7 @@ from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import BEAM, LONGER, TURNED, bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis import signatures as module
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import (
     Tangents,
@@ -64,7 +65,7 @@ def test_the_residual_is_the_reading_less_what_is_declared():
     seen[2:4, 1] = np.nan
     robot = plain.robot.with_errors(errors)
     campaign = replace(plain, robot=robot, measured=seen)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     expected = (fit_of(plain, 2e-4) / SIGMA)[np.isfinite(seen)]
     assert tangents.residual == pytest.approx(expected, abs=1e-9)
     assert len(tangents.declared) == 46
@@ -91,7 +92,7 @@ def test_an_effect_without_unknowns_is_looked_at_where_loads_are_large(
     loads = np.zeros((rows, 6))
     loads[[3, 9, 20, 30], 4] = 10.0
     campaign = replace(bar(rows=rows), loads=loads)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     finite = Hypothesis(FINITE, (), ())
     seen = []
 
@@ -114,7 +115,7 @@ def test_an_effect_without_unknowns_is_looked_at_where_loads_are_large(
 
 def test_an_effect_without_an_answer_is_invisible(monkeypatch):
     campaign = bar([0, 0, 0, 0, 5.0, 0])
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     finite = Hypothesis(FINITE, (), ())
 
     def unanswered(conditions, effects):
@@ -131,9 +132,9 @@ def test_a_visible_effect_without_unknowns_is_an_offset():
     """Of a soft drive that turns far, finite motions say much."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     found = tangents.at_start(Hypothesis(FINITE, (), ()))
-    exact = predict(replace(tangents.conditions, exact=True)).deviation
+    exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
     assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
     assert found.columns.shape == (48, 0)
 
@@ -146,7 +147,7 @@ def test_clearances_of_an_effect_are_taken_up_in_the_linear_model(
 ):
     """Where they are not held already."""
     campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     settled = []
 
     def settle(conditions):
@@ -154,7 +155,7 @@ def test_clearances_of_an_effect_are_taken_up_in_the_linear_model(
         return conditions, None
 
     held = None if rest is None else np.zeros((8, 2, 6))
-    plain = tangents.conditions
+    plain = tangents.derivatives.conditions
     changed = replace(plain, rest=held, exact=exact)
     monkeypatch.setattr(module, "apply_effects", lambda conditions, effects: changed)
     monkeypatch.setattr(module, "with_clearances_taken_up", settle)
@@ -167,7 +168,7 @@ def test_clearances_of_an_effect_are_taken_up_in_the_linear_model(
 def test_columns_are_taken_once(monkeypatch):
     """And again for another effect."""
     campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     model, asked = tangents.model, []
 
     def watched(effects):

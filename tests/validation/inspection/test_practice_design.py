@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from examples.campaign_folder import data_folder
 from forcefit.inputs.table import BadInput
 from validation.campaign.campaign_file import read_campaign
+from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.signatures import Tangents, conditions_of
 from validation.inspection.inspection import inspect_campaign
 
@@ -51,7 +52,7 @@ def test_signatures_have_the_angles_of_the_exact_program(name, inspections):
     }
     campaign = inspections[name].campaign
     columns = inspections[name].signatures.columns
-    tangents = Tangents(campaign, conditions_of(campaign))
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
     done = tangents.model(hidden) - tangents.declared if hidden else None
     compared = 0
     for other in TRUTH[name]["alternatives"] if hidden else ():

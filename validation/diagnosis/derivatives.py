@@ -1,0 +1,83 @@
+"""What a machine reads under declared conditions, and how that changes with effects.
+
+It depends on the design of a campaign and on none of its readings, so that searches of
+the same conditions share it: the folds of a diagnosis, above all.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+from numpy.typing import NDArray
+
+from assembly.effects import LIBRARY, apply_effects
+from assembly.effects.effect import Values
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import predict
+from assembly.measurement.settled_clearance import with_clearances_taken_up
+from validation.diagnosis.candidates import Sensitivities
+from validation.diagnosis.hypotheses import Slot
+from validation.diagnosis.responses import Responses, responses
+
+STEP = 1e-3  # of an unknown's plausible size, for its first derivative
+
+
+class Derivatives:
+    """Readings of R rows, near what is declared; each is computed once.
+
+    Attributes:
+        conditions: as declared, with the registration if that was fitted.
+    """
+
+    def __init__(self, conditions: Conditions) -> None:
+        """Compute nothing yet."""
+        self.conditions = conditions
+        self._begun: dict[object, NDArray] = {}
+
+    @cached_property
+    def declared(self) -> NDArray:
+        """(R, 6) [rad, m] what is read without effects."""
+        return predict(self.conditions).deviation
+
+    @cached_property
+    def response(self) -> Responses:
+        """How the readings answer small screws at all frames."""
+        return responses(self.conditions)
+
+    @cached_property
+    def sensitivities(self) -> Sensitivities:
+        """How the readings answer functions at all places."""
+        return Sensitivities(self.conditions, self.response)
+
+    def model(self, effects: Mapping[str, Values]) -> NDArray:
+        """What is read with effects, to first order in clearances.
+
+        Args:
+            effects: parameters by their public names, by effect.
+
+        Returns:
+            (R, 6) [rad, m]; NaN where the model has no answer.
+        """
+        changed = apply_effects(self.conditions, effects)
+        settles = any(LIBRARY[name].clearance for name in effects)
+        if settles and changed.rest is None and not changed.exact:
+            changed, _ = with_clearances_taken_up(changed)
+        return predict(changed).deviation
+
+    def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
+        """(R, 6) [rad, m] where one number of an effect is a step off its start.
+
+        Args:
+            effect: its name.
+            slot: the number.
+            shapes: values of the unknowns that shape the effect.
+
+        Returns:
+            The readings.
+        """
+        key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
+        if key not in self._begun:
+            start = slot.unknown.start + STEP * slot.unknown.scale
+            values = {**shapes, **dict.fromkeys(slot.names, start)}
+            public = LIBRARY[effect].public(self.conditions.robot, values)
+            self._begun[key] = self.model({effect: public})
+        return self._begun[key]
