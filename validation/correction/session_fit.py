@@ -36,8 +36,7 @@ from validation.campaign.campaign import Campaign
 from validation.correction.machine_numbers import MachineNumbers, unchanging
 from validation.correction.session_unknowns import SessionUnknowns, without_session
 from validation.correction.spread import number_slopes
-from validation.diagnosis.gaussian import leave_block_out, marginalise
-from validation.diagnosis.noise import scale
+from validation.diagnosis.gaussian import leave_block_out, marginalise, scale
 from validation.diagnosis.prediction import finite_conditions
 from validation.diagnosis.registration import coarse_frame
 from validation.diagnosis.separability import orthonormal_basis

@@ -30,7 +30,7 @@ from assembly.measurement.variables import LOADS, variable
 from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import Responses
 
 TURN, SHIFT = AXES[:3], AXES[3:]

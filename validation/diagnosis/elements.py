@@ -211,7 +211,7 @@ class Dense:
             bounded = np.array([m == 1 and elements[i].bounded[0] for i in own])
             self._groups.append((np.array(own), B, gram, most, bounded))
 
-    def gains(self, marginal: Marginal, freedom: float) -> NDArray:
+    def gains(self, marginal: Marginal) -> NDArray:
         """Return the log evidence ratio of adding each element to a model."""
         gains = np.full(len(self.elements), -np.inf)
         for own, B, gram, most, bounded in self._groups:
@@ -223,13 +223,13 @@ class Dense:
             )
             left = gram - shown.transpose(0, 2, 1) @ shown
             along = (marginal.held @ B).reshape(len(own), m)
-            gains[own] = evidence_gains(left, along, most, bounded, marginal, freedom)
+            gains[own] = evidence_gains(left, along, most, bounded, marginal)
         n = len(marginal.held)
         for i, o in self._offsets:
             factor_columns = marginal.factor_columns.T @ o
             Q = marginal.squares - 2 * float(marginal.held @ o) + float(o @ o)
             Q -= float(factor_columns @ factor_columns)
-            change = deviance(marginal.squares, n, freedom) - deviance(Q, n, freedom)
+            change = deviance(marginal.squares, n) - deviance(Q, n)
             gains[i] = 0.5 * float(change)
         return gains
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from validation.campaign.campaign import Campaign
-from validation.diagnosis import shapes as forms
+from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
@@ -36,7 +36,7 @@ from validation.diagnosis.candidates import (
     variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
-from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.gaussian import Marginal, evidence_gains
 from validation.diagnosis.places import Places, Weighted, Where
 
@@ -86,7 +86,7 @@ class _Scored:
 
 
 def _likeliest(
-    parts: Mapping[int, Sequence[_Scored]], marginal: Marginal, freedom: float
+    parts: Mapping[int, Sequence[_Scored]], marginal: Marginal
 ) -> list[tuple[float, int, int, int]]:
     """Return score, request, form and place of the functions, best first."""
     scores, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
@@ -94,7 +94,7 @@ def _likeliest(
         gains = evidence_gains(
             np.concatenate([p.gram for p in own]),
             np.concatenate([p.along for p in own]),
-            np.concatenate([p.most for p in own]), False, marginal, freedom,
+            np.concatenate([p.most for p in own]), False, marginal,
         )  # fmt: skip
         scores.append(gains + np.concatenate([p.prior for p in own]))
         whose += [p.whose for p in own]
@@ -161,7 +161,7 @@ class Functions:
         """Return all forms of one or two variables with their log priors."""
         known = self.known(*variables)
         if len(variables) == 1:
-            shapes = forms.every(known, variables[0], "compliance")
+            shapes = forms.every(known, variables[0])
         else:
             both = forms.of_two(known, *variables)
             shapes = [] if both is None else both[1]
@@ -213,7 +213,7 @@ class Functions:
         return list(requests.items())
 
     def look(
-        self, marginal: Marginal, weighted: Weighted, freedom: float,
+        self, marginal: Marginal, weighted: Weighted,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
         """Return the functions that improve a model most.
@@ -221,7 +221,6 @@ class Functions:
         Args:
             marginal: model, in the cells of ``weighted``.
             weighted: responses at all places.
-            freedom: degrees of freedom of the noise scale's prior.
             requests: variables with their forms.
             most: number of functions for each request.
 
@@ -244,7 +243,7 @@ class Functions:
                 parts.setdefault(one.along.shape[1], []).append(one)
         best: list[ScoredFunction] = []
         each: dict[int, int] = {}
-        for score, number, k, where in _likeliest(parts, marginal, freedom):
+        for score, number, k, where in _likeliest(parts, marginal):
             each[number] = each.get(number, 0) + 1
             if each[number] <= most:
                 variables, shapes = requests[number]

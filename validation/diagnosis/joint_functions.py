@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from assembly.effects.friction_hysteresis import elastic_joints
 from assembly.effects.functions import AXES
 from assembly.effects.places import drives
-from validation.diagnosis import shapes as forms
+from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import Candidate, CandidatePart, places_of
 from validation.diagnosis.elements import Element
-from validation.diagnosis.forms_tried import CandidateShape, is_angle
+from validation.diagnosis.function_forms import CandidateShape, is_angle
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.gaussian import SIZES
 

@@ -1,7 +1,7 @@
 """Noise: its scale beside the stated sigma, and blunders.
 
 A reading is good, with N(0, tau^2), or with a probability of one in five thousand a
-blunder, thirty times as wide.  tau^2 follows a scaled inverse chi-square about 1.
+blunder, thirty times as wide.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-FREEDOM = 20.0  # degrees of freedom of the prior of tau^2 about 1
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # standard deviation of blunders over tau
 _LEFT_OUT = 1e-12  # relative precision of a blunder
@@ -130,10 +129,3 @@ def _in_common(common: tuple[float, float]) -> list[tuple[float, str]]:
     """Return sizes of a motion in common that are not zero, with their units."""
     listed = [(common[1], "um"), (common[0], "urad")]
     return [one for one in listed if one[0] > 0]
-
-
-def scale(squares: float, count: int) -> tuple[float, float]:
-    """Return the estimate of tau and its standard deviation."""
-    freedom = FREEDOM + count
-    tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
-    return float(tau), float(tau / np.sqrt(2 * freedom))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
-from validation.diagnosis.gaussian import deviance, size_penalty
+from validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
 _STEPS = 25
@@ -59,7 +59,7 @@ class Sizes:
 
 
 def best_sizes(
-    gram: NDArray, along: NDArray, squares: float, count: int, freedom: float,
+    gram: NDArray, along: NDArray, squares: float, count: int,
     group: NDArray, given: NDArray, most: NDArray, start: dict[int, float],
     eigen: Mapping[int, Eigen] = MappingProxyType({}),
 ) -> Sizes:  # fmt: skip
@@ -70,7 +70,6 @@ def best_sizes(
         along: (k,) inner products with the readings.
         squares: sum of squares of the readings.
         count: n, number of readings.
-        freedom: degrees of freedom of the noise scale's prior.
         group: (k,) group of each unknown.
         given: (k,) fixed standard deviation, or NaN.
         most: (k,) largest plausible standard deviation.
@@ -99,10 +98,10 @@ def best_sizes(
         for g, which in own.items():
             std[which] = size[g]
         now = turned.posterior(std, squares)
-        value = -0.5 * (float(deviance(now.left, count, freedom)) + now.log_det)
+        value = -0.5 * (float(deviance(now.left, count)) + now.log_det)
         if value > worth:
             worth, best = value, (now, dict(size))
-        precision, change = (freedom + count) / (freedom + now.left), 0.0
+        precision, change = (FREEDOM + count) / (FREEDOM + now.left), 0.0
         for g, which in own.items():
             seen = max(float(now.determined[which].sum()), 1e-9)
             step = np.sqrt(precision * float((now.x[which] ** 2).sum()) / seen)

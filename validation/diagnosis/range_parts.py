@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.variables import variable
 from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.gaussian import Marginal
+from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.states import State
 
 PARTS = 5
@@ -62,21 +62,9 @@ def range_error(
             continue
         levels = np.quantile(np.unique(x), np.linspace(0, 1, PARTS + 1)[1:-1])
         part = np.searchsorted(levels, x, side="right")
-        errors = [_rms(_left_out(s.marginal, part)) for s in (without, best)]
+        errors = [_rms(leave_block_out(s.marginal, part)[0]) for s in (without, best)]
         found.append(RangeError(name, *errors))
     return max(found, key=lambda one: one.after, default=None)
-
-
-def _left_out(marginal: Marginal, part: NDArray) -> NDArray:
-    """(n,) errors of parts foretold by the others: (1 - U U')^-1 C^-1 z of each."""
-    errors = np.empty_like(marginal.held)
-    for number in np.unique(part):
-        own = part == number
-        U, held = marginal.factor_columns[own], marginal.held[own]
-        inner = np.eye(U.shape[1]) - U.T @ U
-        # Woodbury's identity: as many equations as columns
-        errors[own] = held + U @ np.linalg.lstsq(inner, U.T @ held, rcond=None)[0]
-    return errors
 
 
 def _rms(values: NDArray) -> float:

@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis import shapes as forms
+from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
 from validation.diagnosis.functions import Request, ScoredFunction
-from validation.diagnosis.noise import FREEDOM, cell_weights
+from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.places import Weighted
 from validation.diagnosis.relinearise import Relinearisation
 from validation.diagnosis.states import MORE, Fitting, State
@@ -147,8 +147,8 @@ class Search:
     ) -> list[tuple[float, Element]]:
         """Return the best elements to add, with estimates of the log posterior."""
         listed = [*self.library.elements, *self.explicit.elements]
-        some = self.explicit.gains(state.sample_marginal, FREEDOM)
-        gains = [self.library.gains(state.marginal, FREEDOM), self._more * some]
+        some = self.explicit.gains(state.sample_marginal)
+        gains = [self.library.gains(state.marginal), self._more * some]
         score = np.concatenate(gains) + np.array([e.log_prior for e in listed])
         have = {e.name for e in state.elements if e.name}
         counts: dict[str, int] = {}
@@ -189,7 +189,7 @@ class Search:
     ) -> list[ScoredFunction]:
         """Return the best functions to add; scores are scaled to all rows."""
         found = self.functions.look(
-            state.sample_marginal, self.weighted, FREEDOM, requests, most
+            state.sample_marginal, self.weighted, requests, most
         )
         scaled = [
             replace(f, score=self._more * (f.score - f.log_prior) + f.log_prior)
@@ -246,9 +246,7 @@ class Search:
             e = e or self.functions.element(candidate, priors[candidate.shape])
             if e is None:
                 continue
-            gain = Dense([e], self.fit.cells, self.fit.whiten).gains(
-                base.marginal, FREEDOM
-            )
+            gain = Dense([e], self.fit.cells, self.fit.whiten).gains(base.marginal)
             best.append((float(gain[0]) + e.log_prior, e))
             best = sorted(best, key=lambda scored: -scored[0])[:4]
         base.forget()
@@ -263,7 +261,7 @@ class Search:
 
         def gain(e: Element) -> float:
             dense = Dense([e], self.fit.cells, self.fit.whiten)
-            return float(dense.gains(base.marginal, FREEDOM)[0])
+            return float(dense.gains(base.marginal)[0])
 
         best = gain(e)
         variables, conditions = one.parts[0].variables, self.functions.conditions

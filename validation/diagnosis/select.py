@@ -18,13 +18,13 @@ from assembly.effects.forms import FORMS
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.common_noise import NONE, common_sizes, stable
 from validation.diagnosis.elements import Element, label
+from validation.diagnosis.gaussian import scale
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
     findings,
     probability_good,
     repeat_scatter,
-    scale,
 )
 from validation.diagnosis.range_parts import range_error
 from validation.diagnosis.search import Search, Update, names_of

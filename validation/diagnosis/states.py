@@ -23,8 +23,8 @@ from validation.diagnosis.gaussian import (
     deviance,
     leave_block_out,
     marginalise,
+    scale,
 )
-from validation.diagnosis.noise import FREEDOM, scale
 from validation.diagnosis.prior_sizes import Sizes, best_sizes
 from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
@@ -227,7 +227,7 @@ class Fitting(WeightedReadings):
             ])
             sizes = best_sizes(
                 gram, np.append(small_z[used], with_z), float(z @ z),
-                self.count, FREEDOM,
+                self.count,
                 np.append(small.group[used], _GROUPS + element),
                 np.append(small.given[used], given), np.append(small.most[used], most),
                 begin, eigen,
@@ -247,7 +247,7 @@ class Fitting(WeightedReadings):
     ) -> float:
         """Return the log posterior up to a constant."""
         small = self.columns.nuisance
-        evidence = float(deviance(sizes.squares, self.count, FREEDOM)) + sizes.log_det
+        evidence = float(deviance(sizes.squares, self.count)) + sizes.log_det
         score = -0.5 * evidence - sizes.cost
         for spring, cost in ((False, IN_USE[0]), (True, IN_USE[1])):
             declared = small.declared and not spring

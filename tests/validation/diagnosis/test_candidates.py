@@ -19,7 +19,7 @@ from validation.diagnosis.candidates import (
     places_of,
     variables_of,
 )
-from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import conditions_of
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from validation.diagnosis.gaussian import scale
 from validation.diagnosis.noise import (
     findings,
     probability_good,
     repeat_scatter,
-    scale,
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.campaigns_for_tests import campaign_of
 from validation.diagnosis.candidates import Candidate, CandidatePart
-from validation.diagnosis.forms_tried import CandidateShape
+from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.gaussian import marginalise
 from validation.diagnosis.range_parts import PARTS, range_error
 from validation.diagnosis.signatures import conditions_of

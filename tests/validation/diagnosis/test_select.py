@@ -10,7 +10,6 @@ from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.elements import Dense
-from validation.diagnosis.noise import FREEDOM
 from validation.diagnosis.search import Search
 from validation.diagnosis.select import select
 from validation.diagnosis.signatures import conditions_of
@@ -106,7 +105,7 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
         columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
     ]
     dense = Dense(made, search.fit.cells, search.fit.whiten)
-    alone = dense.gains(search.empty[-1].marginal, FREEDOM)
+    alone = dense.gains(search.empty[-1].marginal)
     together = np.array([f.score - f.log_prior for f in looked])
     assert len(looked) > 50
     assert together == pytest.approx(alone, rel=1e-6)
