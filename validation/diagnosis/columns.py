@@ -19,22 +19,23 @@ from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import SPANS, blocks_of, drawn
-from validation.diagnosis.hypotheses import Hypothesis, hypotheses, with_declared
-from validation.diagnosis.joint_functions import joint_functions
-from validation.diagnosis.nuisance import Nuisance, nuisance
-from validation.diagnosis.registration import device_frame
-from validation.diagnosis.session_hypotheses import (
+from validation.diagnosis.hypotheses import (
+    Hypothesis,
+    hypotheses,
     in_one_session,
     sessions_of,
+    with_declared,
     with_sessions,
 )
+from validation.diagnosis.joint_functions import joint_functions
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS, nuisance
+from validation.diagnosis.registration import device_frame
 from validation.diagnosis.signatures import (
     Signature,
     Tangents,
     loaded_components,
     whiten,
 )
-from validation.diagnosis.small_terms import small_terms
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
 FUNCTION = "function"
@@ -90,9 +91,10 @@ class Columns:
         self.library = self._library(update)
         response = derivatives.response
         self.motions = platform_motions(campaign, response.reading)
-        terms = small_terms(campaign, self.conditions, response)
-        terms = [term for term in terms if odds.get(term.name, 1.0) > 0.0]
-        self.nuisance: Nuisance = nuisance(terms, self._named())
+        kinds = [k for k in (GEOMETRY, SPRINGS) if odds.get(k, 1.0) > 0.0]
+        self.nuisance = nuisance(
+            campaign, self.conditions, response, self._named(), kinds
+        )
         self.sensitivities = derivatives.sensitivities
         rows = np.unique(self.row)
         rows = rows[drawn(campaign.measured_at_once[rows], _SAMPLE)]

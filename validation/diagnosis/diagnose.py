@@ -26,9 +26,9 @@ from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut, hidden, hold_out
 from validation.diagnosis.judge import Judged, judge
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.trace import Traced, declared, trace
 
 Update = Callable[[str, int, int], None]

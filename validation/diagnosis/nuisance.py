@@ -1,17 +1,29 @@
-"""Nuisance parameters: geometric errors of frames and springs of joints.
+"""Nuisance parameters: small unknowns that every machine has, geometry and springs.
 
-Random springs describe compliance that is spread over many joints.  A spring with the
-same column as a single unknown of a library effect is removed: it is that effect.
+Nobody makes a frame exactly where it was drawn, and nothing is rigid.  Each of these
+unknowns has a Gaussian prior about what is declared: from the frame's ``tolerance``, or
+of one size for all of a group that the readings are asked for.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Container
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS, SmallTerm
+from assembly.kinematics.nominal import size_of
+from assembly.measurement.conditions import Conditions
+from assembly.model.links import in_series
+from assembly.model.robot import Robot
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.responses import Responses
+from validation.diagnosis.signatures import UNSEEN, whiten
 
+GEOMETRY, SPRINGS = "geometry", "springs"
+KINDS = ("rotation", "translation")
+LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
+LARGEST_SHIFT = 0.1  # of the robot's size, likewise
+_ROUNDING = 1e-9  # of the largest column of a group
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 
@@ -20,58 +32,137 @@ class Nuisance:
     """k unknowns of geometric errors and springs.
 
     Attributes:
-        columns: (N, k) whitened change of the readings per unknown.
-        group: (k,) 0 and 1 rotations and translations of frames, 2 and 3 of springs.
+        columns: (N, k) change of the whitened readings per unknown.
+        spring: (k,) whether it is a spring; its compliance cannot be negative.
+        frame, axis: (k,) row of the frame in the campaign's robot, and component of the
+            screw there, 0 to 5.
         given: (k,) declared standard deviation, or NaN.
         most: (k,) largest plausible standard deviation.
-        frame, axis: (k,) row of the frame and component of the screw.
     """
 
     columns: NDArray
-    group: NDArray
-    given: NDArray
-    most: NDArray
+    spring: NDArray
     frame: NDArray
     axis: NDArray
+    given: NDArray
+    most: NDArray
 
     @property
-    def spring(self) -> NDArray:
-        """(k,) whether it is a spring; its compliance cannot be negative."""
-        return self.group >= 2
+    def group(self) -> NDArray:
+        """(k,) 0 and 1 rotations and translations of frames, 2 and 3 of springs."""
+        return 2 * self.spring + self.axis // 3
 
     @property
     def declared(self) -> bool:
         """Whether the robot declares tolerances; geometric errors are then in use."""
         return bool(np.isfinite(self.given).any())
 
+    def take(self, unknowns: NDArray) -> "Nuisance":
+        """Some of the unknowns, by a mask (k,) or numbers."""
+        return Nuisance(
+            self.columns[:, unknowns], self.spring[unknowns], self.frame[unknowns],
+            self.axis[unknowns], self.given[unknowns], self.most[unknowns],
+        )  # fmt: skip
 
-def nuisance(terms: Sequence[SmallTerm], named: NDArray) -> Nuisance:
-    """Collect the nuisance parameters, without springs that are library effects.
+
+def nuisance(
+    campaign: Campaign, conditions: Conditions, response: Responses, named: NDArray,
+    kinds: Container[str] = (GEOMETRY, SPRINGS),
+) -> Nuisance:  # fmt: skip
+    """Geometric errors and springs of a campaign's robot.
+
+    Random springs describe compliance that is spread over many joints: one with the
+    same column as a single unknown of a library effect is that effect, and left out.
 
     Args:
-        terms: of geometry, of springs, both or none.
+        campaign: of R rows, N measured cells.
+        conditions: its conditions as declared.
+        response: of the readings there.
         named: (N, c) columns of single unknowns of library effects.
+        kinds: which of the two there are.
 
     Returns:
-        The parameters in the order of the terms.
+        The unknowns that show in the readings.
     """
-    unit = named / np.maximum(np.linalg.norm(named, axis=0), 1e-300)
-    kept = []
-    for term in terms:
-        if term.name == SPRINGS:
-            size = np.maximum(np.linalg.norm(term.columns, axis=0), 1e-300)
-            same = np.abs(unit.T @ (term.columns / size)) > _SAME
-            term = term.take(np.flatnonzero(~same.any(axis=0)))
-        kept.append(term)
-    kept = [term for term in kept if len(term)]
-    numbers = {GEOMETRY: 0, SPRINGS: 2}
-    group = [numbers[t.name] + t.axis // 3 for t in kept]
-    most = [np.array(t.most)[t.axis // 3] for t in kept]
-    return Nuisance(
-        columns=np.hstack([np.zeros((len(named), 0)), *(t.columns for t in kept)]),
-        group=np.concatenate([np.zeros(0, int), *group]),
-        given=np.concatenate([np.zeros(0), *(t.given for t in kept)]),
-        most=np.concatenate([np.zeros(0), *most]),
-        frame=np.concatenate([np.zeros(0, int), *(t.frame for t in kept)]),
-        axis=np.concatenate([np.zeros(0, int), *(t.axis for t in kept)]),
+    robot, n = campaign.robot, len(campaign.robot.frames)
+    own = [conditions.robot.index(frame.name) for frame in robot.frames]
+    screws, carried = response.screws[:, :, own], response.wrenches[:, own]
+    # what closures meet at, and the platform, have no spring of their own
+    carried[:, [not _may_give(robot, f.name) for f in robot.frames]] = 0.0
+    changes = np.concatenate([screws, screws * carried[:, None]], axis=2)
+    given = np.full((2 * n, 6), np.nan)
+    for row, frame in enumerate(robot.frames):
+        if frame.tolerance is not None:
+            given[row] = frame.tolerance
+    axis = np.tile(np.arange(6), 2 * n)
+    spring = np.repeat([False, True], 6 * n)
+    largest = LARGEST_TURN, LARGEST_SHIFT * size_of(robot)
+    every = Nuisance(
+        columns=whiten(campaign, changes.reshape(*changes.shape[:2], -1)),
+        spring=spring,
+        frame=np.tile(np.repeat(np.arange(n), 6), 2),
+        axis=axis,
+        given=given.ravel(),
+        most=np.where(spring, np.inf, np.array(largest)[axis // 3]),
     )
+    wanted = np.array([GEOMETRY in kinds, SPRINGS in kinds])
+    shown = every.take(visible(every) & wanted[every.spring.astype(int)])
+    return shown.take(~(shown.spring & _is_among(shown.columns, named)))
+
+
+def _may_give(robot: Robot, name: str) -> bool:
+    """Whether a frame may have a joint stiffness."""
+    return name != robot.platform and all(name not in pair for pair in robot.closures)
+
+
+def visible(small: Nuisance) -> NDArray:
+    """(k,) bool, unknowns that show beside the others of their group, and at all."""
+    size = np.linalg.norm(small.columns, axis=0)
+    largest = np.zeros(4)
+    np.maximum.at(largest, small.group, size)
+    # a tolerance of zero says that a direction is exact
+    shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
+    return np.asarray(shown & (size > UNSEEN / small.most))
+
+
+def _is_among(columns: NDArray, named: NDArray) -> NDArray:
+    """(k,) bool, columns (N, k) that are equal to some of others but for their size."""
+    unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
+    return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
+
+
+def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
+    """A robot whose geometric errors are larger by x (k,) [rad, m] at frames and axes.
+
+    Args:
+        robot: any.
+        frame: (k,) rows of frames.
+        axis: (k,) components of the screw there, 0 to 5.
+        x: (k,) what is added.
+
+    Returns:
+        The robot.
+    """
+    errors = robot.errors.copy()
+    np.add.at(errors, (frame, axis), x)
+    return robot.with_errors(errors)
+
+
+def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
+    """A robot with compliances x (k,) in series with its joints; 0 changes nothing.
+
+    Args:
+        robot: any.
+        frame: (k,) rows of frames.
+        axis: (k,) components of the screw there, 0 to 5.
+        x: (k,) [rad/(N m), m/N].
+
+    Returns:
+        The robot.
+    """
+    frames = list(robot.frames)
+    for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):
+        if c > 0.0:
+            K = in_series(frames[i].resistance, a, c)
+            frames[i] = replace(frames[i], joint_stiffness=K)
+    return replace(robot, frames=tuple(frames))

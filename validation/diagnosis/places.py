@@ -21,7 +21,7 @@ from validation.diagnosis.candidates import (
     places_of,
 )
 from validation.diagnosis.gaussian import SIZES
-from validation.diagnosis.small_terms import LARGEST_SHIFT, LARGEST_TURN
+from validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
 from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind

@@ -18,7 +18,7 @@ from assembly.effects import LIBRARY
 from assembly.kinematics.nominal import size_of
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.small_terms import (
+from validation.diagnosis.nuisance import (
     GEOMETRY,
     KINDS,
     LARGEST_SHIFT,

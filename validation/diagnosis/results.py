@@ -11,10 +11,10 @@ from validation.campaign.campaign import READING
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.claims import Parameter, parameters_of
 from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.nuisance import GEOMETRY, KINDS, SPRINGS
 from validation.diagnosis.saving import functions_of
 from validation.diagnosis.sentence import WORDS, formula, sentence
 from validation.diagnosis.sequence import LEARNED
-from validation.diagnosis.small_terms import GEOMETRY, KINDS, SPRINGS
 
 LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
 _HARDLY = 0.05  # of an unknown known: its frame is not listed

@@ -23,7 +23,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import write_bytes
 from validation.campaign.campaign import READING
 from validation.diagnosis.fit import MachineFit
-from validation.diagnosis.small_terms import GEOMETRY, with_error
+from validation.diagnosis.nuisance import GEOMETRY, with_error
 from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_in
 
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (

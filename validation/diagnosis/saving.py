@@ -19,8 +19,8 @@ from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.learned_range import learned_range
+from validation.diagnosis.nuisance import GEOMETRY
 from validation.diagnosis.saved_covariance import covariance_of, write_covariance
-from validation.diagnosis.small_terms import GEOMETRY
 from validation.diagnosis.unknowns import Small
 
 

@@ -9,8 +9,8 @@ from assembly.effects.functions import columns_of, parameters_of
 from assembly.model.function import Function
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.saving import functions_of
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.verdict import NOT_ENOUGH
 
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}

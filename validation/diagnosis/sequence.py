@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import MachineFit, fit_machine
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.prediction import residual_of
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Unknowns
 
 LEARNED = "learned effects"

@@ -93,9 +93,9 @@ def loaded_components(campaign: Campaign) -> list[str]:
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """(N,) deviations (R, 6) of the measured cells in units of their sigma."""
-    cells = campaign.cells
-    return deviation[cells] / campaign.sigma[cells]
+    """(N, ..) deviations (R, 6, ..) of the measured cells in units of their sigma."""
+    some = deviation[campaign.cells]
+    return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 class Tangents:

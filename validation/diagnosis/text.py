@@ -6,9 +6,9 @@ from typing import Any
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.next_measurement import load_text
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.results import table
 from validation.diagnosis.sentence import WORDS, calibration_text, open_text
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 
 Table = dict[str, Any]
 

@@ -34,17 +34,16 @@ from validation.diagnosis.common_noise import NONE
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import drawn, hidden
-from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.hypotheses import Hypothesis, in_one_session, sessions_of
 from validation.diagnosis.lack_of_fit import outlying
 from validation.diagnosis.noise import cell_weights
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.registration import register
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
-from validation.diagnosis.session_hypotheses import in_one_session, sessions_of
 from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.states import prediction_gain
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
 

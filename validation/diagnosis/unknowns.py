@@ -21,9 +21,9 @@ from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import Candidate, Sensitivities
 from validation.diagnosis.hypotheses import Hypothesis
+from validation.diagnosis.nuisance import GEOMETRY, with_compliance, with_error
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.small_terms import GEOMETRY, with_compliance, with_error
 
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
 _BEND = 0.5  # of a number in which a function is not linear, likewise; and its bound

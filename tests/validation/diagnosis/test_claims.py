@@ -24,7 +24,7 @@ from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis.claims import supported
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.hypotheses import Hypothesis, Slot
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 SURE = norm.isf(0.5e-3)  # standard deviations that chance exceeds once in a thousand

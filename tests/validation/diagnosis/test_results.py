@@ -11,9 +11,9 @@ from tests.bar_for_tests import LONGER, TURNED, bar
 from validation.diagnosis import results as module
 from validation.diagnosis.candidates import CandidatePart
 from validation.diagnosis.fit import MachineFit
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.range_parts import RangeError
 from validation.diagnosis.sequence import Errors, Step
-from validation.diagnosis.small_terms import GEOMETRY, SPRINGS
 from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 

@@ -8,18 +8,16 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import LENGTH, along, bar
-from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis.responses import responses
-from validation.diagnosis.signatures import conditions_of, whiten
-from validation.diagnosis.small_terms import (
-    GEOMETRY,
-    SPRINGS,
-    _term,
-    small_terms,
+from validation.diagnosis.nuisance import (
+    Nuisance,
+    nuisance,
+    visible,
     with_compliance,
     with_error,
 )
+from validation.diagnosis.responses import responses
+from validation.diagnosis.signatures import conditions_of, whiten
 
 LOAD = [0.0, 0, 4.0, 0, 0, 30.0]
 
@@ -31,6 +29,14 @@ def loaded():
     return campaign, conditions, responses(conditions)
 
 
+def of_both_kinds(campaign, conditions, response):
+    """Geometric errors and springs, none of which is an effect of the library."""
+    small = nuisance(
+        campaign, conditions, response, np.zeros((campaign.cells.sum(), 0))
+    )
+    return small.take(~small.spring), small.take(small.spring)
+
+
 def column(campaign, screws):
     """Whitened readings of screws (R, 6) of the tip, base axes."""
     return (screws / SIGMA).ravel()
@@ -39,15 +45,12 @@ def column(campaign, screws):
 def test_columns_are_what_a_unit_of_each_does(loaded):
     """A drive turned about z, a tip shifted along itself; springs times the moment."""
     campaign, conditions, response = loaded
-    geometry, springs = small_terms(campaign, conditions, response)
-    assert (geometry.name, springs.name) == (GEOMETRY, SPRINGS)
-    assert (geometry.lower, springs.lower) == (-np.inf, 0.0)
-    assert not (geometry.sure)
-    assert not (springs.sure)
+    geometry, springs = of_both_kinds(campaign, conditions, response)
+    assert not geometry.declared
+    assert not springs.declared
     # 0.2 rad and a tenth of the longest body
-    assert geometry.most == pytest.approx((0.2, 0.1 * LENGTH))
-    assert springs.most == (np.inf, np.inf)
-    assert len(geometry) == 12
+    assert geometry.most == pytest.approx([*[0.2] * 3, *[0.1 * LENGTH] * 3] * 2)
+    assert (springs.most == np.inf).all()
     by_place = dict(
         zip(zip(geometry.frame.tolist(), geometry.axis.tolist(), strict=True),
             geometry.columns.T, strict=True)
@@ -75,16 +78,15 @@ def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
               campaign.robot.frames[1])  # fmt: skip
     campaign = replace(campaign, robot=replace(campaign.robot, frames=frames))
     conditions = conditions_of(campaign)
-    geometry, springs = small_terms(campaign, conditions, responses(conditions))
+    geometry, springs = of_both_kinds(campaign, conditions, responses(conditions))
     own = geometry.frame == 0
     assert geometry.axis[own].tolist() == [0, 2, 3, 5]
     np.testing.assert_array_equal(geometry.given[own], [1e-3, 1e-3, 2e-4, 1e-4])
-    assert geometry.group[own].tolist() == [-1, -1, -1, -1]
-    assert geometry.group[~own].tolist() == [0, 0, 0, 1, 1, 1]
-    assert geometry.sure
-    assert not springs.sure
-    some = geometry.take(own, slice(0, 6))
-    assert (some.columns.shape, len(some)) == ((6, 4), 4)
+    assert np.isnan(geometry.given[~own]).all()
+    assert geometry.group.tolist() == [0, 0, 1, 1, 0, 0, 0, 1, 1, 1]
+    assert geometry.declared
+    assert not springs.declared
+    assert geometry.take(own).columns.shape == (48, 4)
 
 
 def test_what_is_not_loaded_or_not_read_has_no_unknowns():
@@ -93,7 +95,8 @@ def test_what_is_not_loaded_or_not_read_has_no_unknowns():
     seen[:, 3] = 0.0
     campaign = bar(measured=seen)
     conditions = conditions_of(campaign)
-    (geometry,) = small_terms(campaign, conditions, responses(conditions))
+    geometry, springs = of_both_kinds(campaign, conditions, responses(conditions))
+    assert not len(springs.frame)
     places = set(zip(geometry.frame.tolist(), geometry.axis.tolist(), strict=True))
     assert places == {(0, 2), (0, 3), (1, 3), (1, 4)}
     assert geometry.columns.shape == (8, 4)
@@ -102,9 +105,9 @@ def test_what_is_not_loaded_or_not_read_has_no_unknowns():
 def test_columns_add_up_to_what_a_robot_with_them_reads(loaded):
     """Errors and springs of a size that is small, built into the robot."""
     campaign, conditions, response = loaded
-    geometry, springs = small_terms(campaign, conditions, response)
+    geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
-    x, c = 1e-6 * rng.normal(size=len(geometry)), 1e-8 * rng.uniform(0.5, 1, 4)
+    x, c = 1e-6 * rng.normal(size=len(geometry.frame)), 1e-8 * rng.uniform(0.5, 1, 4)
     robot = with_error(campaign.robot, geometry.frame, geometry.axis, x)
     robot = with_compliance(robot, springs.frame, springs.axis, c)
     there = conditions_of(replace(campaign, robot=robot))
@@ -131,30 +134,41 @@ def test_springs_of_passive_joints_leave_their_own_motion_free():
     assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
 
 
+def of_sizes(sizes, most=(np.inf, np.inf)):
+    """Geometric errors at one frame after another whose columns have sizes (n, 6)."""
+    count = sizes.size
+    axis = np.tile(np.arange(6), len(sizes))
+    columns = np.zeros((4, count))
+    columns[2] = sizes.ravel()
+    return Nuisance(
+        columns, np.zeros(count, bool), np.repeat(np.arange(len(sizes)), 6), axis,
+        np.full(count, np.nan), np.array(most)[axis // 3],
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("units", [1.0, 1e6])
 @pytest.mark.parametrize("kind", [0, 1])
 def test_an_unknown_shows_beside_the_largest_of_its_own_kind(kind, units):
     """By a billionth of that, whatever those of the other kind show."""
     largest = units * np.array([5e3, 3e-3])
     shares = np.array([1.0, 1.1e-9, 0.9e-9])
-    changes = np.zeros((4, 6, 2, 6))
+    sizes = np.zeros((2, 6))
     for each in (0, 1):
-        sizes = largest[each] * (shares if each == kind else np.ones(3))
-        changes[1, 2, 1, 3 * each + np.arange(3)] = sizes
-    campaign = campaign_of(np.zeros((4, 6)))
-    term = _term(campaign, "any", changes, np.full((2, 6), np.nan), -np.inf)
+        own = largest[each] * (shares if each == kind else np.ones(3))
+        sizes[1, 3 * each + np.arange(3)] = own
+    small = of_sizes(sizes)
+    shown = small.take(visible(small))
     expected = [3 * kind, 3 * kind + 1, *(3 * (1 - kind) + np.arange(3))]
-    assert term.frame.tolist() == [1] * 5
-    assert term.axis.tolist() == sorted(expected)
+    assert shown.frame.tolist() == [1] * 5
+    assert shown.axis.tolist() == sorted(expected)
 
 
 @pytest.mark.parametrize("most", [(0.2, 5.0), (1e-4, 3.0), (2.0, 1e-3)])
 def test_an_unknown_must_show_a_thousandth_of_sigma_at_its_largest(most):
     """Of rotations and of translations as large as each may be."""
-    changes = np.zeros((4, 6, 1, 6))
+    sizes = np.zeros((1, 6))
     for axis in range(6):
         above = 1.01 if axis % 3 else 0.99
-        changes[2, 1, 0, axis] = above * 1e-3 / most[axis // 3]
-    campaign = campaign_of(np.zeros((4, 6)))
-    term = _term(campaign, "any", changes, np.full((1, 6), np.nan), 0.0, most)
-    assert term.axis.tolist() == [1, 2, 4, 5]
+        sizes[0, axis] = above * 1e-3 / most[axis // 3]
+    small = of_sizes(sizes, most)
+    assert small.axis[visible(small)].tolist() == [1, 2, 4, 5]
