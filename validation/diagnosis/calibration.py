@@ -52,7 +52,7 @@ def calibrate(
     traced = diagnosis.traced
     cells = traced.used[traced.columns.row]
     best = traced.selected.states[0]
-    fit = best.fit
+    fit = best.readings
     truth = tuple(sorted(e.name for e in best.elements if e.name))
     rng = np.random.default_rng(0)
     tally: dict[bool, Counter[str]] = {False: Counter(), True: Counter()}

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from validation.diagnosis.gaussian import size_penalty
-from validation.diagnosis.states import IN_USE, Fitting, State
+from validation.diagnosis.states import IN_USE, Models, State
+from validation.diagnosis.weighted_readings import NONE
 
-NONE = (0.0, 0.0)
 _STEP = 1.0  # of the logarithms of both sizes, at the start
 _CLOSE = 0.05  # of a logarithm, that ends the search
 _LEAST = 0.02  # [sigma] contribution to the readings that is none
@@ -35,16 +35,14 @@ def common_sizes(state: State) -> tuple[float, float]:
         [rad, m] standard deviations of rotation and translation over the noise's scale;
         zero for what is not better than none by more than its cost.
     """
-    fit = state.fit
-    cells = fit.cells.copy()
-    cells[cells] = fit.sampled
-    loadings = fit.columns.loadings(cells)
+    some = state.readings.sample(NONE)
+    loadings = some.columns.loadings(some.cells)
     if loadings is None:
         return NONE
     squares = [float((loadings[:, k : k + 3] ** 2).sum()) for k in (0, 3)]
     units = [math.sqrt(len(loadings) / s) if s > 0 else 0.0 for s in squares]
-    visits = len(np.unique(fit.columns.visit[cells]))
-    cost = size_penalty(3.0 * visits) + IN_USE[0]
+    visits = len(np.unique(some.columns.visit[some.cells]))
+    cost = size_penalty(3.0 * visits) + IN_USE
     best, worth, both = NONE, _evidence(state, NONE), (1.0, 1.0)
     for kinds in ((0, 1), (1,), (0,)):
         if not all(units[k] for k in kinds):
@@ -83,11 +81,10 @@ def _largest(
 
 def _evidence(state: State, sizes: tuple[float, float]) -> float:
     """Return the log posterior of a model's elements with some noise in common."""
-    fit, drawn = state.fit, state.fit.sampled
-    cells = fit.cells.copy()
-    cells[cells] = drawn
-    other = Fitting(fit.columns, fit.given[drawn], cells, fit.weights[drawn], sizes)
-    return other.state(state.elements, state.mode, state).score - other.log_det / 2
+    some = state.readings.sample(sizes)
+    return (
+        Models(some).state(state.elements, state.mode, state).score - some.log_det / 2
+    )
 
 
 def stable(one: tuple[float, float], other: tuple[float, float]) -> bool:

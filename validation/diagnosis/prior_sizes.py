@@ -11,7 +11,7 @@ Sources:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -58,14 +58,11 @@ class Sizes:
         return np.where(self.std > 0, share, 0.0)
 
 
-def best_sizes(
-    gram: NDArray, along: NDArray, squares: float, count: int,
-    group: NDArray, given: NDArray, most: NDArray, start: dict[int, float],
-    eigen: Mapping[int, Eigen] = MappingProxyType({}),
-) -> Sizes:  # fmt: skip
-    """Optimise the prior standard deviations of all groups.
+@dataclass(frozen=True, eq=False)
+class Grouped:
+    """k unknowns of readings, in groups that share a prior standard deviation.
 
-    Args:
+    Attributes:
         gram: (k, k) inner products of columns.
         along: (k,) inner products with the readings.
         squares: sum of squares of the readings.
@@ -73,31 +70,59 @@ def best_sizes(
         group: (k,) group of each unknown.
         given: (k,) fixed standard deviation, or NaN.
         most: (k,) largest plausible standard deviation.
+    """
+
+    gram: NDArray
+    along: NDArray
+    squares: float
+    count: int
+    group: NDArray
+    given: NDArray
+    most: NDArray
+
+    def without(self, unknowns: NDArray) -> "Grouped":
+        """The same without some unknowns, by their numbers."""
+        kept = np.delete(np.arange(len(self.along)), unknowns)
+        return replace(
+            self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],
+            group=self.group[kept], given=self.given[kept], most=self.most[kept],
+        )  # fmt: skip
+
+
+def best_sizes(
+    model: Grouped, start: Mapping[int, float] = MappingProxyType({}),
+    eigen: Mapping[int, Eigen] = MappingProxyType({}),
+) -> Sizes:  # fmt: skip
+    """Optimise the prior standard deviations of all groups.
+
+    Args:
+        model: unknowns and their groups.
         start: start values by group.
         eigen: eigenvalues and eigenvectors of some groups' blocks of ``gram``.
 
     Returns:
         Standard deviations and posterior.
     """
+    given, group, count = model.given, model.group, model.count
     free = np.isnan(given)
     own = {int(g): np.flatnonzero((group == g) & free) for g in np.unique(group[free])}
-    diagonal = np.diag(gram)
+    diagonal = np.diag(model.gram)
     limits, size = {}, {}
     for g, which in own.items():
         unit = 1 / np.sqrt(max(float(diagonal[which].mean()), 1e-300))
-        limits[g] = unit * _LEAST, min(unit * _MOST, float(most[which].max()))
+        limits[g] = unit * _LEAST, min(unit * _MOST, float(model.most[which].max()))
         size[g] = min(max(start.get(g, unit * _BEGIN), limits[g][0]), limits[g][1])
     largest = max(own, key=lambda g: len(own[g]), default=None)
     which = np.zeros(0, dtype=int) if largest is None else own[largest]
     block = eigen.get(-1 if largest is None else largest)
-    turned = _turned(gram, along, which, block)
+    turned = _turned(model.gram, model.along, which, block)
     best: tuple[_Posterior, dict[int, float]] | None = None
     worth = -np.inf
     for _ in range(_STEPS):
         std = np.where(free, 0.0, given)
         for g, which in own.items():
             std[which] = size[g]
-        now = turned.posterior(std, squares)
+        now = turned.posterior(std, model.squares)
         value = -0.5 * (float(deviance(now.left, count)) + now.log_det)
         if value > worth:
             worth, best = value, (now, dict(size))

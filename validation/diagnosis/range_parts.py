@@ -51,7 +51,7 @@ def range_error(
         Of its variables the one with the largest error; None where none has enough
         values.
     """
-    conditions = best.fit.columns.conditions
+    conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)
     found = []
     for name in names:

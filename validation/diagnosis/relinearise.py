@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
-from validation.diagnosis.states import Fitting, State
+from validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # of linearisation
 _MOVED = 0.3  # log posterior: change that ends the iteration
@@ -22,14 +22,14 @@ _SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
 class Relinearisation:
     """Linearisations of models at their estimates, with a cache."""
 
-    def __init__(self, columns: Columns, fit: Fitting) -> None:
+    def __init__(self, columns: Columns, models: Models) -> None:
         """Start with an empty cache.
 
         Args:
             columns: of all N cells.
-            fit: of the fitted cells.
+            models: of the fitted cells.
         """
-        self.columns, self.fit = columns, fit
+        self.columns, self.models = columns, models
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
@@ -38,7 +38,7 @@ class Relinearisation:
             elements = self._again(state)
             if elements is None:
                 break
-            before, state = state.score, self.fit.state(elements, state.mode, state)
+            before, state = state.score, self.models.state(elements, state.mode, state)
             if abs(state.score - before) < _MOVED:
                 break
         return state
@@ -74,12 +74,12 @@ class Relinearisation:
 
     def _misses(self, effects: list[Element], xs: list[NDArray]) -> float:
         """Return the squared whitened error of the linearisation."""
-        linear = np.zeros(len(self.fit.cells))
+        linear = np.zeros(len(self.models.readings.cells))
         for e, x in zip(effects, xs, strict=True):
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)
             if e.offset is not None:
                 linear += e.offset
-        miss = (self.columns.combined(effects, xs) - linear)[self.fit.cells]
+        miss = (self.columns.combined(effects, xs) - linear)[self.models.readings.cells]
         return float(miss @ miss)
 
 

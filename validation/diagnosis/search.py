@@ -13,17 +13,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import Candidate
-from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Dense, Element
 from validation.diagnosis.functions import Request, ScoredFunction
-from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.places import Weighted
 from validation.diagnosis.relinearise import Relinearisation
-from validation.diagnosis.states import MORE, Fitting, State
+from validation.diagnosis.states import MORE, Models, State
+from validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
 Tried = tuple[tuple[Element, ...], State]  # elements; model that gives start values
@@ -45,24 +43,14 @@ _MOVED = 0.3  # log posterior: least improvement
 class Search:
     """Models of one set of readings and weights, and the search over them."""
 
-    def __init__(
-        self, columns: Columns, z: NDArray, cells: NDArray, good: NDArray,
-        common: tuple[float, float] = (0.0, 0.0),
-    ) -> None:  # fmt: skip
-        """Weight the readings and fit the model without elements.
-
-        Args:
-            columns: of all N cells.
-            z: (n,) whitened residual of the fitted cells.
-            cells: (N,) mask of the fitted cells.
-            good: (n,) probability that a reading is no blunder.
-            common: sizes of noise in common, see :class:`.states.Fitting`.
-        """
-        self.columns, self.functions = columns, columns.functions
-        self.fit = Fitting(columns, z, cells, cell_weights(good), common)
-        self.empty = [self.fit.state((), mode) for mode in self.fit.modes()]
+    def __init__(self, readings: WeightedReadings) -> None:
+        """Fit the models without elements."""
+        self.readings, self.columns = readings, readings.columns
+        self.functions = readings.columns.functions
+        self.models = Models(readings)
+        self.empty = [self.models.state((), mode) for mode in self.models.modes()]
         self.begin = max(self.empty, key=lambda s: s.score)
-        self.relinearisation = Relinearisation(columns, self.fit)
+        self.relinearisation = Relinearisation(self.columns, self.models)
         self.seen: dict[object, State] = {}
         self._made: dict[object, Element | None] = {}
 
@@ -89,14 +77,24 @@ class Search:
 
     def prepare(self) -> None:
         """Compute the inner products that all models share."""
-        cells = self.fit.cells.copy()
-        cells[cells] = self.fit.sampled
-        root = self.fit.root[self.fit.sampled]
-        whiten = self.columns.whitening(cells, root, self.fit.common)
+        cells, some = self.readings.cells.copy(), self.readings.sampled
+        cells[cells] = some
+        root = self.readings.root[some]
+        whiten = self.columns.whitening(cells, root, self.readings.common)
         self.weighted: Weighted = self.functions.places.weighted(cells, whiten)
-        self.library = Dense(self.columns.library, self.fit.cells, self.fit.whiten)
-        own = self.fit.cells[self.columns.sampled]
+        self.library = Dense(
+            self.columns.library, self.readings.cells, self.readings.whiten
+        )
+        own = self.readings.cells[self.columns.sampled]
         self.explicit = Dense(self.columns.explicit, own, whiten)
+
+    def _dense(self, elements: list[Element]) -> Dense:
+        """Return elements to be scored in the fitted cells."""
+        return Dense(elements, self.readings.cells, self.readings.whiten)
+
+    def _gain(self, e: Element, base: State) -> float:
+        """Return the log evidence ratio of adding an element to a model."""
+        return float(self._dense([e]).gains(base.marginal)[0])
 
     def _keep(self, states: Iterable[State]) -> None:
         """Store models whose estimates support their claims."""
@@ -135,9 +133,9 @@ class Search:
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
         """Return the models, and each with fewer groups of nuisance parameters."""
         less = [
-            self.fit.state(s.elements, mode, s)
+            self.models.state(s.elements, mode, s)
             for s in states
-            for mode in self.fit.modes()
+            for mode in self.models.modes()
             if mode != s.mode and mode[0] <= s.mode[0] and mode[1] <= s.mode[1]
         ]
         return [*states, *less]
@@ -200,7 +198,7 @@ class Search:
     @property
     def _more(self) -> float:
         """Readings of all rows for one of the sampled rows."""
-        return len(self.fit.sampled) / max(int(self.fit.sampled.sum()), 1)
+        return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _of(self, found: ScoredFunction) -> Element | None:
         """Return the element of a scored function."""
@@ -218,12 +216,12 @@ class Search:
         if last.name:
             return []
         rest = state.elements[:-1]
-        base = self.fit.state(rest, state.mode, state)
+        base = self.models.state(rest, state.mode, state)
         made = [last]
         if not last.candidate.parts[0].variable.startswith("wrench."):
             made = [e for e in self._forms_of(last, base) if e]
         made += [self._sharper(e, base) for e in made[:1]]
-        new = [self.fit.state((*rest, e), state.mode, base) for e in made]
+        new = [self.models.state((*rest, e), state.mode, base) for e in made]
         return [s for s in new if s.elements != state.elements]
 
     def _forms_of(self, last: Element, base: State) -> list[Element | None]:
@@ -244,11 +242,9 @@ class Search:
         for candidate in tried:  # one by one: each may have hundreds of columns
             e = self._made.get(candidate)
             e = e or self.functions.element(candidate, priors[candidate.shape])
-            if e is None:
-                continue
-            gain = Dense([e], self.fit.cells, self.fit.whiten).gains(base.marginal)
-            best.append((float(gain[0]) + e.log_prior, e))
-            best = sorted(best, key=lambda scored: -scored[0])[:4]
+            if e is not None:
+                best.append((self._gain(e, base) + e.log_prior, e))
+                best = sorted(best, key=lambda scored: -scored[0])[:4]
         base.forget()
         self._made |= {e.candidate: e for _, e in best}
         return [e for _, e in best]
@@ -259,17 +255,13 @@ class Search:
         if not len(one.shape.bends):
             return e
 
-        def gain(e: Element) -> float:
-            dense = Dense([e], self.fit.cells, self.fit.whiten)
-            return float(dense.gains(base.marginal)[0])
-
-        best = gain(e)
+        best = self._gain(e, base)
         variables, conditions = one.parts[0].variables, self.functions.conditions
         for k in range(_HALVINGS):
             for shape in forms.near(conditions, variables, e.candidate.shape, 0.5**k):
                 near = self.functions.element(replace(one, shape=shape), e.log_prior)
-                if near is not None and gain(near) > best:
-                    best, e = gain(near), near
+                if near is not None and (gain := self._gain(near, base)) > best:
+                    best, e = gain, near
         return e
 
     def _with_one_removed(self, state: State) -> list[State]:
@@ -279,7 +271,7 @@ class Search:
         own = origins(state.elements)
         rest = [tuple(e for e in own if e is not out) for out in own]
         return [
-            self.relinearisation.relinearised(self.fit.best(some, state))
+            self.relinearisation.relinearised(self.models.best(some, state))
             for some in rest
         ]
 
@@ -294,7 +286,7 @@ class Search:
         curved = any(e.first for e in best.elements)
         for out in own:
             rest = tuple(e for e in own if e is not out)
-            base = self.fit.best(rest, best)
+            base = self.models.best(rest, best)
             base = self.relinearisation.relinearised(base) if curved else base
             listed = self._candidates(base, functions=not out.name)
             for less in self._without_nuisance([base])[1:]:
@@ -315,10 +307,10 @@ class Search:
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
         """Fit models; optimise modes and linearise again for the best ones."""
-        new = [self.fit.state(elements, s.mode, s) for elements, s in tried]
+        new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [
-            self.relinearisation.relinearised(self.fit.best(s.elements, s))
+            self.relinearisation.relinearised(self.models.best(s.elements, s))
             for s in new[:_KEPT]
         ]
         return sorted([*best, *new[_KEPT:]], key=lambda s: -s.score)

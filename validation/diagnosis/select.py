@@ -16,12 +16,13 @@ from scipy.special import logsumexp
 from assembly.effects import LIBRARY
 from assembly.effects.forms import FORMS
 from validation.diagnosis.columns import Columns
-from validation.diagnosis.common_noise import NONE, common_sizes, stable
+from validation.diagnosis.common_noise import common_sizes, stable
 from validation.diagnosis.elements import Element, label
 from validation.diagnosis.gaussian import scale
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
+    cell_weights,
     findings,
     probability_good,
     repeat_scatter,
@@ -30,6 +31,7 @@ from validation.diagnosis.range_parts import range_error
 from validation.diagnosis.search import Search, Update, names_of
 from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
 from validation.diagnosis.states import State, prediction_gain
+from validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
 _EQUAL = 3.0  # log posterior: difference of equivalent functions
 _CLAIMED = 0.9  # probability of functions from which the best model has them
@@ -59,10 +61,15 @@ def select(
         The best model, and the posterior probabilities.
     """
     good, shared = np.ones(len(z)), common or NONE
-    search = Search(columns, z, cells, good, shared)
+
+    def search_of(good: NDArray, shared: tuple[float, float]) -> Search:
+        weights = cell_weights(good)
+        return Search(WeightedReadings(columns, z, cells, weights, shared))
+
+    search = search_of(good, shared)
     begin = probability_good(search.begin.expected_squares(), clearly=True)
     if (begin < 1).any():
-        good, search = begin, Search(columns, z, cells, begin, shared)
+        good, search = begin, search_of(begin, shared)
     states = search.run(update)
     for _ in range(1 if columns.motions is None else _AGAIN):
         again = probability_good(states[0].expected_squares())
@@ -71,10 +78,10 @@ def select(
             break
         states.clear()  # a model may have columns of hundreds of megabytes
         good, shared = again, sizes
-        search = Search(columns, z, cells, good, shared)
+        search = search_of(good, shared)
         states = search.run(update)
     selected = _selected(search, states, good)
-    search.fit.forget()
+    search.models.forget()
     return selected
 
 
@@ -89,7 +96,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
-    best, fit = states[0], search.fit
+    best, fit = states[0], search.readings
     hypotheses: list[Hypothesis] = []
     values: list[NDArray] = []
     functions: list[Learned] = []
@@ -140,7 +147,7 @@ def _findings(
     search: Search, best: State, scale: tuple[float, float], good: NDArray
 ) -> tuple[str, ...]:
     """Return findings about the noise: scale, repeatability, memory."""
-    columns, fit = search.columns, search.fit
+    columns, fit = search.columns, search.readings
     row, component = (axis[fit.cells] for axis in np.nonzero(columns.campaign.cells))
     repeat = columns.campaign.repeat[row]
     point = np.zeros(len(row), dtype=int)
@@ -167,7 +174,7 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
     """Remove the best models whose functions fail cross-validation."""
-    blocks = search.columns.block[search.fit.cells]
+    blocks = search.columns.block[search.readings.cells]
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
@@ -175,7 +182,7 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
         rests = [tuple(x for x in best.elements if x is not e) for e in learned]
         rests.append(tuple(x for x in best.elements if x.name))
         sure = [
-            prediction_gain(best, search.fit.state(rest, best.mode, best), blocks)
+            prediction_gain(best, search.models.state(rest, best.mode, best), blocks)
             for rest in rests
             if learned
         ]
@@ -183,7 +190,7 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
             break
         rest = rests[int(np.argmin(sure[: len(learned)]))]
         known = {frozenset(s.elements) for s in states}
-        pruned = [] if frozenset(rest) in known else [search.fit.best(rest, best)]
+        pruned = [] if frozenset(rest) in known else [search.models.best(rest, best)]
         states = sorted([*states[1:], *pruned], key=lambda s: -s.score)
     return states
 
@@ -287,7 +294,7 @@ def _learned(
             parts = next(iter(other)).candidate.parts
             if parts != e.candidate.parts and s.score > best.score - _EQUAL:
                 equal.append(parts)
-    without = search.fit.state(
+    without = search.models.state(
         tuple(x for x in best.elements if x is not e), best.mode, best
     )
     std = best.sizes.std[best.own(k)] * e.scale * best.tau
@@ -295,6 +302,6 @@ def _learned(
         e.candidate, tuple(dict.fromkeys(equal)), best.score - without.score, std,
         probability,
         range_error(
-            e.candidate, best, without, search.columns.row[search.fit.cells]
+            e.candidate, best, without, search.columns.row[search.readings.cells]
         ),
     )  # fmt: skip

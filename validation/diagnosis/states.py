@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 from scipy.stats import rankdata
 
-from validation.diagnosis.columns import Columns
 from validation.diagnosis.elements import Element
 from validation.diagnosis.gaussian import (
     Marginal,
@@ -25,12 +24,12 @@ from validation.diagnosis.gaussian import (
     marginalise,
     scale,
 )
-from validation.diagnosis.prior_sizes import Sizes, best_sizes
+from validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
 from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
 Mode = tuple[bool, bool]  # geometric errors in use, springs in use
 MORE = math.log(2.0)  # prior odds of one element fewer
-IN_USE = math.log(10.0), math.log(10.0)  # prior odds against geometry, springs
+IN_USE = math.log(10.0)  # prior odds against geometry, and against springs
 _GROUPS = 4  # of nuisance parameters
 
 
@@ -45,7 +44,7 @@ class State:
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
         tau: true over stated sigma.
-        fit: readings and weights.
+        readings: what it is a model of.
     """
 
     elements: tuple[Element, ...]
@@ -54,27 +53,31 @@ class State:
     sizes: Sizes
     score: float
     tau: float
-    fit: "Fitting"
+    readings: WeightedReadings
 
     def _columns(self) -> NDArray:
         """(n, k) of all unknowns; not kept, they may be hundreds of megabytes."""
-        f = self.fit
-        return np.hstack([f.small[:, self.used], *(f.own(e) for e in self.elements)])
+        r = self.readings
+        return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
+
+    def _z(self) -> NDArray:
+        """(n,) readings minus the offsets of the elements."""
+        return self.readings.without_offsets(self.elements)
 
     @cached_property
     def marginal(self) -> Marginal:
         """Model with its unknowns marginalised, in the fitted cells."""
-        z = self.fit.readings(self.elements)
-        return marginalise(self._columns(), self.sizes.std, z, self.fit.flat)
+        flat = self.readings.flat
+        return marginalise(self._columns(), self.sizes.std, self._z(), flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
         """Model with its unknowns marginalised, in the sampled rows."""
-        f = self.fit
-        if f.sampled.all():
+        some = self.readings.sampled
+        if some.all():
             return self.marginal
-        X, z = self._columns()[f.sampled], f.readings(self.elements)[f.sampled]
-        flat = np.linalg.qr(f.flat[f.sampled])[0]
+        X, z = self._columns()[some], self._z()[some]
+        flat = np.linalg.qr(self.readings.flat[some])[0]
         X, z = X - flat @ (flat.T @ X), z - flat @ (flat.T @ z)
         return marginalise(X, self.sizes.std, z, flat)
 
@@ -86,15 +89,12 @@ class State:
     @cached_property
     def fitted(self) -> NDArray:
         """(n,) contribution of the model to the readings, whitened and weighted."""
-        f = self.fit
-        return self._columns() @ self.sizes.mean + (f.z - f.readings(self.elements))
+        return self._columns() @ self.sizes.mean + (self.readings.z - self._z())
 
     @cached_property
     def left(self) -> NDArray:
         """(n,) residual of independent noise, unweighted."""
-        f = self.fit
-        fitted = self._columns() @ self.sizes.mean
-        return (f.readings(self.elements) - fitted) / f.root
+        return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
         """Return the slice of the k-th element's unknowns."""
@@ -102,11 +102,20 @@ class State:
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
 
+    def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
+        """Return the standard deviations by group of another model with elements."""
+        own = self.sizes.of_group
+        found = {g: s for g, s in own.items() if g < _GROUPS}
+        for k, e in enumerate(self.elements):
+            if e in elements and _GROUPS + k in own:
+                found[_GROUPS + elements.index(e)] = own[_GROUPS + k]
+        return found
+
     def expected_squares(self) -> NDArray:
         """Return the (n,) expected squared residuals, unweighted."""
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
-        return self.left**2 + spread * self.tau**2 / self.fit.weights
+        return self.left**2 + spread * self.tau**2 / self.readings.weights
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
@@ -139,15 +148,12 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
     return max(by_mean, by_ranks) if by_mean > 0 else by_mean
 
 
-class Fitting(WeightedReadings):
-    """Weighted readings of the fitted cells, and models of them."""
+class Models:
+    """Models of weighted readings, each fitted once."""
 
-    def __init__(
-        self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
-        common: tuple[float, float] = (0.0, 0.0),
-    ) -> None:  # fmt: skip
-        """Start with an empty cache of models; arguments as of the readings."""
-        super().__init__(columns, z, cells, weights, common)
+    def __init__(self, readings: WeightedReadings) -> None:
+        """Start with an empty cache."""
+        self.readings, self._small = readings, readings.columns.nuisance
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
@@ -155,11 +161,11 @@ class Fitting(WeightedReadings):
         for state in self._states.values():
             state.forget()
         self._states.clear()
-        super().forget()
+        self.readings.forget()
 
     def modes(self) -> list[Mode]:
         """Return the combinations of nuisance parameters in use."""
-        small = self.columns.nuisance
+        small = self._small
         springs = [False, True] if small.spring.any() else [False]
         geometry = [False, True] if (~small.spring).any() else [False]
         geometry = [True] if small.declared else geometry
@@ -194,65 +200,62 @@ class Fitting(WeightedReadings):
         self, elements: tuple[Element, ...], mode: Mode, start: State | None
     ) -> State:
         """Optimise standard deviations; remove springs of negative compliance."""
-        small = self.columns.nuisance
-        used = np.where(small.spring, mode[1], mode[0])
-        begin: dict[int, float] = {}
+        spring, begin = self._small.spring, dict[int, float]()
+        used = np.where(spring, mode[1], mode[0])
         if start is not None:
-            begin = {g: s for g, s in start.sizes.of_group.items() if g < _GROUPS}
-            if start.mode == mode:
-                used = start.used.copy()
-            for k, e in enumerate(start.elements):
-                if e in elements:
-                    number = _GROUPS + elements.index(e)
-                    begin[number] = start.sizes.of_group.get(_GROUPS + k, np.nan)
-            begin = {g: s for g, s in begin.items() if np.isfinite(s)}
-        z = self.readings(elements)
-        counts = [e.columns.shape[1] for e in elements]
-        with_small, inner = self.products(elements)
-        with_z = np.concatenate([np.zeros(0), *(self.own(e).T @ z for e in elements)])
-        small_z = self.small.T @ z
-        element = np.repeat(np.arange(len(elements)), counts)
-        given = np.concatenate([np.zeros(0), *(e.given for e in elements)])
-        most = np.repeat([e.most for e in elements], counts)
+            begin = start.sizes_for(elements)
+            used = start.used.copy() if start.mode == mode else used
+        model = self._linear(elements, used)
         eigen = {
-            _GROUPS + k: self.eigen(e)
+            _GROUPS + k: self.readings.eigen(e)
             for k, e in enumerate(elements)
             if e.columns.shape[1] > NARROW and np.isnan(e.given).all()
         }
         while True:
-            beside = with_small[used]
-            gram = np.block([
-                [self.gram[np.ix_(used, used)], beside],
-                [beside.T, inner],
-            ])
-            sizes = best_sizes(
-                gram, np.append(small_z[used], with_z), float(z @ z),
-                self.count,
-                np.append(small.group[used], _GROUPS + element),
-                np.append(small.given[used], given), np.append(small.most[used], most),
-                begin, eigen,
-            )  # fmt: skip
-            begin = sizes.of_group
-            kept = np.flatnonzero(used)
-            wrong = small.spring[kept] & (sizes.mean[: len(kept)] < 0)
+            sizes = best_sizes(model, begin, eigen)
+            begin, kept = sizes.of_group, np.flatnonzero(used)
+            wrong = spring[kept] & (sizes.mean[: len(kept)] < 0)
             if not wrong.any():
                 break
             used[kept[wrong]] = False
-        tau = scale(sizes.squares, self.count)[0]
+            model = model.without(np.flatnonzero(wrong))
+        tau = scale(sizes.squares, model.count)[0]
         score = self._score(elements, sizes, used, tau)
-        return State(elements, mode, used, sizes, score, tau, self)
+        return State(elements, mode, used, sizes, score, tau, self.readings)
+
+    def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
+        """Return some nuisance parameters and the elements' unknowns."""
+        readings, small = self.readings, self._small.take(used)
+        z = readings.without_offsets(elements)
+        with_small, inner = readings.products(elements)
+        beside = with_small[used]
+        empty, counts = np.zeros(0), [e.columns.shape[1] for e in elements]
+        with_z = [empty, *(readings.own(e).T @ z for e in elements)]
+        return Grouped(
+            gram=np.block([
+                [readings.gram[np.ix_(used, used)], beside],
+                [beside.T, inner],
+            ]),
+            along=np.concatenate([(readings.small.T @ z)[used], *with_z]),
+            squares=float(z @ z),
+            count=readings.count,
+            group=np.append(
+                small.group, _GROUPS + np.repeat(np.arange(len(elements)), counts)
+            ),
+            given=np.concatenate([small.given, empty, *(e.given for e in elements)]),
+            most=np.append(small.most, np.repeat([e.most for e in elements], counts)),
+        )
 
     def _score(
         self, elements: Sequence[Element], sizes: Sizes, used: NDArray, tau: float
     ) -> float:
         """Return the log posterior up to a constant."""
-        small = self.columns.nuisance
-        evidence = float(deviance(sizes.squares, self.count)) + sizes.log_det
-        score = -0.5 * evidence - sizes.cost
-        for spring, cost in ((False, IN_USE[0]), (True, IN_USE[1])):
-            declared = small.declared and not spring
-            if used[small.spring == spring].any() and not declared:
-                score -= cost
+        small, count = self._small, self.readings.count
+        score = -0.5 * (float(deviance(sizes.squares, count)) + sizes.log_det)
+        score -= sizes.cost
+        geometry, springs = used & ~small.spring, used & small.spring
+        score -= IN_USE * (geometry.any() and not small.declared)
+        score -= IN_USE * springs.any()
         at = int(used.sum())
         for e in elements:
             own = slice(at, at + e.columns.shape[1])

@@ -30,7 +30,6 @@ from assembly.measurement.predict import (
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
-from validation.diagnosis.common_noise import NONE
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import drawn, hidden
@@ -46,6 +45,7 @@ from validation.diagnosis.selected import Selected
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.states import prediction_gain
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
+from validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
@@ -325,7 +325,7 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
     whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    common = whole.states[0].fit.common  # of one noise alone can they be compared
+    common = whole.states[0].readings.common  # of one noise alone can they be compared
     timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)

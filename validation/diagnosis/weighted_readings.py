@@ -11,25 +11,33 @@ from validation.diagnosis.prior_sizes import Eigen
 
 NARROW = 50  # most columns of an element that are kept beside those of all cells
 _RANK = 1e-9  # relative singular value of a dependent column
+NONE = (0.0, 0.0)  # noise in common
 
 
 class WeightedReadings:
-    """Readings of the fitted cells, weighted; the device's frame is projected out."""
+    """Readings of the fitted cells, weighted; the device's frame is projected out.
+
+    Attributes:
+        columns: of all N cells.
+        given: (n,) whitened residual of the fitted cells.
+        cells: (N,) mask of the fitted cells.
+        weights: (n,) relative precision, 1 for a good reading.
+        common: [rad, m] standard deviations of the platform's rotation and translation
+            that all cells of a measurement share, over tau.
+        sampled: (n,) cells of the rows by which functions are scored first.
+        whiten: map of the fitted cells to independent noise.
+        flat: (n, f) orthonormal columns of the measuring frame.
+        z: (n,) what is given, whitened, without the measuring frame.
+        small: (n, k) columns of the nuisance parameters, likewise.
+        gram: (k, k) their inner products.
+        count: number of independent readings.
+    """
 
     def __init__(
         self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
-        common: tuple[float, float] = (0.0, 0.0),
+        common: tuple[float, float] = NONE,
     ) -> None:  # fmt: skip
-        """Apply the weights and project out the measuring frame.
-
-        Args:
-            columns: of all N cells.
-            z: (n,) whitened residual of the fitted cells.
-            cells: (N,) mask of the fitted cells.
-            weights: (n,) relative precision, 1 for a good reading.
-            common: [rad, m] standard deviations of the platform's rotation and
-                translation that all cells of a measurement share, over tau.
-        """
+        """Apply the weights and project out the measuring frame."""
         self.columns, self.cells, self.weights = columns, cells, weights
         self.given, self.common = z, common
         self.sampled = columns.sampled[cells]
@@ -48,11 +56,18 @@ class WeightedReadings:
         self.gram = self.small.T @ self.small
         self._own: dict[Element, NDArray] = {}
         self._inner: dict[tuple[Element, Element | None], NDArray] = {}
-        self._turned: dict[Element, Eigen] = {}
-        self._offset: dict[Element, NDArray] = {}
+        self._eigen: dict[Element, Eigen] = {}
 
     def _without_flat(self, columns: NDArray) -> NDArray:
         return columns - self.flat @ (self.flat.T @ columns)
+
+    def sample(self, common: tuple[float, float]) -> "WeightedReadings":
+        """The sampled rows alone, with some noise in common."""
+        cells, some = self.cells.copy(), self.sampled
+        cells[cells] = some
+        return WeightedReadings(
+            self.columns, self.given[some], cells, self.weights[some], common
+        )
 
     def own(self, e: Element) -> NDArray:
         """Return an element's (n, m) columns in the fitted cells."""
@@ -85,22 +100,19 @@ class WeightedReadings:
 
     def eigen(self, e: Element) -> Eigen:
         """Return eigenvalues and eigenvectors of an element's inner products."""
-        if e not in self._turned:
-            self._turned[e] = np.linalg.eigh(self._inner[e, e])
-        return self._turned[e]
+        if e not in self._eigen:
+            self._eigen[e] = np.linalg.eigh(self._inner[e, e])
+        return self._eigen[e]
 
-    def readings(self, elements: Sequence[Element]) -> NDArray:
+    def without_offsets(self, elements: Sequence[Element]) -> NDArray:
         """Return the (n,) readings minus the offsets of the elements."""
         z = self.z
         for e in elements:
             if e.offset is not None:
-                if e not in self._offset:
-                    o = self.whiten(e.offset[self.cells])
-                    self._offset[e] = self._without_flat(o)
-                z = z - self._offset[e]
+                z = z - self._without_flat(self.whiten(e.offset[self.cells]))
         return z
 
     def forget(self) -> None:
         """Drop columns and inner products, which can be computed again."""
-        for one in (self._own, self._inner, self._turned, self._offset):
+        for one in (self._own, self._inner, self._eigen):
             one.clear()

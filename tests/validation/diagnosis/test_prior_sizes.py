@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_t
 
 from validation.diagnosis.gaussian import size_penalty
-from validation.diagnosis.prior_sizes import best_sizes
+from validation.diagnosis.prior_sizes import Grouped, best_sizes
 
 
 def _case(seed=1):
@@ -26,7 +26,7 @@ def test_sizes_are_where_the_density_is_largest():
 
     expected = np.exp(minimize(cost, np.log([5.0, 30.0]), tol=1e-10).x)
     nan, inf = np.full(12, np.nan), np.full(12, np.inf)
-    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, group, nan, inf, {})
+    found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, nan, inf))
     assert [found.of_group[g] for g in (0, 1)] == pytest.approx(expected, rel=0.05)
     assert np.exp(cost(np.log(expected))) > 0
 
@@ -34,7 +34,7 @@ def test_sizes_are_where_the_density_is_largest():
 def test_a_given_size_is_kept_and_costs_nothing():
     X, group, z = _case()
     given, inf = np.full(12, 2.0), np.full(12, np.inf)
-    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, group, given, inf, {})
+    found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, given, inf))
     assert (found.std == 2.0).all()
     assert found.cost == 0.0
 
@@ -42,7 +42,7 @@ def test_a_given_size_is_kept_and_costs_nothing():
 def test_no_size_exceeds_what_is_plausible():
     X, group, z = _case()
     nan, most = np.full(12, np.nan), np.full(12, 3.0)
-    found = best_sizes(X.T @ X, X.T @ z, z @ z, 60, group, nan, most, {})
+    found = best_sizes(Grouped(X.T @ X, X.T @ z, z @ z, 60, group, nan, most))
     assert found.std.max() <= 3.0
 
 

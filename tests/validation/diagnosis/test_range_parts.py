@@ -22,11 +22,15 @@ def function_of(variable):
 
 def model(columns, std, z, wet):
     campaign = campaign_of(np.zeros((ROWS, 6)), wet=wet)
-    fit = SimpleNamespace(columns=SimpleNamespace(conditions=conditions_of(campaign)))
+    readings = SimpleNamespace(
+        columns=SimpleNamespace(conditions=conditions_of(campaign))
+    )
     flat = np.full((ROWS, 1), ROWS**-0.5)
     columns = columns - flat @ (flat.T @ columns)
     z = z - flat[:, 0] * (flat[:, 0] @ z)
-    return SimpleNamespace(fit=fit, marginal=marginalise(columns, std, z, flat))
+    return SimpleNamespace(
+        readings=readings, marginal=marginalise(columns, std, z, flat)
+    )
 
 
 def refitted(columns, std, z, wet):

@@ -11,7 +11,8 @@ from validation.diagnosis.columns import Columns
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.relinearise import Relinearisation
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.states import Fitting
+from validation.diagnosis.states import Models
+from validation.diagnosis.weighted_readings import WeightedReadings
 
 TURN, LONGER = 6e-3, 5e-3
 CAMPAIGN = bar(link=BEAM, rows=20, spread=5.0)
@@ -60,9 +61,10 @@ def test_linearised_elements_are_exact_at_their_values(columns):
 def test_a_model_finds_values_that_a_linear_one_misses(columns):
     elements, xs = effects(columns)
     z = moved() + np.random.default_rng(0).normal(size=120)
-    fit = Fitting(columns, z, np.ones(120, dtype=bool), np.ones(120))
-    first = fit.state(tuple(elements), (False, False))
-    last = Relinearisation(columns, fit).relinearised(first)
+    every = np.ones(120, dtype=bool)
+    models = Models(WeightedReadings(columns, z, every, np.ones(120)))
+    first = models.state(tuple(elements), (False, False))
+    last = Relinearisation(columns, models).relinearised(first)
     assert last.score > first.score + 3
     for k, (e, x) in enumerate(zip(last.elements, xs, strict=True)):
         mean = last.sizes.mean[last.own(k)]

@@ -13,6 +13,7 @@ from validation.diagnosis.elements import Dense
 from validation.diagnosis.search import Search
 from validation.diagnosis.select import select
 from validation.diagnosis.signatures import conditions_of
+from validation.diagnosis.weighted_readings import WeightedReadings
 
 ROWS = 40
 TIME = 60.0 * np.random.default_rng(0).permutation(ROWS)
@@ -98,13 +99,14 @@ def test_no_reading_is_looked_at_but_those_given(columns):
 def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     rng = np.random.default_rng(4)
     z = 5 * rng.normal(size=6 * ROWS)
-    search = Search(columns, z, np.ones(len(z), dtype=bool), np.ones(len(z)))
+    every = np.ones(len(z), dtype=bool)
+    search = Search(WeightedReadings(columns, z, every, np.ones(len(z))))
     search.prepare()
     looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
     made = [
         columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
     ]
-    dense = Dense(made, search.fit.cells, search.fit.whiten)
+    dense = Dense(made, search.readings.cells, search.readings.whiten)
     alone = dense.gains(search.empty[-1].marginal)
     together = np.array([f.score - f.log_prior for f in looked])
     assert len(looked) > 50
