@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -11,8 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.measurement.predict import predict, with_second_order
+from assembly.effects import LIBRARY
 from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.derivatives import Derivatives
@@ -22,7 +21,6 @@ from validation.diagnosis.holdout import SPANS, blocks_of, drawn
 from validation.diagnosis.hypotheses import (
     Hypothesis,
     hypotheses,
-    in_one_session,
     sessions_of,
     with_declared,
     with_sessions,
@@ -34,7 +32,6 @@ from validation.diagnosis.signatures import (
     Signature,
     Tangents,
     loaded_components,
-    whiten,
 )
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
@@ -113,7 +110,7 @@ class Columns:
         listed = [h for h in listed if self.odds.get(h.effect, 1.0) > 0.0]
         for k, h in enumerate(listed):
             if not (self.device and _moves_base(h)):
-                signature = self._told(self._at_start(h))
+                signature = self._told(self.tangents.at_start(h))
                 if _shows(signature):
                     shown.setdefault(_print(signature), signature)
             update("signatures", k + 1, len(listed))
@@ -197,49 +194,8 @@ class Columns:
         if self.device is None:
             return np.zeros((len(self.row), 0))
         columns = self.tangents.at_start(self.device).columns
-        if self.campaign.session is None:
-            return columns
-        own = [
-            columns * (self.campaign.session[self.row] == name)[:, None]
-            for name in self.campaign.sessions
-        ]
-        return np.hstack(own)
-
-    def again(
-        self, elements: Sequence[Element], xs: Sequence[NDArray]
-    ) -> list[Element]:
-        """Linearise effects at given values, all acting together.
-
-        Args:
-            elements: of the library.
-            xs: values of the slots of each.
-
-        Returns:
-            Elements whose sum is exact at these values; the given ones if the model
-            has no solution there.
-        """
-        robot = self.campaign.robot
-        middle = self.combined(elements, xs)
-        made = []
-        for k, x in enumerate(xs):
-            signature = self._about(elements, xs, k)
-            if not _finite(signature) or not np.isfinite(middle).all():
-                return list(elements)
-            middle = middle - signature.columns @ x
-            made.append(replace(signature, offset=np.zeros_like(middle)))
-        # the joint offset is stored with the first element
-        made[0] = replace(made[0], offset=middle)
-        return [
-            replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
-            for s, e, x in zip(made, elements, xs, strict=True)
-        ]
-
-    def _at_start(self, h: Hypothesis) -> Signature:
-        """Return a hypothesis to first order where it begins."""
-        first, own = in_one_session(h, sessions_of(h)[0])
-        alike = self.tangents.at_start(first)
-        columns = [alike.columns * self._rows_of(s) for s in sessions_of(h)]
-        return replace(alike, hypothesis=h, columns=np.hstack(columns))
+        sessions = self.campaign.sessions or (None,)
+        return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
         """Return a hypothesis of sessions without what their devices imitate."""
@@ -255,73 +211,10 @@ class Columns:
         own = replace(h, slots=slots)
         return replace(signature, hypothesis=own, columns=columns[:, kept])
 
-    def _about(
-        self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
-    ) -> Signature:
-        """Return the k-th effect to first order about values, the others beside it."""
-        h = elements[k].hypothesis
-        columns, offset = np.zeros((len(self.row), len(h.slots))), np.zeros(1)
-        for session in _sessions(elements):
-            others = self._public(elements, xs, session)
-            del others[elements[k].name]
-            there, own = in_one_session(h, session)
-            one = self.tangents.about(there, xs[k][own], others)
-            columns[:, own] += one.columns * self._rows_of(session)
-            offset = offset + one.offset * self._rows_of(session)[:, 0]
-        return Signature(h, offset, columns)
-
-    def _rows_of(self, session: str | None) -> NDArray:
-        """(N, 1) 1 in the cells of a session, else 0; 1 in all of None."""
-        if session is None or self.campaign.session is None:
-            return np.ones((len(self.row), 1))
-        return (self.campaign.session[self.row] == session)[:, None].astype(float)
-
-    def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
-        """Return the (N,) whitened contribution of effects acting together."""
-        own = [
-            self._combined(self._public(elements, xs, s)) * self._rows_of(s)[:, 0]
-            for s in _sessions(elements)
-        ]
-        return np.sum(own, axis=0)
-
-    def _combined(self, public: dict[str, dict[str, float]]) -> NDArray:
-        """Return the (N,) whitened contribution of effects in all rows."""
-        if any(LIBRARY[name].clearance for name in public):
-            return self.tangents.model(public) - self.tangents.declared
-        changed = apply_effects(self.conditions, public)
-        if np.ndim(self.conditions.second_order) == 2:
-            # finite motions of the changed machine
-            changed = with_second_order(changed)
-        whitened = whiten(self.campaign, predict(changed).deviation)
-        return whitened - self.tangents.declared
-
-    def _public(
-        self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
-    ) -> dict[str, dict[str, float]]:
-        """Return parameters by their public names, as they are in a session."""
-        robot, values = self.conditions.robot, {}
-        for e, x in zip(elements, xs, strict=True):
-            there, own = in_one_session(e.hypothesis, session)
-            values[e.name] = there.public(robot, x[own])
-        return values
-
-
-def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
-    """Return the sessions that effects tell apart, else None alone."""
-    every = [name for e in elements for name in sessions_of(e.hypothesis)]
-    return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
-
-
-def _finite(signature: Signature) -> bool:
-    """Return whether the model has a solution for a hypothesis."""
-    return bool(
-        np.isfinite(signature.columns).all() and np.isfinite(signature.offset).all()
-    )
-
 
 def _shows(signature: Signature) -> bool:
     """Return whether a hypothesis visibly changes the readings."""
-    if not _finite(signature):
+    if not signature.finite:
         return False
     squares = float(signature.offset @ signature.offset)
     return bool(signature.columns.any()) or squares > _VISIBLE

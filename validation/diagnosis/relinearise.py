@@ -6,11 +6,17 @@ effects of a model is therefore compared with the sum of their linear contributi
 where they differ, all derivatives are computed again at the estimates.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.elements import Element
+from assembly.effects import LIBRARY, apply_effects
+from assembly.measurement.predict import predict, with_second_order
+from validation.diagnosis.elements import Element, effect_element
+from validation.diagnosis.hypotheses import in_one_session, sessions_of
+from validation.diagnosis.signatures import Signature, Tangents, whiten
 from validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # of linearisation
@@ -22,14 +28,14 @@ _SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
 class Relinearisation:
     """Linearisations of models at their estimates, with a cache."""
 
-    def __init__(self, columns: Columns, models: Models) -> None:
+    def __init__(self, tangents: Tangents, models: Models) -> None:
         """Start with an empty cache.
 
         Args:
-            columns: of all N cells.
+            tangents: of all N cells.
             models: of the fitted cells.
         """
-        self.columns, self.models = columns, models
+        self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
@@ -62,7 +68,7 @@ class Relinearisation:
         if key not in self._about:
             settled = all(_has_shapes(e) for e in effects)
             settled = settled and not self._misses(effects, xs) > _LINEAR
-            again = None if settled else self.columns.again(effects, xs)
+            again = None if settled else self.again(effects, xs)
             self._about[key] = again
         made = self._about[key]
         if made is None:
@@ -79,8 +85,89 @@ class Relinearisation:
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)
             if e.offset is not None:
                 linear += e.offset
-        miss = (self.columns.combined(effects, xs) - linear)[self.models.readings.cells]
+        miss = (self.combined(effects, xs) - linear)[self.models.readings.cells]
         return float(miss @ miss)
+
+    def again(
+        self, elements: Sequence[Element], xs: Sequence[NDArray]
+    ) -> list[Element]:
+        """Linearise effects at given values, all acting together.
+
+        Args:
+            elements: of the library.
+            xs: values of the slots of each.
+
+        Returns:
+            Elements whose sum is exact at these values; the given ones if the model
+            has no solution there.
+        """
+        robot = self.tangents.campaign.robot
+        middle = self.combined(elements, xs)
+        made = []
+        for k, x in enumerate(xs):
+            signature = self._one(elements, xs, k)
+            if not signature.finite or not np.isfinite(middle).all():
+                return list(elements)
+            middle = middle - signature.columns @ x
+            made.append(replace(signature, offset=np.zeros_like(middle)))
+        # the joint offset is stored with the first element
+        made[0] = replace(made[0], offset=middle)
+        return [
+            replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
+            for s, e, x in zip(made, elements, xs, strict=True)
+        ]
+
+    def _one(
+        self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
+    ) -> Signature:
+        """Return the k-th effect to first order about values, the others beside it."""
+        h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
+        columns = np.zeros((len(offset), len(h.slots)))
+        for session in _sessions(elements):
+            others = self._public(elements, xs, session)
+            del others[elements[k].name]
+            there, own = in_one_session(h, session)
+            one = self.tangents.about(there, xs[k][own], others)
+            rows = self.tangents.rows_of(session)
+            columns[:, own] += one.columns * rows
+            offset += one.offset * rows[:, 0]
+        return Signature(h, offset, columns)
+
+    def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
+        """Return the (N,) whitened contribution of effects acting together."""
+        total = np.zeros_like(self.tangents.declared)
+        for session in _sessions(elements):
+            moved = self._combined(self._public(elements, xs, session))
+            total += moved * self.tangents.rows_of(session)[:, 0]
+        return total
+
+    def _combined(self, public: dict[str, dict[str, float]]) -> NDArray:
+        """Return the (N,) whitened contribution of effects in all rows."""
+        if any(LIBRARY[name].clearance for name in public):
+            return self.tangents.model(public) - self.tangents.declared
+        derivatives = self.tangents.derivatives
+        changed = apply_effects(derivatives.conditions, public)
+        if np.ndim(derivatives.conditions.second_order) == 2:
+            # finite motions of the changed machine
+            changed = with_second_order(changed)
+        whitened = whiten(self.tangents.campaign, predict(changed).deviation)
+        return whitened - self.tangents.declared
+
+    def _public(
+        self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
+    ) -> dict[str, dict[str, float]]:
+        """Return parameters by their public names, as they are in a session."""
+        robot, values = self.tangents.derivatives.conditions.robot, {}
+        for e, x in zip(elements, xs, strict=True):
+            there, own = in_one_session(e.hypothesis, session)
+            values[e.name] = there.public(robot, x[own])
+        return values
+
+
+def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
+    """Return the sessions that effects tell apart, else None alone."""
+    every = [name for e in elements for name in sessions_of(e.hypothesis)]
+    return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 
 
 def _has_shapes(e: Element) -> bool:

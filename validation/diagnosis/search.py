@@ -50,7 +50,7 @@ class Search:
         self.models = Models(readings)
         self.empty = [self.models.state((), mode) for mode in self.models.modes()]
         self.begin = max(self.empty, key=lambda s: s.score)
-        self.relinearisation = Relinearisation(self.columns, self.models)
+        self.relinearisation = Relinearisation(self.columns.tangents, self.models)
         self.seen: dict[object, State] = {}
         self._made: dict[object, Element | None] = {}
 

@@ -26,7 +26,12 @@ from assembly.measurement.variables import with_history
 from forcefit.inputs.errors import BadInput
 from validation.campaign.campaign import LOAD, Campaign
 from validation.diagnosis.derivatives import STEP, Derivatives
-from validation.diagnosis.hypotheses import Hypothesis, Slot
+from validation.diagnosis.hypotheses import (
+    Hypothesis,
+    Slot,
+    in_one_session,
+    sessions_of,
+)
 
 _PROBED = 4  # rows
 _HARDLY = 2.0  # squared whitened change of all readings together
@@ -46,6 +51,11 @@ class Signature:
     hypothesis: Hypothesis
     offset: NDArray
     columns: NDArray
+
+    @property
+    def finite(self) -> bool:
+        """Whether the model has a solution."""
+        return bool(np.isfinite(self.columns).all() and np.isfinite(self.offset).all())
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
@@ -126,15 +136,29 @@ class Tangents:
         """(N,) whitened, what is read with effects; see :meth:`.Derivatives.model`."""
         return whiten(self.campaign, self.derivatives.model(effects))
 
+    def rows_of(self, session: str | None) -> NDArray:
+        """(N, 1) 1 in the cells of a session, else 0; 1 in all of None."""
+        row = np.nonzero(self.campaign.cells)[0]
+        if session is None or self.campaign.session is None:
+            return np.ones((len(row), 1))
+        return (self.campaign.session[row] == session)[:, None].astype(float)
+
     def at_start(self, hypothesis: Hypothesis) -> Signature:
         """A hypothesis to first order where it begins to differ from what is declared.
 
         Args:
-            hypothesis: which.
+            hypothesis: with numbers of all rows, or of every session.
 
         Returns:
             The tangent; NaN where the model has no answer there.
         """
+        sessions = sessions_of(hypothesis)
+        one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
+        columns = np.hstack([one.columns * self.rows_of(name) for name in sessions])
+        return Signature(hypothesis, one.offset, columns)
+
+    def _at_start(self, hypothesis: Hypothesis) -> Signature:
+        """A hypothesis with numbers of all rows where it begins."""
         if not hypothesis.slots and self._invisible(hypothesis):
             nothing = np.zeros(len(self.declared))
             return Signature(hypothesis, nothing, np.zeros((len(nothing), 0)))

@@ -10,6 +10,7 @@ from assembly.model.function import Function
 from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import BEAM, LONGER, TURNED, bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
+from validation.diagnosis import derivatives
 from validation.diagnosis import signatures as module
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis
@@ -107,6 +108,8 @@ def test_an_effect_without_unknowns_is_looked_at_where_loads_are_large(
 
     monkeypatch.setattr(module, "apply_effects", apply)
     monkeypatch.setattr(module, "predict", Read)
+    declared = Read(tangents.derivatives.conditions)
+    tangents.derivatives.declared = declared.deviation
     invisible = tangents._invisible(finite)
     assert seen[-1] == 4
     # of the rows looked at, those of largest load and of largest rotation, the same
@@ -157,9 +160,11 @@ def test_clearances_of_an_effect_are_taken_up_in_the_linear_model(
     held = None if rest is None else np.zeros((8, 2, 6))
     plain = tangents.derivatives.conditions
     changed = replace(plain, rest=held, exact=exact)
-    monkeypatch.setattr(module, "apply_effects", lambda conditions, effects: changed)
-    monkeypatch.setattr(module, "with_clearances_taken_up", settle)
-    monkeypatch.setattr(module, "predict", lambda conditions: predict(plain))
+    monkeypatch.setattr(
+        derivatives, "apply_effects", lambda conditions, effects: changed
+    )
+    monkeypatch.setattr(derivatives, "with_clearances_taken_up", settle)
+    monkeypatch.setattr(derivatives, "predict", lambda conditions: predict(plain))
     assert len(tangents.model({effect: {}})) == 48
     taken_up = effect == "joint_clearance" and rest is None and not exact
     assert len(settled) == taken_up
@@ -169,13 +174,13 @@ def test_columns_are_taken_once(monkeypatch):
     """And again for another effect."""
     campaign = bar(link=BEAM)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    model, asked = tangents.model, []
+    model, asked = tangents.derivatives.model, []
 
     def watched(effects):
         asked.append(tuple(effects))
         return model(effects)
 
-    tangents.model = watched
+    tangents.derivatives.model = watched
     first, again = tangents.at_start(LONGER), tangents.at_start(LONGER)
     assert asked == [("link_length",)]
     assert first.columns.tolist() == again.columns.tolist()
