@@ -1,45 +1,24 @@
-"""What a machine may do beside the library, as candidates to be learned.
+"""Functions that a machine may have beside the library's effects, to be learned.
 
 A small screw, or a compliance, at a place, as a function of something that was varied.
-
-======  ===============  =========  ==================================================
-symbol  code             shape      meaning
-======  ===============  =========  ==================================================
-a       ``sensitivity``  (R, 6)     change of the reading per unit of a component
-P       ``basis``        (R, p)     columns of a form in a variable
-T       ``mixed``        (p, q)     numbers of the form per unknown of the search
-======  ===============  =========  ==================================================
-
-A component of a candidate adds a times P T to the readings.
 """
 
 from collections.abc import Iterator, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects.forms import FORMS, roughness
-from assembly.effects.functions import AXES, basis
+from assembly.effects.functions import AXES
 from assembly.effects.places import body_axis, drives, growing
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
-from assembly.measurement.variables import LOADS, variable
+from assembly.measurement.variables import variable
 from assembly.model.function import Function
 from assembly.model.robot import Robot
-from validation.campaign.campaign import Campaign
 from validation.diagnosis.function_forms import CandidateShape
-from validation.diagnosis.responses import Responses
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-_STIFF = 0.1  # of a spline's size that its straight part may have, per step
-_RANK = 1e-8
 _ROUNDING = 1e-12  # of the largest component of a vector
-_STEP = 1e-3  # of the largest load, for a derivative
-_BENT = 64  # columns of forms whose last number is being fitted that are kept
-_NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 
 
 @dataclass(frozen=True)
@@ -92,250 +71,6 @@ class Candidate:
             )
             for p in self.parts
         ]
-
-
-class Sensitivities:
-    """How readings respond to a component at any place; the rows' variables."""
-
-    def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Keep what candidates are made of.
-
-        Args:
-            conditions: R rows as declared.
-            response: of the readings there.
-        """
-        self.conditions, self._response = conditions, response
-        self.rows = np.arange(len(conditions))
-        self._origin = conditions.postures.platform[:, :3, 3]
-        self.basis = lru_cache(maxsize=None)(self._basis)
-        self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
-
-    def take(self, rows: NDArray) -> "Sensitivities":
-        """The same of some rows.
-
-        Args:
-            rows: their numbers.
-
-        Returns:
-            Sensitivities of those; forms are normalised over all rows as before.
-        """
-        other = copy(self)
-        other.rows, other._origin = self.rows[rows], self._origin[rows]
-        r = self._response
-        other._response = Responses(r.reading[rows], r.screws[rows], r.wrenches[rows])
-        return other
-
-    def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """The same functions where effects have changed the conditions.
-
-        Args:
-            conditions: of the same rows.
-            response: of the readings there.
-
-        Returns:
-            Sensitivities there; forms are normalised as before.
-        """
-        other = copy(self)
-        other.conditions, other._response = conditions, response
-        return other
-
-    @property
-    def wrenches(self) -> NDArray:
-        """(R, n, 6) [N m, N] through every joint as declared, in its axes."""
-        return self._response.wrenches
-
-    @cached_property
-    def under_load(self) -> NDArray:
-        """(R, 6, 6) change of the reading per unit of a component of the load."""
-        change = np.zeros((len(self.conditions), 6, 6))
-        still = predict(self.conditions).deviation
-        size = max(float(np.abs(self.conditions.load).max()), 1.0)
-        for k in range(6):
-            load = self.conditions.load + _STEP * size * np.eye(6)[k]
-            more = predict(replace(self.conditions, load=load)).deviation
-            change[:, :, k] = np.nan_to_num((more - still) / (_STEP * size))
-        return change[self.rows]
-
-    def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """(R, 6) change of the reading per unit of a component at a place."""
-        if where == "load":
-            return self.under_load[:, :, LOADS.index(component)]
-        axis = AXES.index(component)
-        if where == "reading":
-            return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
-        if where == "base":
-            screw = np.zeros((len(self._origin), 6))
-            screw[:, axis] = 1.0
-            screw[:, 3:] += np.cross(screw[:, :3], self._origin)
-            return np.einsum("rij,rj->ri", self._response.reading, screw)
-        row = self.conditions.robot.index(where)
-        sensitivity = self._response.screws[:, :, row, axis]
-        if kind == "compliance":
-            return sensitivity * self._response.wrenches[:, row, axis, None]
-        return sensitivity
-
-    def _basis(
-        self, variables: tuple[str, ...], shape: CandidateShape
-    ) -> tuple[NDArray, NDArray]:
-        """(R, q) columns of a form of variables, of order one, and T (p, q)."""
-        raw = self._unmixed(variables, shape)
-        size = np.sqrt(np.mean(raw**2, axis=0))
-        mixed = np.diag(1 / np.where(size > 0, size, 1.0))
-        if shape.form == "powers" and len(shape.names) > 1:
-            # so that a power does not stand for the one below it
-            Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # of fewer rows than powers no more can be told than there are rows
-            good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
-            mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
-            mixed *= np.sqrt(len(raw))
-        elif shape.form == "spline":
-            # the prior of its values: rough ones are unlikely
-            stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
-            mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
-            mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
-        elif shape.form.endswith(("waves", "slow_wave")) and len(variables) == 1:
-            mixed = np.eye(len(shape.names))
-        return raw @ mixed, mixed
-
-    def _unmixed(
-        self, variables: tuple[str, ...], shape: CandidateShape
-    ) -> NDArray:  # fmt: skip
-        """(R, p) columns of a form of variables."""
-        if variables[0].startswith("wrench."):
-            wrench = [self._wrench(*variables)]
-            return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
-        anywhere = CandidatePart("reading", ("tx",), *variables)
-        (function,) = Candidate((anywhere,), "screw", shape).functions()
-        raw = np.nan_to_num(basis(self.conditions, function, shape.names))
-        raw[~is_known(self.conditions, *variables)] = 0.0
-        return raw
-
-    def _wrench(self, name: str) -> NDArray:
-        """(R,) [N m or N] what a joint carries as declared."""
-        frame, _, component = name.removeprefix("wrench.").rpartition(".")
-        row = self.conditions.robot.index(frame)
-        return self._response.wrenches[:, row, LOADS.index(component)]
-
-    def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """What a candidate adds to the readings.
-
-        Args:
-            one: of m unknowns.
-            x: (m,) where it is linearised, or (m + 1,): the last is by how much the
-                number in which its form is not linear is larger.
-
-        Returns:
-            (R, 6, m) or (R, 6, m + 1) [rad, m] per unknown.
-        """
-        m = len(self.axes(one))
-        by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # unknown by unknown in memory, as they are made and put together
-        blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
-        if x is not None and len(x) > m:
-            step = _STEP * float(one.shape.bends[0])
-            more, less = (self.moved(one, x[:m], by + s) for s in (step, -step))
-            blocks.append((more - less)[None] / (2 * step))
-        return np.moveaxis(np.concatenate(blocks), 0, 2)
-
-    def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
-        """What a candidate with known numbers adds to the readings.
-
-        Args:
-            one: of m unknowns.
-            x: (m,) their values.
-            by: how much larger the number is in which its form is not linear.
-
-        Returns:
-            (R, 6) [rad, m].
-        """
-        total, at = np.zeros((len(self.rows), 6)), 0
-        for sensitivity, columns in self._factors(one, by):
-            own = slice(at, at + columns.shape[1])
-            at = own.stop
-            total += sensitivity * (columns @ x[own])[:, None]
-        return total
-
-    def axes(self, one: Candidate) -> NDArray:
-        """(m,) component that each unknown of a candidate acts in."""
-        counts = [columns.shape[1] for _, columns in self._factors(one)]
-        components = [c for part in one.parts for c in part.components]
-        kinds = [0 if is_turn(c) else 3 for c in components]
-        numbers = [
-            AXES.index(c) if c in AXES else k
-            for c, k in zip(components, kinds, strict=True)
-        ]
-        return np.repeat(numbers, counts)
-
-    def _factors(
-        self, one: Candidate, by: float = 0.0
-    ) -> Iterator[tuple[NDArray, NDArray]]:
-        """(R, 6) of every component and (R, q) of its unknowns: both multiplied."""
-        for part in one.parts:
-            columns, mixed = self.basis(part.variables, one.shape)
-            if by:
-                columns = self._raw(part.variables, one.shape.bent(by)) @ mixed
-            columns = columns[self.rows]
-            for component in part.components:
-                yield self.sensitivity(part.where, component, one.kind), columns
-
-    def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """The functions of a robot file with their numbers.
-
-        Args:
-            one: a candidate of m unknowns.
-            x: (m,) their values; or (m + 1,), see :meth:`changes`.
-            std: their standard deviations, taken as independent.
-
-        Returns:
-            One function for each of its parts that the readings see; for each session,
-            if some lack a variable of it.
-        """
-        functions, at = [], 0
-        m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
-        if len(x) > m:
-            ((key, _),) = one.shape.given
-            given, sure = dict(one.shape.bent(float(x[m])).given), {key: float(std[m])}
-            x = x[:m]
-        least = _NOTHING * np.abs(x).max(initial=0.0)
-        for part, function in zip(one.parts, one.functions(), strict=True):
-            _, mixed = self.basis(part.variables, one.shape)
-            numbers, spread = dict(given), dict(sure)
-            shown = []  # components that the readings see
-            alone = len(part.components) == 1
-            for component in part.components:
-                own = slice(at, at + mixed.shape[1])
-                at = own.stop
-                if not np.any(np.abs(x[own]) > least):
-                    continue
-                shown.append(component)
-                values = mixed @ x[own]
-                stds = np.sqrt(mixed**2 @ std[own] ** 2)
-                for name, v, s in zip(one.shape.names, values, stds, strict=True):
-                    key = name if alone else f"{component}.{name}"
-                    numbers[key], spread[key] = float(v), float(s)
-            if len(shown) == 1 and not alone:
-                begin = f"{shown[0]}."
-                numbers = {k.removeprefix(begin): v for k, v in numbers.items()}
-                spread = {k.removeprefix(begin): v for k, v in spread.items()}
-            sessions = self._sessions(part.variables) if shown else ()
-            functions += [
-                replace(
-                    function, components=tuple(shown), parameters=numbers, std=spread,
-                    session=session,
-                )
-                for session in sessions
-            ]  # fmt: skip
-        return functions
-
-    def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """The sessions in which variables are known, None for all."""
-        conditions = self.conditions
-        if variables[0].startswith("wrench.") or conditions.session is None:
-            return (None,)
-        known = is_known(conditions, *variables)
-        if known.all():
-            return (None,)
-        return tuple(dict.fromkeys(conditions.session[known].tolist()))
 
 
 def is_turn(component: str) -> bool:
@@ -432,23 +167,3 @@ def _along(robot: Robot, name: str) -> tuple[str, ...]:
     """Components of a body's lengthening."""
     axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)
-
-
-def in_cells(
-    sensitivities: Sensitivities, one: Candidate, campaign: Campaign
-) -> NDArray:
-    """What a candidate of m unknowns adds to the readings.
-
-    Args:
-        sensitivities: of the campaign's rows.
-        one: the candidate.
-        campaign: of R rows, N measured cells.
-
-    Returns:
-        (N, m) in the cells, over sigma.
-    """
-    changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
-    columns = changes.reshape(len(changes), -1)
-    if not campaign.cells.all():
-        columns = columns[:, campaign.cells.ravel()]
-    return columns.T

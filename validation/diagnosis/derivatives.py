@@ -14,9 +14,9 @@ from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import with_clearances_taken_up
-from validation.diagnosis.candidates import Sensitivities
 from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
+from validation.diagnosis.sensitivities import Sensitivities
 
 STEP = 1e-3  # of an unknown's plausible size, for its first derivative
 

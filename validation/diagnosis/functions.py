@@ -30,8 +30,6 @@ from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
-    Sensitivities,
-    in_cells,
     is_known,
     variables_of,
 )
@@ -39,6 +37,7 @@ from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.gaussian import Marginal, evidence_gains
 from validation.diagnosis.places import Places, Weighted, Where
+from validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms

@@ -15,13 +15,10 @@ from assembly.effects.functions import AXES
 from assembly.kinematics.nominal import size_of
 from assembly.measurement.variables import LOADS
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import (
-    Sensitivities,
-    is_turn,
-    places_of,
-)
+from validation.diagnosis.candidates import is_turn, places_of
 from validation.diagnosis.gaussian import SIZES
 from validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
+from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind

@@ -19,10 +19,11 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.robot import Robot
 from validation.campaign.campaign import Campaign
-from validation.diagnosis.candidates import Candidate, Sensitivities
+from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.nuisance import GEOMETRY, with_compliance, with_error
 from validation.diagnosis.responses import responses
+from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.signatures import conditions_of
 
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior

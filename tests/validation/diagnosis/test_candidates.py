@@ -15,12 +15,12 @@ from validation.campaign.campaign_file import read_commands
 from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
-    Sensitivities,
     places_of,
     variables_of,
 )
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import responses
+from validation.diagnosis.sensitivities import Sensitivities
 from validation.diagnosis.signatures import conditions_of
 
 LINE = CandidateShape("powers", ("0", "1"))
