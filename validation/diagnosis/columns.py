@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
+from validation.diagnosis.candidates import variables_of
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.elements import Element, effect_element, effect_prior
 from validation.diagnosis.functions import Functions
@@ -97,7 +98,8 @@ class Columns:
         rows = rows[drawn(campaign.measured_at_once[rows], _SAMPLE)]
         self.sampled = np.isin(self.row, rows)
         any_function = odds.get(FUNCTION, 1.0) > 0.0
-        self.functions = Functions(campaign, self.sensitivities, any_function)
+        names = variables_of(self.conditions) if any_function else []
+        self.functions = Functions(campaign, self.sensitivities, names)
         self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:

@@ -16,7 +16,8 @@ T       ``through``      (R, S, p)    sum over the cells of a row of a U
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
@@ -31,7 +32,6 @@ from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
     is_known,
-    variables_of,
 )
 from validation.diagnosis.elements import Element, function_element
 from validation.diagnosis.function_forms import CandidateShape
@@ -48,58 +48,17 @@ _BATCH = 2_000_000  # numbers that a batch of functions may occupy at once
 
 @dataclass(frozen=True)
 class ScoredFunction:
-    """A scored function.
+    """A function that may be added to a model.
 
     Attributes:
         score: log evidence ratio plus log prior.
-        where: index of its place.
-        variables: one or two.
-        shape: form.
-        log_prior: ln of the prior probability.
+        candidate: the function.
+        log_prior: ln of its prior probability.
     """
 
     score: float
-    where: int
-    variables: Variables
-    shape: CandidateShape
+    candidate: Candidate
     log_prior: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Scored:
-    """Inner products of c functions of equally many columns, scaled to norm about 1.
-
-    Attributes:
-        whose: (c, 3) number of the request, of its form, and of the place.
-        gram: (c, m, m) B'C^-1 B.
-        along: (c, m) B'C^-1 z.
-        most: (c,) largest plausible prior standard deviation.
-        prior: (c,) log prior.
-    """
-
-    whose: NDArray
-    gram: NDArray
-    along: NDArray
-    most: NDArray
-    prior: NDArray
-
-
-def _likeliest(
-    parts: Mapping[int, Sequence[_Scored]], marginal: Marginal
-) -> list[tuple[float, int, int, int]]:
-    """Return score, request, form and place of the functions, best first."""
-    scores, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
-    for own in parts.values():
-        gains = evidence_gains(
-            np.concatenate([p.gram for p in own]),
-            np.concatenate([p.along for p in own]),
-            np.concatenate([p.most for p in own]), False, marginal,
-        )  # fmt: skip
-        scores.append(gains + np.concatenate([p.prior for p in own]))
-        whose += [p.whose for p in own]
-    score, names = np.concatenate(scores), np.concatenate(whose)
-    order = [i for i in np.argsort(-score).tolist()[:_LISTED] if np.isfinite(score[i])]
-    return [(float(score[i]), *names[i].tolist()) for i in order]
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
@@ -113,26 +72,26 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 
 
 class Functions:
-    """Candidate functions of a campaign."""
+    """Candidate functions of a campaign at single places."""
 
     def __init__(
-        self, campaign: Campaign, sensitivities: Sensitivities, some: bool = True
+        self, campaign: Campaign, sensitivities: Sensitivities, variables: list[str]
     ) -> None:
-        """List places and variables.
+        """List the places.
 
         Args:
             campaign: design; no measured value is used.
             sensitivities: of its rows.
-            some: whether any function may act.
+            variables: public names of what functions may depend on.
         """
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
-        self.variables = variables_of(self.conditions) if some else []
         self.places = Places(campaign, sensitivities)
-        self._keep()
+        self._depend_on(variables)
 
-    def _keep(self) -> None:
-        """Make each answer once."""
+    def _depend_on(self, variables: list[str]) -> None:
+        """Set the variables, and make each answer once."""
+        self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
         self._numbers = cache(self._columns)
@@ -140,8 +99,7 @@ class Functions:
     def of(self, variables: list[str]) -> "Functions":
         """The same of some of the variables."""
         other = copy(self)
-        other.variables = variables
-        other._keep()
+        other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
@@ -229,25 +187,30 @@ class Functions:
         if not len(self.places):
             return []
         row, component = weighted.cells
-        count = marginal.factor_columns.shape[1]
-        U = np.zeros((len(weighted.rows), 6, count))
+        U = np.zeros((len(weighted.rows), 6, marginal.factor_columns.shape[1]))
         U[row, component] = marginal.factor_columns
         held = np.zeros((len(weighted.rows), 6))
         held[row, component] = marginal.held
         through = weighted.answers.transpose(1, 0, 2) @ U
         on = np.einsum("src,rc->sr", weighted.answers, held)
-        parts: dict[int, list[_Scored]] = {}
+        scores, whose = [np.zeros(0)], [np.zeros((0, 3), dtype=int)]
         for own in self._by_width(requests, through[0].size):
-            for one in self._scored(own, requests, weighted, through, on):
-                parts.setdefault(one.along.shape[1], []).append(one)
+            made = self._products(own, requests, weighted, through, on)
+            for names, gram, along, largest, priors in made:
+                gains = evidence_gains(gram, along, largest, False, marginal)
+                scores.append(gains + priors)
+                whose.append(names)
+        score, names = np.concatenate(scores), np.concatenate(whose)
         best: list[ScoredFunction] = []
-        each: dict[int, int] = {}
-        for score, number, k, where in _likeliest(parts, marginal):
-            each[number] = each.get(number, 0) + 1
-            if each[number] <= most:
+        each: Counter[int] = Counter()
+        for i in np.argsort(-score)[:_LISTED].tolist():
+            number, k, where = names[i].tolist()
+            if np.isfinite(score[i]) and each[number] < most:
+                each[number] += 1
                 variables, shapes = requests[number]
+                candidate = _at(self.places.names[where], variables, shapes[k])
                 prior = self.prior(variables, shapes[k])
-                best.append(ScoredFunction(score, where, variables, shapes[k], prior))
+                best.append(ScoredFunction(float(score[i]), candidate, prior))
         return best
 
     def _by_width(
@@ -268,11 +231,17 @@ class Functions:
             count = max(1, _BATCH // max(1, size * m))
             yield from (own[i : i + count] for i in range(0, len(own), count))
 
-    def _scored(
+    def _products(
         self, own: list[tuple[int, int]], requests: Sequence[Request],
         weighted: Weighted, through: NDArray, on: NDArray,
-    ) -> Iterator[_Scored]:  # fmt: skip
-        """Compute inner products of f forms of m columns at all places."""
+    ) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]]:  # fmt: skip
+        """Compute inner products of f forms of m columns at all places.
+
+        Yields:
+            Of c functions with equally many columns: (c, 3) number of the request, of
+            its form and of the place; (c, m, m) B'C^-1 B, columns scaled to norm about
+            1; (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
+        """
         named = [(requests[number][0], requests[number][1][k]) for number, k in own]
         each = [self._numbers(*name)[weighted.rows] for name in named]
         f, m, S = len(own), each[0].shape[1], len(weighted.answers)
@@ -300,10 +269,9 @@ class Functions:
             left *= scale[..., None] * scale[..., None, :]
             b = along[:, mem].reshape(f, c, size * m) * scale
             most = self.places.most[where] * norm.max(axis=2)
-            names = np.repeat(own, c, axis=0)
-            whose = np.column_stack([names, np.tile(where, f)])
-            yield _Scored(
-                whose, left.reshape(f * c, size * m, size * m), b.reshape(f * c, -1),
+            yield (
+                np.column_stack([np.repeat(own, c, axis=0), np.tile(where, f)]),
+                left.reshape(f * c, size * m, size * m), b.reshape(f * c, -1),
                 most.ravel(), np.repeat(priors, c),
             )  # fmt: skip
 
@@ -311,17 +279,6 @@ class Functions:
         """Return (R, q) columns of a form, scaled by their relative prior."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
-
-    def candidate(self, found: ScoredFunction) -> Candidate:
-        """Return the candidate of a scored function."""
-        return self._at(self.places.names[found.where], found.variables, found.shape)
-
-    @staticmethod
-    def _at(
-        place: tuple[Where, ...], variables: Variables, shape: CandidateShape
-    ) -> Candidate:
-        part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
-        return Candidate((part,), place[0][2], shape)
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
         """Return the parts of candidates at other places with equal columns."""
@@ -331,7 +288,7 @@ class Functions:
         own = tuple((part.where, c, one.kind) for c in part.components)
         names = self.places.names
         same = self.places.equal[names.index(own)] if own in names else []
-        return [self._at(p, part.variables, one.shape).parts for p in same]
+        return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
         """Return the element of a candidate; None if it is not visible."""
@@ -342,3 +299,11 @@ class Functions:
         wheres = [(p.where, c, one.kind) for p in one.parts for c in p.components]
         most = min(self.places.plausible(w) for w in wheres)
         return function_element(one, columns, axes, fall, most, log_prior)
+
+
+def _at(
+    place: tuple[Where, ...], variables: Variables, shape: CandidateShape
+) -> Candidate:
+    """Return the function of variables at a place."""
+    part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
+    return Candidate((part,), place[0][2], shape)

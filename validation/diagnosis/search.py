@@ -167,7 +167,10 @@ class Search:
         if products:
             found += self.look(state, self._products(found))
         found.sort(key=lambda one: -one.score)
-        made = [(one.score, self._of(one)) for one in found[:_BEAM]]
+        made = [
+            (one.score, self._element(one.candidate, one.log_prior))
+            for one in found[:_BEAM]
+        ]
         best += [(w, e) for w, e in made if e is not None and e not in state.elements]
         best.sort(key=lambda one: -one[0])
         state.forget()
@@ -176,7 +179,7 @@ class Search:
 
     def _products(self, found: Sequence[ScoredFunction]) -> list[Request]:
         """Return requests for products of the best functions' variables."""
-        names = list(dict.fromkeys(one.variables[0] for one in found))
+        names = list(dict.fromkeys(f.candidate.parts[0].variable for f in found))
         names = names[:_VARIABLES]
         if "approach" in self.functions.variables:
             names.append("approach")
@@ -199,10 +202,6 @@ class Search:
     def _more(self) -> float:
         """Readings of all rows for one of the sampled rows."""
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
-
-    def _of(self, found: ScoredFunction) -> Element | None:
-        """Return the element of a scored function."""
-        return self._element(self.functions.candidate(found), found.log_prior)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
         """Return the cached element of a function, with columns of all cells."""
@@ -231,7 +230,7 @@ class Search:
         priors = self.functions.shapes_of(variables)
         if len(one.parts) == 1:
             found = self.look(base, [(variables, tuple(priors))], most=4)
-            return [self._of(f) for f in found]
+            return [self._element(f.candidate, f.log_prior) for f in found]
         count = sum(len(part.components) for part in one.parts)
         tried = [
             Candidate(one.parts, one.kind, shape)

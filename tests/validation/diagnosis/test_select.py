@@ -103,9 +103,7 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     search = Search(WeightedReadings(columns, z, every, np.ones(len(z))))
     search.prepare()
     looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
-    made = [
-        columns.functions.element(columns.functions.candidate(f), 0.0) for f in looked
-    ]
+    made = [columns.functions.element(f.candidate, 0.0) for f in looked]
     dense = Dense(made, search.readings.cells, search.readings.whiten)
     alone = dense.gains(search.empty[-1].marginal)
     together = np.array([f.score - f.log_prior for f in looked])
