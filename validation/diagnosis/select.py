@@ -19,7 +19,6 @@ from validation.diagnosis.columns import Columns
 from validation.diagnosis.common_noise import common_sizes, stable
 from validation.diagnosis.elements import Element, label
 from validation.diagnosis.gaussian import scale
-from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import (
     Noise,
     cell_weights,
@@ -96,70 +95,50 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
-    best, fit = states[0], search.readings
-    hypotheses: list[Hypothesis] = []
-    values: list[NDArray] = []
-    functions: list[Learned] = []
-    names = [names_of(s) for s in states]
-    if search.columns.device is not None:
-        hypotheses.append(search.columns.device)
-        values.append(search.columns.device.start)
-    for k, e in enumerate(best.elements):
-        mean = best.sizes.mean[best.own(k)]
-        if e.name:
-            hypotheses.append(e.hypothesis)
-            values.append(e.values(mean))
-            continue
-        own = names_of(replace(best, elements=(e,)))[0]
-        share = sum(w for w, n in zip(weights, names, strict=True) if own in n)
-        functions.append(_learned(search, states, best, k, float(share)))
+    best, readings, device = states[0], search.readings, search.columns.device
+    own = [(k, e) for k, e in enumerate(best.elements) if e.name]
+    hypotheses = [e.hypothesis for _, e in own]
+    values = [e.values(best.sizes.mean[best.own(k)]) for k, e in own]
+    if device is not None:
+        hypotheses, values = [device, *hypotheses], [device.start, *values]
     effects = {e.name for s in states for e in s.elements if e.name}
-    small, kept = search.columns.nuisance, np.flatnonzero(best.used)
-    blocks = len(np.unique(search.columns.block[fit.cells]))
-    tau, tau_std = scale(best.sizes.squares, fit.count)
+    small = search.columns.nuisance.take(best.used)
+    tau, tau_std = scale(best.sizes.squares, readings.count)
+    std = best.sizes.std[: len(small.frame)] * tau
+    common = tau * readings.common[0], tau * readings.common[1]
     return Selected(
         hypotheses=tuple(hypotheses),
         values=np.concatenate([np.zeros(0), *values]),
-        functions=tuple(functions),
-        prior=SmallPrior(
-            small.spring[kept],
-            small.frame[kept],
-            small.axis[kept],
-            best.sizes.std[: len(kept)] * tau,
-        ),  # fmt: skip
-        noise=Noise(
-            tau,
-            tau_std,
-            _findings(search, best, (tau, tau_std), good),
-            (tau * fit.common[0], tau * fit.common[1]),
-        ),  # fmt: skip
+        functions=tuple(
+            _learned(search, states, weights, k)
+            for k, e in enumerate(best.elements)
+            if not e.name
+        ),
+        prior=SmallPrior(small.spring, small.frame, small.axis, std),
+        noise=Noise(tau, tau_std, _findings(search, best, good), common),
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
-        unknowns=float(best.sizes.determined.sum()) + fit.flat.shape[1],
-        blocks=blocks,
-        gain=best.score - search.begin.score,
+        unknowns=float(best.sizes.determined.sum()) + readings.flat.shape[1],
         states=tuple(states[:_LISTED]),
     )
 
 
-def _findings(
-    search: Search, best: State, scale: tuple[float, float], good: NDArray
-) -> tuple[str, ...]:
+def _findings(search: Search, best: State, good: NDArray) -> tuple[str, ...]:
     """Return findings about the noise: scale, repeatability, memory."""
-    columns, fit = search.columns, search.readings
-    row, component = (axis[fit.cells] for axis in np.nonzero(columns.campaign.cells))
-    repeat = columns.campaign.repeat[row]
+    campaign, readings = search.columns.campaign, search.readings
+    row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
-    if columns.campaign.point is not None:
-        point = np.unique(columns.campaign.point, return_inverse=True)[1][row]
-    group = (repeat * (point.max(initial=0) + 1) + point) * 6 + component
+    if campaign.point is not None:
+        point = np.unique(campaign.point, return_inverse=True)[1][row]
+    group = campaign.repeat[row] * (point.max(initial=0) + 1) + point
     kept = good > 0.5
-    repeats = repeat_scatter(best.left[kept], group[kept])
+    repeats = repeat_scatter(best.left[kept], (group * 6 + component)[kept])
     forms = {e.candidate.shape.form for e in best.elements if not e.name}
     memory = any(FORMS[form].remembers for form in forms)
-    common = scale[0] * fit.common[0], scale[0] * fit.common[1]
-    return findings(*scale, repeats, memory=memory, common=common)
+    tau, tau_std = scale(best.sizes.squares, readings.count)
+    common = tau * readings.common[0], tau * readings.common[1]
+    return findings(tau, tau_std, repeats, memory=memory, common=common)
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
@@ -174,24 +153,23 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
     """Remove the best models whose functions fail cross-validation."""
-    blocks = search.columns.block[search.readings.cells]
+    blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
         # each one, and all together: two functions can compensate each other
-        rests = [tuple(x for x in best.elements if x is not e) for e in learned]
-        rests.append(tuple(x for x in best.elements if x.name))
+        rests = [best.without([e]) for e in learned]
         sure = [
-            prediction_gain(best, search.models.state(rest, best.mode, best), blocks)
-            for rest in rests
+            prediction_gain(best, models.state(rest, best.mode, best), blocks)
+            for rest in [*rests, best.without(learned)]
             if learned
         ]
         if all(one >= _SURE for one in sure):
             break
         rest = rests[int(np.argmin(sure[: len(learned)]))]
         known = {frozenset(s.elements) for s in states}
-        pruned = [] if frozenset(rest) in known else [search.models.best(rest, best)]
-        states = sorted([*states[1:], *pruned], key=lambda s: -s.score)
+        pruned = [] if frozenset(rest) in known else [models.best(rest, best)]
+        states = _best_first([*states[1:], *pruned])
     return states
 
 
@@ -204,47 +182,50 @@ def _merged(states: Sequence[State]) -> list[State]:
     Returns:
         Models, best first.
     """
-    every = sorted(states, key=lambda s: -s.score)
-    bare = [
-        s for s in every if not _functions(s)
-    ]  # kept in case no function is confirmed
-    ordered = [
-        *every[:_COMPARED],
-        *(s for s in bare[:_LISTED] if s not in every[:_COMPARED]),
-    ]
+    every = _best_first(states)
+    # models without functions are kept in case no function is confirmed
+    bare = [s for s in every if not _functions(s)][:_LISTED]
+    compared = every[:_COMPARED]
     kept: list[State] = []
-    for state in ordered:
+    for state in [*compared, *(s for s in bare if s not in compared)]:
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
         if twin is None:
             kept.append(state)
-        elif _rank(state) < _rank(kept[twin]):
-            both = np.logaddexp(state.score, kept[twin].score)
-            kept[twin] = replace(state, score=float(both))
-        elif _rank(state) > _rank(kept[twin]):
-            both = np.logaddexp(state.score, kept[twin].score)
-            kept[twin] = replace(kept[twin], score=float(both))
+        elif _rank(state) != _rank(kept[twin]):
+            kept[twin] = _joined(*sorted((kept[twin], state), key=_rank))
         elif names_of(state) != names_of(kept[twin]):
             kept.append(state)
-    return _without_refinements(sorted(kept, key=lambda s: -s.score))
+    return _without_refinements(kept)
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
     """Merge models with an effect's refinement that is not clearly better than it."""
     kept: list[State] = []
-    for state in sorted(states, key=lambda s: any(map(_refined, s.elements))):
-        plain = [_refined(e) or e.name for e in state.elements]
+    for state in sorted(_best_first(states), key=_is_refined):
+        plain = sorted(_refined(e) or e.name for e in state.elements)
         alike = [
             k for k, other in enumerate(kept)
-            if any(map(_refined, state.elements))
-            and sorted(plain) == sorted(e.name for e in other.elements)
+            if _is_refined(state) and plain == sorted(e.name for e in other.elements)
             and other.score > state.score - _EQUAL
         ]  # fmt: skip
         if alike:
-            both = float(np.logaddexp(kept[alike[0]].score, state.score))
-            kept[alike[0]] = replace(kept[alike[0]], score=both)
+            kept[alike[0]] = _joined(kept[alike[0]], state)
         else:
             kept.append(state)
-    return sorted(kept, key=lambda s: -s.score)
+    return _best_first(kept)
+
+
+def _best_first(states: Sequence[State]) -> list[State]:
+    return sorted(states, key=lambda s: -s.score)
+
+
+def _joined(one: State, other: State) -> State:
+    """Return a model with the weight of another one as well."""
+    return replace(one, score=float(np.logaddexp(one.score, other.score)))
+
+
+def _is_refined(state: State) -> bool:
+    return any(map(_refined, state.elements))
 
 
 def _refined(e: Element) -> str:
@@ -282,26 +263,26 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 
 
 def _learned(
-    search: Search, states: Sequence[State], best: State, k: int, probability: float
+    search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
     """Return a function of the best model with its equivalents."""
-    e = best.elements[k]
-    rest = set(best.elements) - {e}
+    best, e = states[0], states[0].elements[k]
+    rest = best.without([e])
     equal = list(search.functions.equivalents(e.candidate))
     for s in states:
-        other = set(s.elements) - rest
-        if rest <= set(s.elements) and len(other) == 1 and not next(iter(other)).name:
-            parts = next(iter(other)).candidate.parts
+        others = [x for x in s.elements if x not in rest]
+        if len(others) == 1 and len(s.elements) > len(rest) and not others[0].name:
+            parts = others[0].candidate.parts
             if parts != e.candidate.parts and s.score > best.score - _EQUAL:
                 equal.append(parts)
-    without = search.models.state(
-        tuple(x for x in best.elements if x is not e), best.mode, best
-    )
-    std = best.sizes.std[best.own(k)] * e.scale * best.tau
+    own = names_of(replace(best, elements=(e,)))[0]
     return Learned(
-        e.candidate, tuple(dict.fromkeys(equal)), best.score - without.score, std,
-        probability,
-        range_error(
-            e.candidate, best, without, search.columns.row[search.readings.cells]
+        candidate=e.candidate,
+        equivalent=tuple(dict.fromkeys(equal)),
+        std=best.sizes.std[best.own(k)] * e.scale * best.tau,
+        probability=float(weights[[own in names_of(s) for s in states]].sum()),
+        range_error=range_error(
+            e.candidate, best, search.models.state(rest, best.mode, best),
+            search.columns.row[search.readings.cells],
         ),
     )  # fmt: skip

@@ -18,7 +18,6 @@ class Learned:
     Attributes:
         candidate: where, of what, in which form.
         equivalent: other places and variables with the same predictions.
-        gain: log posterior minus that of the model without it.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
         probability: of all models with a function of these variables.
         range_error: where it must extrapolate; None where that cannot be said.
@@ -26,10 +25,9 @@ class Learned:
 
     candidate: Candidate
     equivalent: tuple[tuple[CandidatePart, ...], ...]
-    gain: float
     std: NDArray
     probability: float
-    range_error: RangeError | None = None
+    range_error: RangeError | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +75,6 @@ class Selected:
         models: by names, best first.
         probability: of each effect of the library in any visited model.
         unknowns: [-] number of well determined unknowns, with the measuring frame.
-        blocks: configurations, or spans of time.
-        gain: log posterior of the best model over the model without elements.
         states: models that were seen, best first.
     """
 
@@ -91,11 +87,4 @@ class Selected:
     models: tuple[Model, ...]
     probability: dict[str, float]
     unknowns: float
-    blocks: int
-    gain: float
     states: tuple[State, ...]
-
-    @property
-    def enough(self) -> bool:
-        """Whether the blocks exceed the unknowns by two."""
-        return self.blocks >= self.unknowns + 2

@@ -102,6 +102,10 @@ class State:
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
 
+    def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
+        """Return the elements but for some."""
+        return tuple(e for e in self.elements if e not in some)
+
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
         """Return the standard deviations by group of another model with elements."""
         own = self.sizes.of_group
