@@ -79,13 +79,9 @@ def is_turn(component: str) -> bool:
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Public names of what was varied, and is known in every row of some session.
+    """Return names of what was varied, and is known in every row of some session.
 
-    Args:
-        conditions: R rows.
-
-    Returns:
-        Coordinates of drives, loads and their size, positions, covariates.
+    Coordinates of drives, loads and their size, positions, covariates.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -111,14 +107,9 @@ def _kind(name: str) -> str:
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:
-    """(R,) bool, rows of sessions in which variables are known in every row.
+    """Return (R,) bool, rows of sessions in which variables are always known.
 
-    Args:
-        conditions: R rows.
-        names: of variables, no wrenches.
-
-    Returns:
-        All rows or none, where there are no sessions.
+    All rows or none, where there are no sessions; wrenches are not asked for.
     """
     known = np.ones(len(conditions), dtype=bool)
     for name in names:
@@ -133,10 +124,6 @@ def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
     """Kinds and parts of all candidates, variable by variable.
-
-    Args:
-        robot: any.
-        variables: names of what was varied.
 
     Yields:
         Kind, and where with what: components one by one and by three, drives together

@@ -67,14 +67,11 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Compute all derivatives.
+        """Compute all derivatives; of what was measured only the pattern of NaN counts.
 
-        Args:
-            campaign: of ``measured``, only the pattern of NaN is used.
-            derivatives: of its rows, registered, with the second-order part.
-            update: progress callback: stage, steps done, steps in total.
-            odds: factors on the prior odds of effects, of ``"function"``, and of
-                ``"geometry"`` and ``"springs"``, by name; 0 leaves something out.
+        Conditions are registered and have the second-order part.  ``odds`` are factors
+        on the prior odds of effects, of ``"function"``, ``"geometry"`` and
+        ``"springs"`` by name; 0 leaves something out.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -156,15 +153,10 @@ class Columns:
     def whitening(
         self, cells: NDArray, root: NDArray, common: tuple[float, float]
     ) -> Whitening:
-        """The map of cells to cells of independent noise.
+        """Return the map of cells (N,) bool to cells of independent noise.
 
-        Args:
-            cells: (N,) mask.
-            root: (n,) square roots of their relative precisions.
-            common: [rad, m] sizes of the platform's motion in common, over tau.
-
-        Returns:
-            The map.
+        ``root`` (n,) are square roots of their relative precisions, ``common`` [rad, m]
+        sizes of the platform's motion in common, over tau.
         """
         loadings = self.loadings(cells) if any(common) else None
         if loadings is not None:

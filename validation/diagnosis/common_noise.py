@@ -26,10 +26,7 @@ _STABLE = 0.1  # change of a logarithm that changes no decision
 
 
 def common_sizes(state: State) -> tuple[float, float]:
-    """Estimate the noise in common.
-
-    Args:
-        state: model of the readings; its elements are kept.
+    """Estimate the noise in common, for the elements of a model.
 
     Returns:
         [rad, m] standard deviations of rotation and translation over the noise's scale;

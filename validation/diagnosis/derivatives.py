@@ -49,13 +49,9 @@ class Derivatives:
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values]) -> NDArray:
-        """What is read with effects, to first order in clearances.
+        """Return (R, 6) [rad, m] read with effects, to first order in clearances.
 
-        Args:
-            effects: parameters by their public names, by effect.
-
-        Returns:
-            (R, 6) [rad, m]; NaN where the model has no answer.
+        Effects are parameters by their public names; NaN where the model has no answer.
         """
         changed = apply_effects(self.conditions, effects)
         settles = any(LIBRARY[name].clearance for name in effects)
@@ -64,15 +60,9 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """(R, 6) [rad, m] where one number of an effect is a step off its start.
+        """Return (R, 6) [rad, m] where one number of an effect is a step off.
 
-        Args:
-            effect: its name.
-            slot: the number.
-            shapes: values of the unknowns that shape the effect.
-
-        Returns:
-            The readings.
+        ``shapes`` are values of the unknowns that shape the effect.
         """
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._begun:

@@ -88,16 +88,10 @@ class Element:
 def effect_element(
     signature: Signature, robot: Robot, log_prior: float, shapes: NDArray | None = None
 ) -> Element:
-    """Build the element of a library effect.
+    """Return the element of a library effect.
 
-    Args:
-        signature: of the hypothesis.
-        robot: whose frames it names.
-        log_prior: of it.
-        shapes: (k,) values of linearisation; absent for the start values.
-
-    Returns:
-        The element; unknowns without influence stay at their start values.
+    ``shapes`` (k,) are the values at which it is linearised; absent for the start
+    values.  Unknowns without influence stay at their start values.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -155,7 +149,7 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Build the element of a function.
+    """Build the element of a function; None if the readings do not depend on it.
 
     Args:
         candidate: of m unknowns.
@@ -166,7 +160,7 @@ def function_element(
         log_prior: ln of the prior probability.
 
     Returns:
-        The element; None if the readings do not depend on it.
+        The element.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -186,13 +180,7 @@ class Dense:
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Group the elements by their number of columns.
-
-        Args:
-            elements: candidates.
-            cells: (N,) mask of the fitted cells.
-            whiten: map of these n cells.
-        """
+        """Group candidates by their number of columns in cells (N,) bool."""
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
         self._groups: list[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]] = []

@@ -162,11 +162,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return the forms of a product of two variables.
+    """Return the forms of a product of two variables, and the variables in their order.
 
-    Returns:
-        The variables in the order of the forms, and the forms; None if the product
-        is not useful.
+    None if the product is not useful.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -204,14 +202,8 @@ def near(
 ) -> list[CandidateShape]:
     """Return a form with the number in which it is not linear a bit less, and more.
 
-    Args:
-        conditions: R rows.
-        variables: one or two.
-        shape: form.
-        part: of half the step by which forms are tried first.
-
-    Returns:
-        Two forms; none of a form without such a number, or of a step.
+    ``part`` is relative to half the step by which forms are tried first.  None of a
+    form without such a number, or of a step.
     """
     if not len(shape.bends):
         return []

@@ -77,13 +77,7 @@ class Functions:
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, variables: list[str]
     ) -> None:
-        """List the places.
-
-        Args:
-            campaign: design; no measured value is used.
-            sensitivities: of its rows.
-            variables: public names of what functions may depend on.
-        """
+        """List the places of a design; no measured value is used."""
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self.places = Places(campaign, sensitivities)
@@ -173,16 +167,10 @@ class Functions:
         self, marginal: Marginal, weighted: Weighted,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
-        """Return the functions that improve a model most.
+        """Return the functions that improve a model most, best first.
 
-        Args:
-            marginal: model, in the cells of ``weighted``.
-            weighted: responses at all places.
-            requests: variables with their forms.
-            most: number of functions for each request.
-
-        Returns:
-            Scored functions, best first.
+        The model is in the cells of ``weighted``; of each request ``most`` are
+        returned.
         """
         if not len(self.places):
             return []
@@ -218,9 +206,7 @@ class Functions:
     ) -> Iterator[list[tuple[int, int]]]:
         """Yield request and form of functions with equally many columns, in batches.
 
-        Args:
-            requests: variables with their forms.
-            size: numbers that one column of one function occupies.
+        One column of one function occupies ``size`` numbers.
         """
         by_width: dict[int, list[tuple[int, int]]] = {}
         for number, (variables, shapes) in enumerate(requests):

@@ -73,12 +73,7 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings by a fit to all others, exactly.
-
-    Args:
-        marginal: of n readings.
-        blocks: (n,) block of each reading.
-        tau: scale of the noise.
+    """Predict each block of readings (n,) by a fit to all others, exactly.
 
     Returns:
         (n,) prediction errors and (blocks,) ln predictive densities.
@@ -145,10 +140,7 @@ def evidence_gains(
 def size_penalty(determined: float) -> float:
     """Return the penalty of an optimised prior size (Laplace approximation).
 
-    Args:
-        determined: number of well determined unknowns that share the size.
-
-    Returns:
-        Logarithm of the ratio of maximum and average over the range of sizes.
+    The logarithm of the ratio of maximum and average over the range of sizes, which
+    ``determined`` well determined unknowns share.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

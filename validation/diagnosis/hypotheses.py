@@ -58,15 +58,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Parameters by their public names.
-
-        Args:
-            robot: that of the campaign.
-            x: a value for each slot.
-
-        Returns:
-            Values in SI units.
-        """
+        """Parameters by their public names [SI], x one for each slot."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -89,14 +81,10 @@ class Hypothesis:
 
 
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
-    """All hypotheses that conditions can tell anything about.
+    """Return all hypotheses that declared conditions can tell anything about.
 
-    Args:
-        conditions: the conditions of a campaign, as declared.
-        loads: components of the load that the campaign records, such as ``["fx"]``.
-
-    Returns:
-        Hypotheses, effect by effect in the library's order.
+    Effect by effect; ``loads`` are components of the load that the campaign records,
+    such as ``["fx"]``.
     """
     return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
@@ -193,15 +181,10 @@ def _scanned(
 
 
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
-    """Hypotheses whose effect and that of a robot's file are one effect again.
+    """Return hypotheses whose effect and that of a robot's file are one again.
 
-    Args:
-        listed: any.
-        robot: with the effects of its file.
-
-    Returns:
-        The same, but for contact laws and delays where there is one; a drift has the
-        time constant that the file declares, and springs may be stiffer than declared.
+    That leaves out contact laws and delays where there is one; a drift has the time
+    constant that the file declares, and springs may be stiffer than declared.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -247,16 +230,10 @@ def _held(slot: Slot, constant: float) -> Slot:
 def with_sessions(
     listed: Sequence[Hypothesis], sessions: Sequence[str], further: Sequence[str] = ()
 ) -> list[Hypothesis]:
-    """Hypotheses, and those of effects that may differ from session to session.
+    """Return hypotheses, and those that may differ from session to session.
 
-    Args:
-        listed: of a campaign.
-        sessions: its names.
-        further: effects that may differ, beside :data:`PER_SESSION`.
-
-    Returns:
-        The same; and, where there are several sessions, each that shares no number
-        among frames once more, with numbers for every session.
+    Where there are several sessions, each effect of :data:`PER_SESSION` and ``further``
+    that shares no number among frames stands once more, with numbers for every session.
     """
     if len(sessions) < 2:
         return list(listed)
@@ -281,15 +258,7 @@ def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """What a hypothesis says of one session, as if of all.
-
-    Args:
-        h: with numbers for every session, or for all.
-        session: its name.
-
-    Returns:
-        A hypothesis of the numbers that act there, and which of its slots they are.
-    """
+    """What a hypothesis says of one session, as if of all, and which slots it has."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

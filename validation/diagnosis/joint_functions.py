@@ -25,14 +25,9 @@ Parts = tuple[CandidatePart, ...]
 
 
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
-    """Return functions at several places and cubic springs.
+    """Return functions at several places and cubic springs that the readings depend on.
 
-    Args:
-        functions: of a campaign.
-        rows: numbers of the rows whose cells the columns have.
-
-    Returns:
-        Elements that the readings depend on.
+    Their columns are those of the cells of some rows.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []

@@ -58,14 +58,9 @@ class Beyond:
 
 
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
-    """Least and largest value of all that acts in a campaign, but time.
+    """Return least and largest value of all that acts in some rows, but time.
 
-    Args:
-        campaign: of R rows.
-        rows: mask (R,) of those that were learned from.
-
-    Returns:
-        By public name: drives, components of the load, covariates.
+    By public name: drives, components of the load, covariates.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -76,15 +71,10 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 
 
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
-    """What leaves the range in which a robot was learned.
+    """Return what leaves the range in which a robot was learned.
 
-    Args:
-        robot: whose file says that range; nothing is found where it says none.
-        campaign: rows of it, measured or not.
-
-    Returns:
-        One for each variable with a value outside by more than a twentieth of the
-        range.
+    One for each variable outside by more than a twentieth of its range; none where the
+    robot's file says no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -95,15 +85,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """(R,) names of what leaves the learned range in each row, empty if nothing does.
-
-    Args:
-        robot: whose file says that range.
-        campaign: of R rows.
-
-    Returns:
-        Texts, names separated by spaces.
-    """
+    """(R,) names of what leaves the learned range in each row, or empty."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]

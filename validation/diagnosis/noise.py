@@ -43,15 +43,10 @@ class Noise:
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Return the probability that each reading is no blunder.
+    """Return the (n,) probability that each reading is no blunder, by expected squares.
 
-    Args:
-        squares: (n,) expected squared residuals.
-
-        clearly: require large residuals, because effects are not fitted yet.
-
-    Returns:
-        (n,) 1 if a reading is more likely good; all 1 if there are too many outliers.
+    1 if it is more likely good, and of all if there are too many outliers.  ``clearly``
+    asks for large residuals, because effects are not fitted yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -70,15 +65,7 @@ def cell_weights(good: NDArray) -> NDArray:
 
 
 def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """Return the scatter of repeated readings.
-
-    Args:
-        z: (n,) whitened residual.
-        group: (n,) readings with the same number are repeats.
-
-    Returns:
-        [sigma] root mean square within groups, and its degrees of freedom.
-    """
+    """Return [sigma] rms of residuals within groups of repeats, and its freedom."""
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(number, weights=z) / count
     freedom = len(z) - len(count)
@@ -90,7 +77,7 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return findings about the noise.
+    """Return sentences about the noise; none where all is as stated.
 
     Args:
         tau: true over stated sigma.
@@ -100,7 +87,7 @@ def findings(
         common: [rad, m] noise that the points of a measurement share.
 
     Returns:
-        Sentences; none where all is as stated.
+        Sentences for the user.
     """
     told = []
     if any(common):

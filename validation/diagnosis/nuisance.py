@@ -69,20 +69,11 @@ def nuisance(
     campaign: Campaign, conditions: Conditions, response: Responses, named: NDArray,
     kinds: Container[str] = (GEOMETRY, SPRINGS),
 ) -> Nuisance:  # fmt: skip
-    """Geometric errors and springs of a campaign's robot.
+    """Return geometric errors and springs that show in a campaign's readings.
 
     Random springs describe compliance that is spread over many joints: one with the
-    same column as a single unknown of a library effect is that effect, and left out.
-
-    Args:
-        campaign: of R rows, N measured cells.
-        conditions: its conditions as declared.
-        response: of the readings there.
-        named: (N, c) columns of single unknowns of library effects.
-        kinds: which of the two there are.
-
-    Returns:
-        The unknowns that show in the readings.
+    same column as a single unknown of a library effect (N, c) ``named`` is that effect,
+    and left out.  ``response`` is of the conditions as declared.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
@@ -132,16 +123,9 @@ def _is_among(columns: NDArray, named: NDArray) -> NDArray:
 
 
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """A robot whose geometric errors are larger by x (k,) [rad, m] at frames and axes.
+    """Return a robot whose geometric errors are larger by x (k,) [rad, m].
 
-    Args:
-        robot: any.
-        frame: (k,) rows of frames.
-        axis: (k,) components of the screw there, 0 to 5.
-        x: (k,) what is added.
-
-    Returns:
-        The robot.
+    At frames (k,), rows of the robot's, in components (k,) of the screw there, 0 to 5.
     """
     errors = robot.errors.copy()
     np.add.at(errors, (frame, axis), x)
@@ -149,16 +133,10 @@ def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot
 
 
 def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """A robot with compliances x (k,) in series with its joints; 0 changes nothing.
+    """Return a robot with x (k,) [rad/(N m), m/N] in series with its joints.
 
-    Args:
-        robot: any.
-        frame: (k,) rows of frames.
-        axis: (k,) components of the screw there, 0 to 5.
-        x: (k,) [rad/(N m), m/N].
-
-    Returns:
-        The robot.
+    At frames (k,), rows of the robot's, in components (k,) of the screw there, 0 to 5;
+    0 changes nothing.
     """
     frames = list(robot.frames)
     for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):

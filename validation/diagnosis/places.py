@@ -74,12 +74,7 @@ class Places:
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List the places.
-
-        Args:
-            campaign: design; no measured value is used.
-            sensitivities: of its rows.
-        """
+        """List the places of a design; no measured value is used."""
         self._campaign, self._sensitivities = campaign, sensitivities
         self._plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         self.names: list[tuple[Where, ...]] = []
@@ -177,15 +172,10 @@ class Places:
         return most / size if size > 0 else 0.0
 
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
-        """Return weighted responses in selected cells.
+        """Return weighted responses at all places in cells (N,) bool.
 
-        Args:
-            cells: (N,) mask of the measured cells.
-            whiten: map of these n cells; rows of one measurement have equal variables,
-                so that a response times a function is whitened as the response is.
-
-        Returns:
-            Responses of all places.
+        Rows of one measurement have equal variables, so that a response times a
+        function is whitened as the response is.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)

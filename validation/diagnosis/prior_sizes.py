@@ -93,15 +93,10 @@ def best_sizes(
     model: Grouped, start: Mapping[int, float] = MappingProxyType({}),
     eigen: Mapping[int, Eigen] = MappingProxyType({}),
 ) -> Sizes:  # fmt: skip
-    """Optimise the prior standard deviations of all groups.
+    """Return the likeliest prior standard deviations of all groups.
 
-    Args:
-        model: unknowns and their groups.
-        start: start values by group.
-        eigen: eigenvalues and eigenvectors of some groups' blocks of ``gram``.
-
-    Returns:
-        Standard deviations and posterior.
+    They begin at ``start``; ``eigen`` are eigenvalues and eigenvectors of some groups'
+    blocks of the inner products.
     """
     free, count = np.isnan(model.given), model.count
     groups = np.unique(model.group[free]).tolist()

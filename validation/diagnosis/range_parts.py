@@ -39,17 +39,10 @@ class RangeError:
 def range_error(
     candidate: Candidate, best: State, without: State, rows: NDArray
 ) -> RangeError | None:
-    """The error where a function of a model must extrapolate.
+    """Return the error where a function of a model must extrapolate.
 
-    Args:
-        candidate: the function.
-        best: model with it.
-        without: the same model without it.
-        rows: (n,) row of each fitted cell.
-
-    Returns:
-        Of its variables the one with the largest error; None where none has enough
-        values.
+    Of its variables that with the largest error, None where none has enough values.
+    ``without`` is the model without it, ``rows`` (n,) are those of the fitted cells.
     """
     conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)

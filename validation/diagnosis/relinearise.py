@@ -29,12 +29,7 @@ class Relinearisation:
     """Linearisations of models at their estimates, with a cache."""
 
     def __init__(self, tangents: Tangents, models: Models) -> None:
-        """Start with an empty cache.
-
-        Args:
-            tangents: of all N cells.
-            models: of the fitted cells.
-        """
+        """Start with an empty cache; tangents are of all cells."""
         self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
 
@@ -91,15 +86,10 @@ class Relinearisation:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Linearise effects at given values, all acting together.
+        """Return effects linearised at given values of their slots, acting together.
 
-        Args:
-            elements: of the library.
-            xs: values of the slots of each.
-
-        Returns:
-            Elements whose sum is exact at these values; the given ones if the model
-            has no solution there.
+        The sum of what is returned is exact there.  The given ones are returned if the
+        model has no solution there.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)

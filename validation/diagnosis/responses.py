@@ -51,13 +51,9 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Answers to small screws at all frames, clearances where they rest.
+    """Return how R rows answer small screws, clearances where they rest.
 
-    Args:
-        conditions: R rows of a robot.
-
-    Returns:
-        The answers; rows that do not close have zeros.
+    Rows that do not close have zeros.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct

@@ -53,7 +53,7 @@ def select(
         columns: of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells; no other reading is used.
-        update: progress callback: stage, steps done, steps in total.
+        update: told the stage, steps done, and steps in total.
         common: [rad, m] noise that cells of a measurement share, over tau, if known.
 
     Returns:
@@ -174,13 +174,11 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 
 
 def _merged(states: Sequence[State]) -> list[State]:
-    """Merge models of equal predictions; the one with fewer functions is kept.
+    """Return models without others of equal predictions, best first.
 
-    A function with the same columns as an effect of the library is that effect; but for
-    errors of the measuring device, which the machine may have as well.
-
-    Returns:
-        Models, best first.
+    The one with fewer functions is kept: a function with the same columns as an effect
+    of the library is that effect; but for errors of the measuring device, which the
+    machine may have as well.
     """
     every = _best_first(states)
     # models without functions are kept in case no function is confirmed

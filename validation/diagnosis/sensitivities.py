@@ -46,12 +46,7 @@ class Sensitivities:
     """How readings respond to a component at any place; the rows' variables."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Keep what candidates are made of.
-
-        Args:
-            conditions: R rows as declared.
-            response: of the readings there.
-        """
+        """Keep what candidates are made of: R rows as declared, and how they answer."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -59,14 +54,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """The same of some rows.
-
-        Args:
-            rows: their numbers.
-
-        Returns:
-            Sensitivities of those; forms are normalised over all rows as before.
-        """
+        """The same of some rows, by number; forms are normalised over all."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -74,14 +62,9 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """The same functions where effects have changed the conditions.
+        """Return the same where effects have changed the conditions of the rows.
 
-        Args:
-            conditions: of the same rows.
-            response: of the readings there.
-
-        Returns:
-            Sensitivities there; forms are normalised as before.
+        Forms are normalised as before.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -165,15 +148,11 @@ class Sensitivities:
         return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """What a candidate adds to the readings.
+        """Return (R, 6, m) [rad, m] what a candidate adds, per unknown.
 
-        Args:
-            one: of m unknowns.
-            x: (m,) where it is linearised, or (m + 1,): the last is by how much the
-                number in which its form is not linear is larger.
-
-        Returns:
-            (R, 6, m) or (R, 6, m + 1) [rad, m] per unknown.
+        ``x`` (m,) is where it is linearised.  If it is (m + 1,), the last is by how
+        much the number in which its form is not linear is larger, and has a column as
+        well.
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
@@ -186,15 +165,9 @@ class Sensitivities:
         return np.moveaxis(np.concatenate(blocks), 0, 2)
 
     def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
-        """What a candidate with known numbers adds to the readings.
+        """Return (R, 6) [rad, m] what a candidate of numbers x (m,) adds.
 
-        Args:
-            one: of m unknowns.
-            x: (m,) their values.
-            by: how much larger the number is in which its form is not linear.
-
-        Returns:
-            (R, 6) [rad, m].
+        The number in which its form is not linear is larger by ``by``.
         """
         total, at = np.zeros((len(self.rows), 6)), 0
         for sensitivity, columns in self._factors(one, by):
@@ -227,16 +200,11 @@ class Sensitivities:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """The functions of a robot file with their numbers.
+        """Return the functions of a robot file with their numbers.
 
-        Args:
-            one: a candidate of m unknowns.
-            x: (m,) their values; or (m + 1,), see :meth:`changes`.
-            std: their standard deviations, taken as independent.
-
-        Returns:
-            One function for each of its parts that the readings see; for each session,
-            if some lack a variable of it.
+        One for each part of a candidate that the readings see; for each session, if
+        some lack a variable of it.  ``x`` is (m,) or (m + 1,), see :meth:`changes`;
+        ``std`` are its standard deviations, taken as independent.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -289,16 +257,7 @@ class Sensitivities:
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """What a candidate of m unknowns adds to the readings.
-
-    Args:
-        sensitivities: of the campaign's rows.
-        one: the candidate.
-        campaign: of R rows, N measured cells.
-
-    Returns:
-        (N, m) in the cells, over sigma.
-    """
+    """(N, m) change of a campaign's measured cells over sigma per unknown."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

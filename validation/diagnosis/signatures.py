@@ -118,12 +118,7 @@ class Tangents:
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Read what the declared model predicts.
-
-        Args:
-            campaign: what was measured.
-            derivatives: of its conditions.
-        """
+        """Read what the declared model predicts in the measured cells."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
@@ -144,13 +139,10 @@ class Tangents:
         return (self.campaign.session[row] == session)[:, None].astype(float)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
-        """A hypothesis to first order where it begins to differ from what is declared.
+        """Return a hypothesis to first order where it begins.
 
-        Args:
-            hypothesis: with numbers of all rows, or of every session.
-
-        Returns:
-            The tangent; NaN where the model has no answer there.
+        Where it begins to differ from what is declared; it has numbers of all rows, or
+        of every session.  NaN where there is no answer.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -204,16 +196,7 @@ class Tangents:
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """A hypothesis to first order about fitted values, other effects beside it.
-
-        Args:
-            hypothesis: which.
-            x: (k,) values of its unknowns.
-            others: parameters of other effects that act too.
-
-        Returns:
-            The tangent.
-        """
+        """A hypothesis to first order about values x (k,), other effects acting too."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:

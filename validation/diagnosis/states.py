@@ -123,20 +123,12 @@ class State:
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
-    """Return how surely one model predicts better than another.
+    """Return by how many standard errors one model predicts better than another.
 
-    A few blocks often make up most of a gain and of its scatter; that nearly all of the
-    others gain as well is seen by their signed ranks only (Wilcoxon 1945).
-
-    Args:
-        one: model.
-        other: another model of the same readings.
-        blocks: (n,) block of each reading; each is predicted by a fit to the others.
-
-    Returns:
-        By how many standard errors the log predictive densities of blocks gain: of
-        their mean, or of their signed ranks if these say more; 0 of a single block,
-        whose gain has no known error.
+    Each block (n,) of readings is predicted by a fit to the others.  It is the gain of
+    their log predictive densities on average or, if that says more, of signed ranks
+    (Wilcoxon 1945): a few blocks often make up most of a gain and of its scatter, while
+    nearly all others gain as well.  0 of a single block, whose gain has no known error.
     """
     densities = []
     for state in (one, other):
@@ -178,15 +170,9 @@ class Models:
     def state(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None = None
     ) -> State:
-        """Return the model with optimised standard deviations.
+        """Return the model with optimised standard deviations, from a cache.
 
-        Args:
-            elements: effects and functions.
-            mode: nuisance parameters in use.
-            start: model whose standard deviations are the start values.
-
-        Returns:
-            The model, from a cache.
+        They begin at those of ``start``.
         """
         key = frozenset(elements), mode
         if key not in self._states:

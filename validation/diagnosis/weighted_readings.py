@@ -79,11 +79,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return the inner products of the elements' m columns.
-
-        Returns:
-            (k, m) with the nuisance parameters, (m, m) with one another.
-        """
+        """Inner products of m columns: (k, m) with the nuisance parameters, (m, m)."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip

@@ -55,15 +55,11 @@ class Whitening:
 
 
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
-    """Build the map.
+    """Return the map of n cells; diagonal without loadings.
 
-    Args:
-        root: (n,) square roots of the relative precisions.
-        loadings: (n, k) change of the cells over sigma per number in common, or None.
-        visit: (n,) the same for cells of one measurement.
-
-    Returns:
-        The map; diagonal without loadings.
+    ``root`` (n,) are square roots of the relative precisions, ``loadings`` (n, k)
+    changes over sigma per number in common, ``visit`` (n,) is the same for cells of a
+    measurement.
     """
     if loadings is None or not loadings.any():
         return Whitening(root)
@@ -93,15 +89,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """The map of cells of a campaign, by its sigma and its noise in common.
-
-    Args:
-        campaign: of R rows.
-        cells: (R, 6) bool, measured cells.
-
-    Returns:
-        The map of these n cells over sigma.
-    """
+    """The map of cells (R, 6) bool by a campaign's sigma and noise in common."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -111,14 +99,9 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """A residual over its noise, independent in every cell.
+    """Return a residual (R, 6) [rad, m] over its noise, independent in the N cells.
 
-    Args:
-        campaign: of R rows, N measured cells.
-        residual: (R, 6) [rad, m]; what is not finite counts as zero.
-
-    Returns:
-        (N,) of unit variance if the residual is noise.
+    (N,), of unit variance if it is noise; what is not finite counts as zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
