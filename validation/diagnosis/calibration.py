@@ -80,6 +80,6 @@ def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
     more = float(chi2.sf(best.sizes.squares, freedom)) < SIGNIFICANT
     decision, claimed = verdict(
         selected, names, functions=bool(selected.functions),
-        small=len(selected.prior.std) > 0, more_than_noise=more,
+        small=bool(selected.small), more_than_noise=more,
     )  # fmt: skip
     return decision, tuple(sorted(claimed))

@@ -7,12 +7,13 @@ the same conditions share it: the folds of a diagnosis, above all.
 from collections.abc import Mapping
 from functools import cached_property
 
+import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.effect import Values
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import predict
+from assembly.measurement.predict import predict, with_second_order
 from assembly.measurement.settled_clearance import with_clearances_taken_up
 from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
@@ -48,15 +49,19 @@ class Derivatives:
         """How the readings answer functions at all places."""
         return Sensitivities(self.conditions, self.response)
 
-    def model(self, effects: Mapping[str, Values]) -> NDArray:
+    def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
         """Return (R, 6) [rad, m] read with effects, to first order in clearances.
 
         Effects are parameters by their public names; NaN where the model has no answer.
+        Finite motions are those of what is declared or, asked for, of the changed
+        machine.
         """
         changed = apply_effects(self.conditions, effects)
-        settles = any(LIBRARY[name].clearance for name in effects)
-        if settles and changed.rest is None and not changed.exact:
-            changed, _ = with_clearances_taken_up(changed)
+        if any(LIBRARY[name].clearance for name in effects):
+            if changed.rest is None and not changed.exact:
+                changed, _ = with_clearances_taken_up(changed)
+        elif finite and np.ndim(changed.second_order) == 2:
+            changed = with_second_order(changed)
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:

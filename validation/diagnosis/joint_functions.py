@@ -6,6 +6,7 @@ same at all places; each place has its own coefficients.
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,23 +87,20 @@ def _at_drives(
     own = [(f.name, (AXES[f.own_axis],)) for f in robot.frames if f.actuated]
     if len(own) < 2:
         return
-
-    def at(*variables: str) -> Parts:
-        return tuple(CandidatePart(w, c, *variables) for w, c in own)
-
     sided = "approach" in functions.variables
     for name in functions.variables:
         if name.startswith("q."):
             continue
-        yield "screw", at(name), forms.first(functions.known(name), name)
+        parts = tuple(CandidatePart(w, c, name) for w, c in own)
+        yield "screw", parts, forms.first(functions.known(name), name)
         known = functions.known("approach", name)
         both = forms.of_two(known, "approach", name)
         if sided and name != "approach" and both is not None and len(known):
-            yield "screw", at(*both[0]), both[1]
+            yield "screw", tuple(CandidatePart(w, c, *both[0]) for w, c in own), both[1]
     if all(is_angle(robot, f"q.{w}") for w, _ in own):
         turns = tuple(CandidatePart(w, c, f"q.{w}") for w, c in own)
         yield "screw", turns, forms.of_direction(conditions, turns[0].variable)
         both = forms.of_two(conditions, turns[0].variable, "approach")
         if sided and both is not None:
-            sides = tuple(CandidatePart(w, c, f"q.{w}", "approach") for w, c in own)
+            sides = tuple(replace(part, beside="approach") for part in turns)
             yield "screw", sides, both[1]

@@ -91,13 +91,12 @@ def findings(
     """
     told = []
     if any(common):
-        sizes = [f"{1e6 * size:.3g} {unit}" for size, unit in _in_common(common)]
-        unsure = (
-            ""
-            if repeats[1]
-            else ("; without repeats a cause that was not recorded would look the same")
-        )
-        told.append(f"noise common to the points of a row: {', '.join(sizes)}{unsure}")
+        named = (common[1], "um"), (common[0], "urad")
+        sizes = ", ".join(f"{1e6 * size:.3g} {unit}" for size, unit in named if size)
+        told.append(f"noise common to the points of a row: {sizes}")
+        if not repeats[1]:
+            unsure = "a cause that was not recorded would look the same"
+            told[0] += f"; without repeats {unsure}"
     if abs(np.log(tau)) > max(_UNLIKE * tau_std / tau, _CLOSE):
         told.append(f"the residual is {tau:.2g} times the stated sigma")
     rms, freedom = repeats
@@ -110,9 +109,3 @@ def findings(
     if memory:
         told.append("memory: the readings depend on the order of the rows")
     return tuple(told)
-
-
-def _in_common(common: tuple[float, float]) -> list[tuple[float, str]]:
-    """Return sizes of a motion in common that are not zero, with their units."""
-    listed = [(common[1], "um"), (common[0], "urad")]
-    return [one for one in listed if one[0] > 0]

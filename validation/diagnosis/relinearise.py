@@ -12,11 +12,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.effects import LIBRARY, apply_effects
-from assembly.measurement.predict import predict, with_second_order
 from validation.diagnosis.elements import Element, effect_element
 from validation.diagnosis.hypotheses import in_one_session, sessions_of
-from validation.diagnosis.signatures import Signature, Tangents, whiten
+from validation.diagnosis.signatures import Signature, Tangents
 from validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # of linearisation
@@ -127,21 +125,10 @@ class Relinearisation:
         """Return the (N,) whitened contribution of effects acting together."""
         total = np.zeros_like(self.tangents.declared)
         for session in _sessions(elements):
-            moved = self._combined(self._public(elements, xs, session))
+            effects = self._public(elements, xs, session)
+            moved = self.tangents.model(effects, finite=True) - self.tangents.declared
             total += moved * self.tangents.rows_of(session)[:, 0]
         return total
-
-    def _combined(self, public: dict[str, dict[str, float]]) -> NDArray:
-        """Return the (N,) whitened contribution of effects in all rows."""
-        if any(LIBRARY[name].clearance for name in public):
-            return self.tangents.model(public) - self.tangents.declared
-        derivatives = self.tangents.derivatives
-        changed = apply_effects(derivatives.conditions, public)
-        if np.ndim(derivatives.conditions.second_order) == 2:
-            # finite motions of the changed machine
-            changed = with_second_order(changed)
-        whitened = whiten(self.tangents.campaign, predict(changed).deviation)
-        return whitened - self.tangents.declared
 
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None

@@ -11,8 +11,10 @@ Steps:
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from validation.diagnosis import function_forms as forms
 from validation.diagnosis.candidates import Candidate
@@ -22,6 +24,7 @@ from validation.diagnosis.places import Weighted
 from validation.diagnosis.relinearise import Relinearisation
 from validation.diagnosis.states import MORE, Models, State
 from validation.diagnosis.weighted_readings import WeightedReadings
+from validation.diagnosis.whitening import Whitening
 
 Update = Callable[[str, int, int], None]
 Tried = tuple[tuple[Element, ...], State]  # elements; model that gives start values
@@ -56,7 +59,6 @@ class Search:
 
     def run(self, update: Update) -> list[State]:
         """Run the search and return all visited models, best first."""
-        self.prepare()
         self._keep(self.empty)
         front = [self.begin]
         for level in range(_MOST):
@@ -75,18 +77,29 @@ class Search:
             self._grow([best], products=False)
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
-    def prepare(self) -> None:
-        """Compute the inner products that all models share."""
+    @cached_property
+    def _whiten_sample(self) -> tuple[NDArray, Whitening]:
+        """(N,) mask of the sampled cells, and their map to independent noise."""
         cells, some = self.readings.cells.copy(), self.readings.sampled
         cells[cells] = some
-        root = self.readings.root[some]
-        whiten = self.columns.whitening(cells, root, self.readings.common)
-        self.weighted: Weighted = self.functions.places.weighted(cells, whiten)
-        self.library = Dense(
-            self.columns.library, self.readings.cells, self.readings.whiten
-        )
+        root, common = self.readings.root[some], self.readings.common
+        return cells, self.columns.whitening(cells, root, common)
+
+    @cached_property
+    def weighted(self) -> Weighted:
+        """Responses at all places in the sampled cells."""
+        return self.functions.places.weighted(*self._whiten_sample)
+
+    @cached_property
+    def _library(self) -> Dense:
+        """Effects of the library."""
+        return self._dense(self.columns.library)
+
+    @cached_property
+    def _explicit(self) -> Dense:
+        """Functions at several places, in the sampled cells."""
         own = self.readings.cells[self.columns.sampled]
-        self.explicit = Dense(self.columns.explicit, own, whiten)
+        return Dense(self.columns.explicit, own, self._whiten_sample[1])
 
     def _dense(self, elements: list[Element]) -> Dense:
         """Return elements to be scored in the fitted cells."""
@@ -99,7 +112,7 @@ class Search:
     def _keep(self, states: Iterable[State]) -> None:
         """Store models whose estimates support their claims."""
         for state in states:
-            if supported(state):
+            if state.supported:
                 self.seen[frozenset(origins(state.elements)), state.mode] = state
 
     def _grow(self, sources: Sequence[State], *, products: bool) -> list[State]:
@@ -123,8 +136,8 @@ class Search:
         self._keep(new)
         kept: list[State] = []
         for state in sorted(new, key=lambda s: -s.score):
-            alike = [s for s in kept if names_of(s) == names_of(state)]
-            if len(alike) < _OF_NAME and len(kept) < _KEPT and supported(state):
+            alike = [s for s in kept if s.names == state.names]
+            if len(alike) < _OF_NAME and len(kept) < _KEPT and state.supported:
                 kept.append(state)
         for state in kept[:1]:
             self._keep(self._with_one_removed(state))
@@ -144,9 +157,9 @@ class Search:
         self, state: State, *, functions: bool = True, products: bool = False
     ) -> list[tuple[float, Element]]:
         """Return the best elements to add, with estimates of the log posterior."""
-        listed = [*self.library.elements, *self.explicit.elements]
-        some = self.explicit.gains(state.sample_marginal)
-        gains = [self.library.gains(state.marginal), self._more * some]
+        listed = [*self._library.elements, *self._explicit.elements]
+        some = self._explicit.gains(state.sample_marginal)
+        gains = [self._library.gains(state.marginal), self._more * some]
         score = np.concatenate(gains) + np.array([e.log_prior for e in listed])
         have = {e.name for e in state.elements if e.name}
         counts: dict[str, int] = {}
@@ -253,7 +266,6 @@ class Search:
         one = e.candidate
         if not len(one.shape.bends):
             return e
-
         best = self._gain(e, base)
         variables, conditions = one.parts[0].variables, self.functions.conditions
         for k in range(_HALVINGS):
@@ -318,29 +330,3 @@ class Search:
 def origins(elements: Iterable[Element]) -> tuple[Element, ...]:
     """Return the elements as linearised at their start values."""
     return tuple(e.origin for e in elements)
-
-
-def names_of(state: State) -> tuple[str, ...]:
-    """Return the sorted names of effects and variables of functions."""
-    names = [
-        e.name or "of " + ", ".join(e.candidate.parts[0].variables)
-        for e in state.elements
-    ]
-    return tuple(sorted(names))
-
-
-def supported(state: State) -> bool:
-    """Return whether no effect of a model is at its bounds."""
-    for k, e in enumerate(state.elements):
-        if not e.name or not e.columns.shape[1]:
-            continue
-        mean = state.sizes.mean[state.own(k)]
-        shapes = np.isfinite(e.given)
-        if np.all((mean <= e.lower)[~shapes] | (mean >= e.upper)[~shapes]):
-            return False
-        x = e.values(mean)
-        for j, slot in enumerate(e.hypothesis.slots):
-            low, high = slot.unknown.lower, slot.unknown.upper
-            if slot.shape and not low * 1.001 < x[j] < high * 0.999:
-                return False
-    return True

@@ -26,10 +26,12 @@ from validation.diagnosis.noise import (
     probability_good,
     repeat_scatter,
 )
+from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.range_parts import range_error
-from validation.diagnosis.search import Search, Update, names_of
-from validation.diagnosis.selected import Learned, Model, Selected, SmallPrior
+from validation.diagnosis.search import Search, Update
+from validation.diagnosis.selected import Learned, Model, Selected
 from validation.diagnosis.states import State, prediction_gain
+from validation.diagnosis.unknowns import Small
 from validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
 _EQUAL = 3.0  # log posterior: difference of equivalent functions
@@ -102,9 +104,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     if device is not None:
         hypotheses, values = [device, *hypotheses], [device.start, *values]
     effects = {e.name for s in states for e in s.elements if e.name}
-    small = search.columns.nuisance.take(best.used)
     tau, tau_std = scale(best.sizes.squares, readings.count)
-    std = best.sizes.std[: len(small.frame)] * tau
     common = tau * readings.common[0], tau * readings.common[1]
     return Selected(
         hypotheses=tuple(hypotheses),
@@ -114,13 +114,24 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
             for k, e in enumerate(best.elements)
             if not e.name
         ),
-        prior=SmallPrior(small.spring, small.frame, small.axis, std),
+        small=_small(search, best, tau),
         noise=Noise(tau, tau_std, _findings(search, best, good), common),
         weights=good,
         models=_models(states, weights),
         probability={n: _probability(n, states, weights) for n in sorted(effects)},
         unknowns=float(best.sizes.determined.sum()) + readings.flat.shape[1],
         states=tuple(states[:_LISTED]),
+    )
+
+
+def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
+    """Return the nuisance parameters in use, with their prior."""
+    small = search.columns.nuisance.take(best.used)
+    std = best.sizes.std[: len(small.frame)] * tau
+    return tuple(
+        Small(name, small.frame[own], small.axis[own], std[own])
+        for name, own in ((GEOMETRY, ~small.spring), (SPRINGS, small.spring))
+        if own.any()
     )
 
 
@@ -191,7 +202,7 @@ def _merged(states: Sequence[State]) -> list[State]:
             kept.append(state)
         elif _rank(state) != _rank(kept[twin]):
             kept[twin] = _joined(*sorted((kept[twin], state), key=_rank))
-        elif names_of(state) != names_of(kept[twin]):
+        elif state.names != kept[twin].names:
             kept.append(state)
     return _without_refinements(kept)
 
@@ -273,12 +284,12 @@ def _learned(
             parts = others[0].candidate.parts
             if parts != e.candidate.parts and s.score > best.score - _EQUAL:
                 equal.append(parts)
-    own = names_of(replace(best, elements=(e,)))[0]
+    own = replace(best, elements=(e,)).names[0]
     return Learned(
         candidate=e.candidate,
         equivalent=tuple(dict.fromkeys(equal)),
         std=best.sizes.std[best.own(k)] * e.scale * best.tau,
-        probability=float(weights[[own in names_of(s) for s in states]].sum()),
+        probability=float(weights[[own in s.names for s in states]].sum()),
         range_error=range_error(
             e.candidate, best, search.models.state(rest, best.mode, best),
             search.columns.row[search.readings.cells],

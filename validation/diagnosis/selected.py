@@ -9,6 +9,7 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.noise import Noise
 from validation.diagnosis.range_parts import RangeError
 from validation.diagnosis.states import State
+from validation.diagnosis.unknowns import Small
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,22 +29,6 @@ class Learned:
     std: NDArray
     probability: float
     range_error: RangeError | None
-
-
-@dataclass(frozen=True, eq=False)
-class SmallPrior:
-    """Nuisance parameters in use and their prior.
-
-    Attributes:
-        spring: (k,) bool.
-        frame, axis: (k,) row of the frame in the campaign's robot, component there.
-        std: (k,) [rad, m, or per wrench] prior standard deviation.
-    """
-
-    spring: NDArray
-    frame: NDArray
-    axis: NDArray
-    std: NDArray
 
 
 @dataclass(frozen=True)
@@ -69,7 +54,7 @@ class Selected:
         hypotheses: of the best model, the measuring frame first where it is not known.
         values: (k,) estimates of their unknowns, in the order of the hypotheses.
         functions: of the best model.
-        prior: nuisance parameters in use.
+        small: geometric errors and springs in use.
         noise: scale and findings.
         weights: (n,) probability that a cell is no blunder.
         models: by names, best first.
@@ -81,7 +66,7 @@ class Selected:
     hypotheses: tuple[Hypothesis, ...]
     values: NDArray
     functions: tuple[Learned, ...]
-    prior: SmallPrior
+    small: tuple[Small, ...]
     noise: Noise
     weights: NDArray
     models: tuple[Model, ...]

@@ -127,9 +127,9 @@ class Tangents:
         """(N,) whitened readings minus what is declared; nothing else reads them."""
         return whiten(self.campaign, self.campaign.measured) - self.declared
 
-    def model(self, effects: Mapping[str, Values]) -> NDArray:
+    def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
         """(N,) whitened, what is read with effects; see :meth:`.Derivatives.model`."""
-        return whiten(self.campaign, self.derivatives.model(effects))
+        return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
         """(N, 1) 1 in the cells of a session, else 0; 1 in all of None."""

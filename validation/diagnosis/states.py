@@ -106,6 +106,21 @@ class State:
         """Return the elements but for some."""
         return tuple(e for e in self.elements if e not in some)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Sorted names of effects, and variables of functions."""
+        names = [
+            e.name or "of " + ", ".join(e.candidate.parts[0].variables)
+            for e in self.elements
+        ]
+        return tuple(sorted(names))
+
+    @property
+    def supported(self) -> bool:
+        """Whether no effect is at its bounds."""
+        means = [self.sizes.mean[self.own(k)] for k in range(len(self.elements))]
+        return not any(map(_at_bounds, self.elements, means))
+
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
         """Return the standard deviations by group of another model with elements."""
         own = self.sizes.of_group
@@ -120,6 +135,20 @@ class State:
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / self.readings.weights
+
+
+def _at_bounds(e: Element, mean: NDArray) -> bool:
+    """Whether all numbers of an effect, or one that shapes it, are at a bound."""
+    if not e.name or not e.columns.shape[1]:
+        return False
+    at, x = (mean <= e.lower) | (mean >= e.upper), e.values(mean)
+    if at[np.isnan(e.given)].all():
+        return True
+    return any(
+        not slot.unknown.lower * 1.001 < x[j] < slot.unknown.upper * 0.999
+        for j, slot in enumerate(e.hypothesis.slots)
+        if slot.shape
+    )
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:

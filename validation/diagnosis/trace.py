@@ -36,7 +36,7 @@ from validation.diagnosis.holdout import drawn, hidden
 from validation.diagnosis.hypotheses import Hypothesis, in_one_session, sessions_of
 from validation.diagnosis.lack_of_fit import outlying
 from validation.diagnosis.noise import cell_weights
-from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
+from validation.diagnosis.nuisance import GEOMETRY
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.registration import register
@@ -44,7 +44,7 @@ from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
 from validation.diagnosis.signatures import conditions_of, whiten
 from validation.diagnosis.states import prediction_gain
-from validation.diagnosis.unknowns import Acting, LearnedFunction, Small, Unknowns
+from validation.diagnosis.unknowns import Acting, LearnedFunction, Unknowns
 from validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
@@ -99,17 +99,9 @@ class Traced:
                 effects += self._device_frames(h)
             elif h.effect != FINITE or self._alone:
                 effects += _acting(h, found.values[own])
-        small = []
-        for name, springs in ((GEOMETRY, False), (SPRINGS, True)):
-            own = found.prior.spring == springs
-            if own.any():
-                prior = found.prior
-                small.append(
-                    Small(name, prior.frame[own], prior.axis[own], prior.std[own])
-                )
         functions = [LearnedFunction(f.candidate, f.std) for f in found.functions]
         return Unknowns(
-            self.campaign.robot, tuple(effects), tuple(small), tuple(functions),
+            self.campaign.robot, tuple(effects), found.small, tuple(functions),
             self.columns.sensitivities if functions else None,
         )  # fmt: skip
 
