@@ -16,7 +16,7 @@ from assembly.measurement.variables import variable
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.candidates import variables_of
 from validation.diagnosis.derivatives import Derivatives
-from validation.diagnosis.elements import Element, effect_element, effect_prior
+from validation.diagnosis.elements import Element, effect_element
 from validation.diagnosis.functions import Functions
 from validation.diagnosis.holdout import SPANS, blocks_of, drawn
 from validation.diagnosis.hypotheses import (
@@ -32,6 +32,7 @@ from validation.diagnosis.registration import device_frame
 from validation.diagnosis.signatures import (
     Signature,
     Tangents,
+    fingerprints,
     loaded_components,
 )
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
@@ -101,11 +102,11 @@ class Columns:
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
         """Return visible hypotheses with distinct columns."""
-        listed = hypotheses(self.conditions, loaded_components(self.campaign))
+        campaign = self.campaign
         shown: dict[object, Signature] = {}
-        listed = with_declared(listed, self.campaign.robot)
-        sessions, further = self.campaign.sessions, self.campaign.per_session
-        listed = with_sessions(listed, sessions, further)
+        listed = hypotheses(self.conditions, loaded_components(campaign))
+        listed = with_declared(listed, campaign.robot)
+        listed = with_sessions(listed, campaign.sessions, campaign.per_session)
         listed = [h for h in listed if self.odds.get(h.effect, 1.0) > 0.0]
         for k, h in enumerate(listed):
             if not (self.device and _moves_base(h)):
@@ -114,17 +115,15 @@ class Columns:
                     shown.setdefault(_print(signature), signature)
             update("signatures", k + 1, len(listed))
         ways = Counter(s.hypothesis.effect for s in shown.values())
-        robot = self.campaign.robot
+        prior = {
+            name: math.log(self.odds.get(name, 1.0) / (2.0 * len(ways) * count))
+            for name, count in ways.items()
+        }
         made = [
-            effect_element(s, robot, self._prior(s.hypothesis.effect, ways))
+            effect_element(s, campaign.robot, prior[s.hypothesis.effect])
             for s in shown.values()
         ]
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
-
-    def _prior(self, effect: str, ways: Counter[str]) -> float:
-        """Return the log prior of one way in which an effect may act."""
-        prior = effect_prior(len(ways), ways[effect])
-        return prior + math.log(self.odds.get(effect, 1.0))
 
     def without_clocks(self) -> "Columns":
         """Return the columns without functions of time and effects of time alone."""
@@ -208,22 +207,15 @@ class Columns:
 
 def _shows(signature: Signature) -> bool:
     """Return whether a hypothesis visibly changes the readings."""
-    if not signature.finite:
-        return False
     squares = float(signature.offset @ signature.offset)
-    return bool(signature.columns.any()) or squares > _VISIBLE
+    return signature.finite and bool(signature.columns.any() or squares > _VISIBLE)
 
 
 def _print(signature: Signature) -> object:
     """Return a key that hypotheses of one effect with equal columns share."""
-    rng = np.random.default_rng(0)
-    probe = rng.normal(size=len(signature.offset))
-    size = np.maximum(np.linalg.norm(signature.columns, axis=0), 1e-300)
-    seen = np.abs(probe @ signature.columns) / size
-    shown = signature.columns.any(axis=0)
-    key = tuple(np.round(np.sort(seen[shown]), 6))
+    shown = signature.columns[:, signature.columns.any(axis=0)]
     starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
-    return signature.hypothesis.effect, key, starts
+    return signature.hypothesis.effect, tuple(sorted(fingerprints(shown))), starts
 
 
 def _moves_base(h: Hypothesis) -> bool:

@@ -4,7 +4,6 @@ An element adds ``offset + columns d`` to the whitened readings.  Its unknowns d
 scaled so that columns of one unit have norm one; they share a prior standard deviation.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -106,9 +105,8 @@ def effect_element(
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # zero for all effects with unknowns
-    held = np.zeros(len(begin)) if shapes is None else begin
-    held = np.where(shape, held, begin)
+    # at the start values the unknowns that shape an effect have no columns
+    held = np.where(shape & (shapes is None), 0.0, begin)
     offset = signature.offset + signature.columns @ held
     scale = plausible / norm
     low, high = h.bounds
@@ -149,18 +147,11 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Build the element of a function; None if the readings do not depend on it.
+    """Return the element of a function of m unknowns; None if it is not visible.
 
-    Args:
-        candidate: of m unknowns.
-        columns: (N, m) whitened change of the readings per unknown.
-        axes: (m,) component of each unknown.
-        falling: (m,) relative prior standard deviations.
-        most: largest plausible value of an unknown.
-        log_prior: ln of the prior probability.
-
-    Returns:
-        The element.
+    ``columns`` (N, m) are the whitened change of the readings per unknown, ``axes``
+    (m,) the component of each, ``falling`` (m,) relative prior standard deviations, and
+    ``most`` is the largest plausible value.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -220,11 +211,6 @@ class Dense:
             change = deviance(marginal.squares, n) - deviance(Q, n)
             gains[i] = 0.5 * float(change)
         return gains
-
-
-def effect_prior(effects: int, ways: int) -> float:
-    """Return ln of the prior probability of one hypothesis of the library."""
-    return -math.log(2.0) - math.log(max(effects, 1)) - math.log(max(ways, 1))
 
 
 def label(one: Candidate) -> str:

@@ -130,14 +130,7 @@ class Functions:
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
         """Return the log prior of a form at one place."""
         known = self.shapes_of(variables)
-        if shape in known:
-            return known[shape]
-        alike = {
-            float(np.abs(np.log(s.bends / shape.bends)).sum()): prior
-            for s, prior in known.items()
-            if (s.form, s.names) == (shape.form, shape.names) and len(shape.bends)
-        }
-        return alike[min(alike)] if alike else min(known.values(), default=-math.inf)
+        return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
         """Return requests for general forms of every variable."""

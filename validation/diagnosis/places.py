@@ -19,11 +19,10 @@ from validation.diagnosis.candidates import is_turn, places_of
 from validation.diagnosis.gaussian import SIZES
 from validation.diagnosis.nuisance import LARGEST_SHIFT, LARGEST_TURN
 from validation.diagnosis.sensitivities import Sensitivities
+from validation.diagnosis.signatures import fingerprints
 from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind
-_PROBES = 3  # random projections that identify equal responses
-_DIGITS = 6  # of a projection that must agree
 _HEAVY = 10.0  # largest unrecorded force over the largest recorded one
 _FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
 _REMEMBERED = 8  # most columns of a form whose products are cached
@@ -77,9 +76,6 @@ class Places:
         """List the places of a design; no measured value is used."""
         self._campaign, self._sensitivities = campaign, sensitivities
         self._plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
-        self.names: list[tuple[Where, ...]] = []
-        self.equal: list[list[tuple[Where, ...]]] = []
-        self.members: list[tuple[int, ...]] = []
         singles, combined = self._listed()
         self._list_singles(singles)
         self._list_combinations(combined)
@@ -113,27 +109,24 @@ class Places:
     def _list_singles(self, singles: list[Where]) -> None:
         """List single components with distinct responses."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
-        rng = np.random.default_rng(0)
-        probes = rng.normal(size=(_PROBES, *over_sigma.shape))
-        answers: list[NDArray] = []
-        known: dict[tuple[float, ...], int] = {}
-        self.number: dict[Where, int] = {}
+        shown, answers = [], []
         for where in singles:
             a = self._sensitivities.sensitivity(*where) * over_sigma
             size = float(np.linalg.norm(a))
-            if not np.isfinite(size) or size * self.plausible(where) < SIZES[0]:
-                continue
-            seen = np.einsum("prc,rc->p", probes, a) / size
-            key = tuple(np.round(seen * np.sign(seen[0]), _DIGITS).tolist())
-            self.number[where] = known.setdefault(key, len(self.names))
-            if known[key] < len(self.names):
-                self.equal[known[key]].append((where,))
-                continue
-            self.names.append((where,))
-            self.members.append((len(answers),))
-            self.equal.append([])
-            answers.append(a)
-        self._answers = np.array(answers).reshape(len(answers), *over_sigma.shape)
+            if np.isfinite(size) and size * self.plausible(where) >= SIZES[0]:
+                shown.append(where)
+                answers.append(a)
+        every = np.array(answers).reshape(len(shown), *over_sigma.shape)
+        alike: dict[tuple[float, ...], list[int]] = {}
+        for k, key in enumerate(fingerprints(every.reshape(len(shown), -1).T)):
+            alike.setdefault(key, []).append(k)
+        self._answers = every[[own[0] for own in alike.values()]]
+        same: list[list[tuple[Where, ...]]]
+        same = [[(shown[k],) for k in own] for own in alike.values()]
+        self.names = [own[0] for own in same]
+        self.equal = [own[1:] for own in same]
+        self.members: list[tuple[int, ...]] = [(k,) for k in range(len(same))]
+        self.number = {own[0]: k for k, each in enumerate(same) for own in each}
 
     def _list_combinations(self, combined: list[tuple[Where, ...]]) -> None:
         """List combinations of components of one frame."""

@@ -25,7 +25,7 @@ _STEPS = 25
 _SETTLED = 0.03  # change of ln s that ends the iteration
 _LEAP = 4.0  # largest factor of change in a step
 _BEGIN = 4.0  # [sigma] contribution of a group's unknowns at the start
-_LEAST, _MOST = 1e-2, 1e6  # [sigma] limits of that contribution
+_LEAST = 1e-2  # [sigma] least contribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def best_sizes(
     limits, size = {}, {}
     for g, which in own.items():
         unit = 1 / np.sqrt(max(float(diagonal[which].mean()), 1e-300))
-        limits[g] = unit * _LEAST, min(unit * _MOST, float(model.most[which].max()))
+        limits[g] = unit * _LEAST, float(model.most[which].max())
         size[g] = min(max(start.get(g, unit * _BEGIN), limits[g][0]), limits[g][1])
     turned = _turned(model, own, eigen)
     best, worth = dict(size), -np.inf

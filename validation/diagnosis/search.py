@@ -38,7 +38,6 @@ _VARIABLES = 4  # variables whose products with others are scored
 _WIDEST = 600  # most columns of a function at several places
 _DROP = 1.0  # log posterior by which a larger model may be worse
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
-_ROUNDS = 3  # of exchanges
 _HALVINGS = 6  # of the step of a number in which a form is not linear
 _MOVED = 0.3  # log posterior: least improvement
 
@@ -68,7 +67,7 @@ class Search:
             if not new or new[0].score < best.score - _DROP:
                 break
             front = new
-        for _ in range(_ROUNDS):
+        while True:
             before = self._best()
             self._exchange(before)
             best = self._best()

@@ -38,7 +38,6 @@ _EQUAL = 3.0  # log posterior: difference of equivalent functions
 _CLAIMED = 0.9  # probability of functions from which the best model has them
 _SAME = 1.0  # squared whitened difference of models with equal predictions
 _LISTED = 20  # models in the result
-_COMPARED = 60  # models whose predictions are compared
 _FEWEST = 5  # blocks: with fewer, functions are not cross-validated
 _AGAIN = 3  # searches with other noise in common, or other blunders
 _SURE = 2.0  # standard errors: least gain of a function in cross-validation
@@ -191,12 +190,8 @@ def _merged(states: Sequence[State]) -> list[State]:
     of the library is that effect; but for errors of the measuring device, which the
     machine may have as well.
     """
-    every = _best_first(states)
-    # models without functions are kept in case no function is confirmed
-    bare = [s for s in every if not _functions(s)][:_LISTED]
-    compared = every[:_COMPARED]
     kept: list[State] = []
-    for state in [*compared, *(s for s in bare if s not in compared)]:
+    for state in _best_first(states):
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
         if twin is None:
             kept.append(state)

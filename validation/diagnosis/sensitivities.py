@@ -77,7 +77,7 @@ class Sensitivities:
 
     @cached_property
     def under_load(self) -> NDArray:
-        """(R, 6, 6) change of the reading per unit of a component of the load."""
+        """(all, 6, 6) change of every reading per unit of a component of the load."""
         change = np.zeros((len(self.conditions), 6, 6))
         still = predict(self.conditions).deviation
         size = max(float(np.abs(self.conditions.load).max()), 1.0)
@@ -85,12 +85,12 @@ class Sensitivities:
             load = self.conditions.load + _STEP * size * np.eye(6)[k]
             more = predict(replace(self.conditions, load=load)).deviation
             change[:, :, k] = np.nan_to_num((more - still) / (_STEP * size))
-        return change[self.rows]
+        return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
         """(R, 6) change of the reading per unit of a component at a place."""
         if where == "load":
-            return self.under_load[:, :, LOADS.index(component)]
+            return self.under_load[self.rows, :, LOADS.index(component)]
         axis = AXES.index(component)
         if where == "reading":
             return np.broadcast_to(np.eye(6)[axis], (len(self._origin), 6))
@@ -128,9 +128,7 @@ class Sensitivities:
             mixed = np.eye(len(shape.names))
         return raw @ mixed, mixed
 
-    def _unmixed(
-        self, variables: tuple[str, ...], shape: CandidateShape
-    ) -> NDArray:  # fmt: skip
+    def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
         """(R, p) columns of a form of variables."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]

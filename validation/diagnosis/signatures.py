@@ -33,6 +33,8 @@ from validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
+_PROBES = 3  # random projections that identify equal columns
+_DIGITS = 6  # of a projection that must agree
 _PROBED = 4  # rows
 _HARDLY = 2.0  # squared whitened change of all readings together
 UNSEEN = 1e-3  # [sigma] over all readings, of an unknown's own size
@@ -106,6 +108,14 @@ def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
     """(N, ..) deviations (R, 6, ..) of the measured cells in units of their sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
+
+
+def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
+    """Keys that columns (n, k) share which are equal but for their size and sign."""
+    probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
+    seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    seen *= np.sign(seen[0])
+    return [tuple(key) for key in np.round(seen, _DIGITS).T.tolist()]
 
 
 class Tangents:
