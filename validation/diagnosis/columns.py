@@ -38,10 +38,10 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.whitening import Whitening, platform_motions, whitening
 
 FUNCTION = "function"
-_CLOCK = 0.999  # correlation with time of what counts it
-_SAMPLE = 500  # rows, drawn once
+_CLOCK = 0.999  # correlation with time of what counts it, rounded as it may be
+_SAMPLE = 500  # rows, drawn once: functions by the thousand are scored in a second
 _ALIKE = 1e-3  # share of a column that a device's place does not imitate: none
-_VISIBLE = 4.0  # squared whitened change of the readings
+_VISIBLE = 4.0  # squared whitened change of all readings: two standard deviations
 
 
 class Columns:

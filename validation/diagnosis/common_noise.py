@@ -17,11 +17,11 @@ from validation.diagnosis.gaussian import size_penalty
 from validation.diagnosis.states import IN_USE, Models, State
 from validation.diagnosis.weighted_readings import NONE
 
-_STEP = 1.0  # of the logarithms of both sizes, at the start
+_STEP = 1.0  # of the logarithms of both sizes, which begin at one sigma
 _CLOSE = 0.05  # of a logarithm, that ends the search
 _LEAST = 0.02  # [sigma] contribution to the readings that is none
 _CLEAR = 1.0  # [sigma] contribution to the readings from which a size is needed
-_EVALUATIONS = 40
+_EVALUATIONS = 40  # each fits a model
 _STABLE = 0.1  # change of a logarithm that changes no decision
 
 

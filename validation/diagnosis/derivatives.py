@@ -19,7 +19,7 @@ from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.sensitivities import Sensitivities
 
-STEP = 1e-3  # of an unknown's plausible size, for its first derivative
+STEP = 1e-3  # of an unknown's plausible size: between rounding and curvature
 
 
 class Derivatives:

@@ -41,9 +41,9 @@ from validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
 Request = tuple[Variables, tuple[CandidateShape, ...]]  # variables, and their forms
-_WIDEST = 36  # most columns of a function of several components
-_LISTED = 2000  # best functions that are sorted
-_BATCH = 2_000_000  # numbers that a batch of functions may occupy at once
+_WIDEST = 36  # most columns of several components: six of six
+_LISTED = 2000  # best functions that are looked through for those of each request
+_BATCH = 2_000_000  # numbers that a batch occupies at once: 16 MB
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] no error of a drive, a frame or a device is larger
 LARGEST_SHIFT = 0.1  # of the robot's size, likewise
-_ROUNDING = 1e-9  # of the largest column of a group
+_ROUNDING = 1e-9  # of the largest column of a group: what moves nothing
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 

@@ -23,9 +23,9 @@ from validation.diagnosis.signatures import fingerprints
 from validation.diagnosis.whitening import Whitening
 
 Where = tuple[str, str, str]  # place, component, kind
-_HEAVY = 10.0  # largest unrecorded force over the largest recorded one
+_HEAVY = 10.0  # largest unrecorded force over the largest recorded one: a cable's
 _FORCE = 1000.0  # [N] largest unrecorded force where no load is recorded
-_REMEMBERED = 8  # most columns of a form whose products are cached
+_REMEMBERED = 8  # most columns of a form whose products are kept, for memory
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,11 @@ from scipy.linalg import cho_solve, solve_triangular
 from validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
-_STEPS = 25
-_SETTLED = 0.03  # change of ln s that ends the iteration
-_LEAP = 4.0  # largest factor of change in a step
-_BEGIN = 4.0  # [sigma] contribution of a group's unknowns at the start
-_LEAST = 1e-2  # [sigma] least contribution
+_STEPS = 25  # about ten are needed
+_SETTLED = 0.03  # change of ln s that ends the iteration: the evidence is flat there
+_LEAP = 4.0  # largest factor of change in a step, which holds nearby
+_BEGIN = 4.0  # [sigma] contribution of a group's unknowns at the start: visible
+_LEAST = 1e-2  # [sigma] contribution that is none
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.gaussian import leave_block_out
 from validation.diagnosis.states import State
 
-PARTS = 5
+PARTS = 5  # of a range, as folds of rows
 _DISTINCT = 4  # values of a variable for each part, at least
 
 

@@ -17,8 +17,8 @@ from validation.diagnosis.hypotheses import in_one_session, sessions_of
 from validation.diagnosis.signatures import Signature, Tangents
 from validation.diagnosis.states import Models, State
 
-_ROUNDS = 3  # of linearisation
-_MOVED = 0.3  # log posterior: change that ends the iteration
+_ROUNDS = 3  # of linearisation, which may go back and forth
+MOVED = 0.3  # log posterior: change that alters no decision
 _LINEAR = 0.5  # squared whitened error of a linearisation that is accepted
 _SHIFT = 3.0  # largest factor by which a nonlinear parameter changes in a round
 
@@ -38,7 +38,7 @@ class Relinearisation:
             if elements is None:
                 break
             before, state = state.score, self.models.state(elements, state.mode, state)
-            if abs(state.score - before) < _MOVED:
+            if abs(state.score - before) < MOVED:
                 break
         return state
 

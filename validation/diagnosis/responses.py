@@ -30,8 +30,8 @@ from assembly.measurement.settled_clearance import (
     without_joint_clearances,
 )
 
-_STEP = 1e-5  # [rad, m] for the derivative of what a device reads
-_ROUNDING = 1e-9  # of the largest moment or force
+_STEP = 1e-5  # [rad, m] for a derivative: central, exact to 1e-10
+_ROUNDING = 1e-9  # of the largest moment or force: in struts between ball joints
 _AT_ONCE = 50  # postures, so that memory stays small
 
 

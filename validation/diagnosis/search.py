@@ -21,25 +21,24 @@ from validation.diagnosis.candidates import Candidate
 from validation.diagnosis.elements import Dense, Element
 from validation.diagnosis.functions import Request, ScoredFunction
 from validation.diagnosis.places import Weighted
-from validation.diagnosis.relinearise import Relinearisation
+from validation.diagnosis.relinearise import MOVED, Relinearisation
 from validation.diagnosis.states import MORE, Models, State
 from validation.diagnosis.weighted_readings import WeightedReadings
 from validation.diagnosis.whitening import Whitening
 
 Update = Callable[[str, int, int], None]
 Tried = tuple[tuple[Element, ...], State]  # elements; model that gives start values
-_MOST = 5  # elements of a model
-_BEAM = 6  # candidates per model of the beam
+_MOST = 5  # elements of a model, the limit that the docs state
+_BEAM = 6  # candidates per model of the beam: trials, as the widths below
 _KEPT = 3  # width of the beam
 _OF_NAME = 2  # models in the beam with the same names
 _LOOKED = 2  # models of the beam for which functions are scored
 _FORMS = 4  # models whose function is tried in all forms
 _VARIABLES = 4  # variables whose products with others are scored
-_WIDEST = 600  # most columns of a function at several places
-_DROP = 1.0  # log posterior by which a larger model may be worse
+_WIDEST = 600  # most columns of a function at several places, for memory
+_DROP = 1.0  # log posterior by which a larger model may be worse, if two need it
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
-_HALVINGS = 6  # of the step of a number in which a form is not linear
-_MOVED = 0.3  # log posterior: least improvement
+_HALVINGS = 6  # of the step of a number in which a form is not linear; the fit ends it
 
 
 class Search:
@@ -71,7 +70,7 @@ class Search:
             before = self._best()
             self._exchange(before)
             best = self._best()
-            if best.score < before.score + _MOVED:
+            if best.score < before.score + MOVED:
                 break
             self._grow([best], products=False)
         return sorted(self.seen.values(), key=lambda s: -s.score)

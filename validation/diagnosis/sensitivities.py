@@ -36,9 +36,9 @@ from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import Responses
 
 _STIFF = 0.1  # of a spline's size that its straight part may have, per step
-_RANK = 1e-8
-_STEP = 1e-3  # of the largest load, for a derivative
-_BENT = 64  # columns of forms whose last number is being fitted that are kept
+_RANK = 1e-8  # relative size of a power that is no rounding of those below it
+_STEP = 1e-3  # of the largest load, for a derivative: the model is linear in it
+_BENT = 64  # columns that are kept of forms whose last number is being fitted
 _NOTHING = 1e-9  # of the largest unknown: what the readings do not see
 
 

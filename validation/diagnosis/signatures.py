@@ -35,8 +35,8 @@ from validation.diagnosis.hypotheses import (
 
 _PROBES = 3  # random projections that identify equal columns
 _DIGITS = 6  # of a projection that must agree
-_PROBED = 4  # rows
-_HARDLY = 2.0  # squared whitened change of all readings together
+_PROBED = 4  # rows of largest load, and of largest rotation
+_HARDLY = 2.0  # squared whitened change of all readings together, in no case visible
 UNSEEN = 1e-3  # [sigma] over all readings, of an unknown's own size
 
 
