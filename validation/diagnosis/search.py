@@ -9,6 +9,7 @@ Steps:
 5. Exchange each element of the best model for any other until the model is stable.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -66,7 +67,7 @@ class Search:
             if not new or new[0].score < best.score - _DROP:
                 break
             front = new
-        while True:
+        for _ in range(_MOST):  # each element may be exchanged
             before = self._best()
             self._exchange(before)
             best = self._best()
@@ -117,11 +118,11 @@ class Search:
         """Return the best models with one element added, best first."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._without_nuisance(sources):
-            for score, element in self._candidates(
-                state,
-                functions=state in sources[:_LOOKED],
-                products=products and state is sources[0],
-            ):
+            looked, first = state in sources[:_LOOKED], state is sources[0]
+            listed = self._candidates(
+                state, functions=looked, products=products and first
+            )
+            for score, element in listed:
                 elements = (*state.elements, element)
                 key = frozenset(elements)
                 if key not in tried or tried[key][0] < score:
@@ -160,13 +161,13 @@ class Search:
         gains = [self._library.gains(state.marginal), self._more * some]
         score = np.concatenate(gains) + np.array([e.log_prior for e in listed])
         have = {e.name for e in state.elements if e.name}
-        counts: dict[str, int] = {}
+        counts: Counter[str] = Counter()
         best: list[tuple[float, Element]] = []
         for i in np.argsort(-score).tolist():
             e = listed[i]
             if not np.isfinite(score[i]) or (e.name and e.name in have):
                 continue
-            counts[e.name] = counts.get(e.name, 0) + 1
+            counts[e.name] += 1
             whole = e if e.name else self._element(e.candidate, e.log_prior)
             if counts[e.name] <= _OF_NAME and whole is not None:
                 best.append((float(score[i]), whole))
@@ -178,11 +179,10 @@ class Search:
         if products:
             found += self.look(state, self._products(found))
         found.sort(key=lambda one: -one.score)
-        made = [
-            (one.score, self._element(one.candidate, one.log_prior))
-            for one in found[:_BEAM]
-        ]
-        best += [(w, e) for w, e in made if e is not None and e not in state.elements]
+        for one in found[:_BEAM]:
+            made = self._element(one.candidate, one.log_prior)
+            if made is not None and made not in state.elements:
+                best.append((one.score, made))
         best.sort(key=lambda one: -one[0])
         state.forget()
         begin = state.score - MORE
@@ -278,11 +278,11 @@ class Search:
         if len(state.elements) < 2:
             return []
         own = origins(state.elements)
-        rest = [tuple(e for e in own if e is not out) for out in own]
-        return [
-            self.relinearisation.relinearised(self.models.best(some, state))
-            for some in rest
-        ]
+        return [self._fitted(_without(own, out), state) for out in own]
+
+    def _fitted(self, elements: tuple[Element, ...], start: State) -> State:
+        """Return a model in its best mode, linearised at its estimates."""
+        return self.relinearisation.relinearised(self.models.best(elements, start))
 
     def _best(self) -> State:
         """Return the model of largest log posterior."""
@@ -294,9 +294,9 @@ class Search:
         self._keep(self._with_one_removed(best))
         curved = any(e.first for e in best.elements)
         for out in own:
-            rest = tuple(e for e in own if e is not out)
-            base = self.models.best(rest, best)
-            base = self.relinearisation.relinearised(base) if curved else base
+            base = (self._fitted if curved else self.models.best)(
+                _without(own, out), best
+            )
             listed = self._candidates(base, functions=not out.name)
             for less in self._without_nuisance([base])[1:]:
                 listed += self._candidates(less, functions=False)
@@ -318,13 +318,14 @@ class Search:
         """Fit models; optimise modes and linearise again for the best ones."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
-        best = [
-            self.relinearisation.relinearised(self.models.best(s.elements, s))
-            for s in new[:_KEPT]
-        ]
+        best = [self._fitted(s.elements, s) for s in new[:_KEPT]]
         return sorted([*best, *new[_KEPT:]], key=lambda s: -s.score)
 
 
 def origins(elements: Iterable[Element]) -> tuple[Element, ...]:
     """Return the elements as linearised at their start values."""
     return tuple(e.origin for e in elements)
+
+
+def _without(elements: Iterable[Element], out: Element) -> tuple[Element, ...]:
+    return tuple(e for e in elements if e is not out)
