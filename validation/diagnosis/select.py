@@ -272,7 +272,7 @@ def _learned(
     """Return a function of the best model with its equivalents."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
-    equal = list(search.functions.equivalents(e.candidate))
+    equal = list(search.columns.functions.equivalents(e.candidate))
     for s in states:
         others = [x for x in s.elements if x not in rest]
         if len(others) == 1 and len(s.elements) > len(rest) and not others[0].name:

@@ -101,7 +101,9 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     z = 5 * rng.normal(size=6 * ROWS)
     every = np.ones(len(z), dtype=bool)
     search = Search(WeightedReadings(columns, z, every, np.ones(len(z))))
-    looked = search.look(search.empty[-1], columns.functions.first_look(), most=30)
+    looked = search.scores.look(
+        search.empty[-1], columns.functions.first_look(), most=30
+    )
     made = [columns.functions.element(f.candidate, 0.0) for f in looked]
     dense = Dense(made, search.readings.cells, search.readings.whiten)
     alone = dense.gains(search.empty[-1].marginal)

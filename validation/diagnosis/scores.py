@@ -1,0 +1,170 @@
+"""What every element would add to a model, estimated at its standard deviations."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.diagnosis import function_forms as forms
+from validation.diagnosis.candidates import Candidate
+from validation.diagnosis.elements import Dense, Element
+from validation.diagnosis.functions import Request, ScoredFunction
+from validation.diagnosis.places import Weighted
+from validation.diagnosis.states import MORE, State
+from validation.diagnosis.weighted_readings import WeightedReadings
+from validation.diagnosis.whitening import Whitening
+
+BEAM = 6  # elements to add to a model: trials
+OF_NAME = 2  # of them with the same name
+_VARIABLES = 4  # variables whose products with others are scored
+_WIDEST = 600  # most columns of a function at several places, for memory
+_HALVINGS = 6  # of the step of a number in which a form is not linear; the fit ends it
+
+
+class Scores:
+    """Scores of all candidates, given a model of the same readings."""
+
+    def __init__(self, readings: WeightedReadings) -> None:
+        """Compute nothing yet."""
+        self.readings, self.columns = readings, readings.columns
+        self.functions = readings.columns.functions
+        self._made: dict[object, Element | None] = {}
+
+    @cached_property
+    def _whiten_sample(self) -> tuple[NDArray, Whitening]:
+        """(N,) mask of the sampled cells, and their map to independent noise."""
+        cells, some = self.readings.cells.copy(), self.readings.sampled
+        cells[cells] = some
+        root, common = self.readings.root[some], self.readings.common
+        return cells, self.columns.whitening(cells, root, common)
+
+    @cached_property
+    def weighted(self) -> Weighted:
+        """Responses at all places in the sampled cells."""
+        return self.functions.places.weighted(*self._whiten_sample)
+
+    @cached_property
+    def _library(self) -> Dense:
+        """Effects of the library."""
+        return self._dense(self.columns.library)
+
+    @cached_property
+    def _explicit(self) -> Dense:
+        """Functions at several places, in the sampled cells."""
+        own = self.readings.cells[self.columns.sampled]
+        return Dense(self.columns.explicit, own, self._whiten_sample[1])
+
+    def _dense(self, elements: list[Element]) -> Dense:
+        """Return elements to be scored in the fitted cells."""
+        return Dense(elements, self.readings.cells, self.readings.whiten)
+
+    def _gain(self, e: Element, base: State) -> float:
+        """Return the log evidence ratio of adding an element to a model."""
+        return float(self._dense([e]).gains(base.marginal)[0])
+
+    def best_to_add(
+        self, state: State, *, functions: bool = True, products: bool = False
+    ) -> list[tuple[float, Element]]:
+        """Return the best elements to add, with estimates of the log posterior."""
+        listed = [*self._library.elements, *self._explicit.elements]
+        some = self._explicit.gains(state.sample_marginal)
+        gains = [self._library.gains(state.marginal), self._more * some]
+        score = np.concatenate(gains) + np.array([e.log_prior for e in listed])
+        counts = Counter({e.name: OF_NAME for e in state.elements if e.name})
+        best: list[tuple[float, Element]] = []
+        for i in np.argsort(-score).tolist():
+            e = listed[i]
+            counts[e.name] += 1
+            if np.isfinite(score[i]) and counts[e.name] <= OF_NAME:
+                whole = e if e.name else self._element(e.candidate, e.log_prior)
+                best += [(float(score[i]), whole)] if whole else []
+            if len(best) >= BEAM:
+                break
+        found: list[ScoredFunction] = []
+        if functions:
+            found = self.look(state, self.functions.first_look())
+        if products:
+            found += self.look(state, self._products(found))
+        found.sort(key=lambda one: -one.score)
+        for one in found[:BEAM]:
+            made = self._element(one.candidate, one.log_prior)
+            if made is not None and made not in state.elements:
+                best.append((one.score, made))
+        best.sort(key=lambda one: -one[0])
+        state.forget()
+        begin = state.score - MORE
+        return [(begin + w, e) for w, e in best[: BEAM + 2]]
+
+    def _products(self, found: Sequence[ScoredFunction]) -> list[Request]:
+        """Return requests for products of the best functions' variables."""
+        names = list(dict.fromkeys(f.candidate.parts[0].variable for f in found))
+        names = names[:_VARIABLES]
+        if "approach" in self.functions.variables:
+            names.append("approach")
+        return self.functions.products(dict.fromkeys(names))
+
+    def look(
+        self, state: State, requests: Sequence[Request], most: int = 3
+    ) -> list[ScoredFunction]:
+        """Return the best functions to add; scores are scaled to all rows."""
+        found = self.functions.look(
+            state.sample_marginal, self.weighted, requests, most
+        )
+        scaled = [
+            replace(f, score=self._more * (f.score - f.log_prior) + f.log_prior)
+            for f in found
+        ]
+        return sorted(scaled, key=lambda one: -one.score)
+
+    @property
+    def _more(self) -> float:
+        """Readings of all rows for one of the sampled rows."""
+        return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
+
+    def _element(self, one: Candidate, log_prior: float) -> Element | None:
+        """Return the cached element of a function, with columns of all cells."""
+        if one not in self._made:
+            self._made[one] = self.functions.element(one, log_prior)
+        return self._made[one]
+
+    def forms_of(self, last: Element, base: State) -> list[Element | None]:
+        """Return the best forms of a function's variables."""
+        one = last.candidate
+        variables = one.parts[0].variables
+        priors = self.functions.shapes_of(variables)
+        if len(one.parts) == 1:
+            found = self.look(base, [(variables, tuple(priors))], most=4)
+            return [self._element(f.candidate, f.log_prior) for f in found]
+        count = sum(len(part.components) for part in one.parts)
+        tried = [
+            Candidate(one.parts, one.kind, shape)
+            for shape in priors
+            if len(shape.names) * count <= _WIDEST and not forms.is_screw(shape)
+        ]
+        best: list[tuple[float, Element]] = []
+        for candidate in tried:  # one by one: each may have hundreds of columns
+            e = self._made.get(candidate)
+            e = e or self.functions.element(candidate, priors[candidate.shape])
+            if e is not None:
+                best.append((self._gain(e, base) + e.log_prior, e))
+                best = sorted(best, key=lambda scored: -scored[0])[:4]
+        base.forget()
+        self._made |= {e.candidate: e for _, e in best}
+        return [e for _, e in best]
+
+    def sharper(self, e: Element, base: State) -> Element:
+        """Return a function with the number in which its form is not linear refined."""
+        one = e.candidate
+        if not len(one.shape.bends):
+            return e
+        best = self._gain(e, base)
+        variables, conditions = one.parts[0].variables, self.functions.conditions
+        for k in range(_HALVINGS):
+            for shape in forms.near(conditions, variables, e.candidate.shape, 0.5**k):
+                near = self.functions.element(replace(one, shape=shape), e.log_prior)
+                if near is not None and (gain := self._gain(near, base)) > best:
+                    best, e = gain, near
+        return e
