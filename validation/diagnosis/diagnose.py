@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from assembly.effects import LIBRARY
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.columns import FUNCTION
+from validation.diagnosis.declared import declared
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut, hidden, hold_out
@@ -29,7 +30,7 @@ from validation.diagnosis.judge import Judged, judge
 from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.setup_blunders import SetupBlunder, setup_blunders
 from validation.diagnosis.signatures import conditions_of
-from validation.diagnosis.trace import Traced, declared, trace
+from validation.diagnosis.trace import Traced, trace
 
 Update = Callable[[str, int, int], None]
 

@@ -102,6 +102,16 @@ class State:
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
 
+    @property
+    def errors(self) -> NDArray:
+        """(n, 6) [rad, m] geometric errors of the campaign's frames."""
+        columns = self.readings.columns
+        small = columns.nuisance.take(self.used)
+        errors = np.zeros((len(columns.campaign.robot.frames), 6))
+        x = np.where(small.spring, 0.0, self.sizes.mean[: len(small.spring)])
+        np.add.at(errors, (small.frame, small.axis), x)
+        return errors
+
     def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
         """Return the elements but for some."""
         return tuple(e for e in self.elements if e not in some)

@@ -19,30 +19,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
-from assembly.linear.closure import virtual_joints
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import (
     predict,
-    with_finite_motions,
-    with_rest_positions,
-    with_second_order,
 )
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
+from validation.diagnosis.declared import Declared, at_rest
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import drawn, hidden
 from validation.diagnosis.hypotheses import Hypothesis, in_one_session, sessions_of
 from validation.diagnosis.lack_of_fit import outlying
 from validation.diagnosis.noise import cell_weights
-from validation.diagnosis.nuisance import GEOMETRY
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.prediction import residual_of
 from validation.diagnosis.registration import register
 from validation.diagnosis.select import select
 from validation.diagnosis.selected import Selected
-from validation.diagnosis.signatures import conditions_of, whiten
+from validation.diagnosis.signatures import whiten
 from validation.diagnosis.states import prediction_gain
 from validation.diagnosis.unknowns import Acting, LearnedFunction, Unknowns
 from validation.diagnosis.weighted_readings import NONE
@@ -153,53 +149,6 @@ def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
     return [Acting(there, values[places], s) for (there, places), s in own]
 
 
-@dataclass(frozen=True, eq=False)
-class Declared:
-    """What a machine reads as its file declares it; no reading is asked.
-
-    Attributes:
-        conditions: of all rows, before any registration.
-        finite: whether motions of the declared model are finite.
-    """
-
-    conditions: Conditions
-    finite: bool
-
-    @cached_property
-    def derivatives(self) -> Derivatives:
-        """Of what is read there, clearances of closed chains where they rest."""
-        return Derivatives(_at_rest(self.conditions))
-
-    def complete(self, conditions: Conditions) -> Conditions:
-        """Changed conditions with what finite motions add."""
-        complete = with_finite_motions if self.finite else with_second_order
-        return complete(conditions)
-
-
-def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
-    """What the file of a campaign's robot says of its rows.
-
-    Args:
-        campaign: of R rows.
-        finite: whether motions of the declared model are finite; they are too if the
-            file says so.
-
-    Returns:
-        The same whichever readings of the campaign are hidden.
-    """
-    conditions = conditions_of(campaign)
-    finite = finite or conditions.exact
-    whole = with_finite_motions if finite else with_second_order
-    return Declared(whole(conditions), finite)
-
-
-def _at_rest(conditions: Conditions) -> Conditions:
-    """Conditions with clearances of closed chains where they rest, found once."""
-    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
-        return with_rest_positions(conditions)
-    return conditions
-
-
 def trace(
     campaign: Campaign, declared: Declared, fitted: NDArray, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
@@ -222,7 +171,7 @@ def trace(
     fitted = fitted & ~impossible_rows(campaign) & campaign.cells.any(axis=1)
     if campaign.registration == "unknown":
         registered = register(campaign.take(fitted), declared.conditions)
-        derivatives = Derivatives(_at_rest(registered))
+        derivatives = Derivatives(at_rest(registered))
     else:
         derivatives = declared.derivatives
     sample = hidden(campaign, ~_searched_rows(campaign, fitted))
@@ -230,10 +179,10 @@ def trace(
     conditions = derivatives.conditions
     columns = Columns(sample, derivatives, update, odds)
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
+    seen = hidden(campaign, ~fitted)
     for turn in range(_TURNS):
         cells = (fitted & ~blunders)[columns.row]
-        read = predict(conditions).deviation
-        z = whiten(sample, sample.measured - read)
+        z = whiten(sample, sample.measured - predict(conditions).deviation)
         cells &= np.isfinite(z)
         selected = _searched(columns, z[cells], cells, update)
         traced = _traced(
@@ -247,8 +196,8 @@ def trace(
         if gross.any() and few and turn < _TURNS - 1:
             blunders = blunders | gross
             continue
-        bent = _with_errors(conditions, fit, declared) if bends < _BENDS else None
-        if bent is None or not _differs(campaign, bent, read, fitted):
+        bent = declared.bent(seen, conditions, fit.errors, _BENT)
+        if bent is None or bends == _BENDS:
             break
         conditions, bends = bent, bends + 1
     return _without_outlying(traced, fit)
@@ -279,21 +228,24 @@ def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
     """Conditions with what finite geometric errors add, before anything is searched."""
-    conditions = derivatives.conditions
+    conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
     cells = fitted[columns.row]
     for _ in range(_BENDS + 1):
-        read = predict(conditions).deviation
-        z = whiten(campaign, campaign.measured - read)
+        z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
+        # a fit of the machine takes long: do the linear estimates come near the limit?
+        near = selected.states[0].errors
+        if declared.bent(seen, conditions, near, _BENT / 3) is None:
+            break
         traced = _traced(
             campaign, declared, conditions, fitted, known, selected, columns
         )
         fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
-        bent = _with_errors(conditions, fit, declared)
-        if bent is None or not _differs(campaign, bent, read, fitted):
+        bent = declared.bent(seen, conditions, fit.errors, _BENT)
+        if bent is None:
             break
         conditions = bent
     same = conditions is derivatives.conditions
@@ -371,26 +323,3 @@ def _size(fit: MachineFit, one: Acting) -> float:
     """[sigma^2] squared change of the fitted readings by an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))
-
-
-def _with_errors(
-    conditions: Conditions, fit: MachineFit, declared: Declared
-) -> Conditions | None:
-    """Conditions with what finite motions add to the geometric errors found."""
-    if not any(part.name == GEOMETRY for part in fit.unknowns.small):
-        return None
-    frames = fit.unknowns.robot.frames
-    own = [conditions.robot.index(frame.name) for frame in frames]
-    errors = conditions.errors.copy()
-    errors[:, own] += fit.robot.errors - fit.unknowns.robot.errors
-    added = declared.complete(replace(conditions, errors=errors)).second_order
-    return replace(conditions, second_order=added)
-
-
-def _differs(
-    campaign: Campaign, bent: Conditions, read: NDArray, fitted: NDArray
-) -> bool:
-    """Whether finite geometric errors change a fitted reading by more than noise."""
-    change = (predict(bent).deviation - read) / campaign.sigma
-    change = np.where(campaign.cells & fitted[:, None], change, 0.0)
-    return bool(np.nanmax(np.abs(change), initial=0.0) > _BENT)

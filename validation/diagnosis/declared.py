@@ -1,0 +1,80 @@
+"""What a machine reads as its file declares it, the same for all folds."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.linear.closure import virtual_joints
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.predict import (
+    predict,
+    with_finite_motions,
+    with_rest_positions,
+    with_second_order,
+)
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.derivatives import Derivatives
+from validation.diagnosis.signatures import conditions_of, whiten
+
+
+@dataclass(frozen=True, eq=False)
+class Declared:
+    """What a machine reads as its file declares it; no reading is asked.
+
+    Attributes:
+        conditions: of all rows, before any registration.
+        finite: whether motions of the declared model are finite.
+    """
+
+    conditions: Conditions
+    finite: bool
+
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Of what is read there, clearances of closed chains where they rest."""
+        return Derivatives(at_rest(self.conditions))
+
+    def bent(
+        self, campaign: Campaign, conditions: Conditions, errors: NDArray, least: float
+    ) -> Conditions | None:
+        """Return conditions with what finite motions add to geometric errors (n, 6).
+
+        None where they change no reading of the campaign by ``least`` [sigma].
+        """
+        if not errors.any():
+            return None
+        own = [conditions.robot.index(frame.name) for frame in campaign.robot.frames]
+        whole = conditions.errors.copy()
+        whole[:, own] += errors
+        complete = with_finite_motions if self.finite else with_second_order
+        added = complete(replace(conditions, errors=whole)).second_order
+        bent = replace(conditions, second_order=added)
+        change = predict(bent).deviation - predict(conditions).deviation
+        largest = np.nanmax(np.abs(whiten(campaign, change)), initial=0.0)
+        return bent if largest > least else None
+
+
+def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
+    """What the file of a campaign's robot says of its rows.
+
+    Args:
+        campaign: of R rows.
+        finite: whether motions of the declared model are finite; they are too if the
+            file says so.
+
+    Returns:
+        The same whichever readings of the campaign are hidden.
+    """
+    conditions = conditions_of(campaign)
+    finite = finite or conditions.exact
+    whole = with_finite_motions if finite else with_second_order
+    return Declared(whole(conditions), finite)
+
+
+def at_rest(conditions: Conditions) -> Conditions:
+    """Conditions with clearances of closed chains where they rest, found once."""
+    if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
+        return with_rest_positions(conditions)
+    return conditions
