@@ -24,6 +24,7 @@ _KEPT = 3  # width of the beam: trials, as the numbers below
 _LOOKED = 2  # models of the beam for which functions are scored
 _FORMS = 4  # models whose function is tried in all forms
 _DROP = 1.0  # log posterior by which a larger model may be worse, if two need it
+_ROUNDS = 3  # of exchanges: with memory that is not in the model they never end
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 
 
@@ -50,7 +51,7 @@ class Search:
             if not new or new[0].score < best.score - _DROP:
                 break
             front = new
-        for _ in range(_MOST):  # each element may be exchanged
+        for _ in range(_ROUNDS):
             before = self._best()
             self._exchange(before)
             best = self._best()

@@ -38,6 +38,7 @@ _EQUAL = 3.0  # log posterior, odds of 20: less tells nothing apart
 _CLAIMED = 0.9  # probability of functions from which the best model has them
 _SAME = 1.0  # squared whitened difference that no reading tells
 _LISTED = 20  # models in the result: the rest has no weight
+_COMPARED = 60  # models whose predictions are compared: others have no weight
 _FEWEST = 5  # blocks: with fewer, functions are not cross-validated
 _AGAIN = 3  # searches with other noise in common: it hardly changes after the first
 _SURE = 2.0  # standard errors: false functions reached 1.8, true ones at least 6.9
@@ -190,8 +191,12 @@ def _merged(states: Sequence[State]) -> list[State]:
     of the library is that effect; but for errors of the measuring device, which the
     machine may have as well.
     """
+    every = _best_first(states)
+    # models without functions are kept in case no function is confirmed
+    bare = [s for s in every if not _functions(s)][:_LISTED]
+    compared = every[:_COMPARED]
     kept: list[State] = []
-    for state in _best_first(states):
+    for state in [*compared, *(s for s in bare if s not in compared)]:
         twin = next((k for k, s in enumerate(kept) if _same(s, state)), None)
         if twin is None:
             kept.append(state)
