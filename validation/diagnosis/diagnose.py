@@ -83,7 +83,7 @@ def diagnose(
         # where there are some, anything else that is found would stand for them
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
-        return _Found(*trace(part, design, rows, update, odds=own), setup)
+        return _Found(*trace(part, rows, design, update, odds=own), setup)
 
     folds = []
     for k, rows in enumerate(held.folds):

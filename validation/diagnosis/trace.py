@@ -150,15 +150,15 @@ def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
 
 
 def trace(
-    campaign: Campaign, declared: Declared, fitted: NDArray, update: Update, *,
+    campaign: Campaign, fitted: NDArray, declared: Declared, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Traced, MachineFit]:  # fmt: skip
     """Search for the effects and functions that a declared model lacks.
 
     Args:
         campaign: of R rows.
-        declared: of these rows.
         fitted: (R,) bool, the rows that are read.
+        declared: of all rows.
         update: told what is done, how much of it and of how much.
         odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
 
