@@ -75,11 +75,6 @@ class MachineFit:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
-    def errors(self) -> NDArray:
-        """(n, 6) [rad, m] geometric errors found, beside those declared."""
-        return np.asarray(self.robot.errors - self.unknowns.robot.errors)
-
-    @property
     def determined(self) -> NDArray:
         """(k,) share of each unknown that the readings say and not its prior."""
         prior = self.unknowns.std**2

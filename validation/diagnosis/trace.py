@@ -196,7 +196,7 @@ def trace(
         if gross.any() and few and turn < _TURNS - 1:
             blunders = blunders | gross
             continue
-        bent = declared.bent(seen, conditions, fit.errors, _BENT)
+        bent = declared.bent(seen, conditions, _errors(fit), _BENT)
         if bent is None or bends == _BENDS:
             break
         conditions, bends = bent, bends + 1
@@ -244,12 +244,17 @@ def _with_its_errors(
             campaign, declared, conditions, fitted, known, selected, columns
         )
         fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
-        bent = declared.bent(seen, conditions, fit.errors, _BENT)
+        bent = declared.bent(seen, conditions, _errors(fit), _BENT)
         if bent is None:
             break
         conditions = bent
     same = conditions is derivatives.conditions
     return derivatives if same else Derivatives(conditions)
+
+
+def _errors(fit: MachineFit) -> NDArray:
+    """(n, 6) [rad, m] geometric errors found, beside those declared."""
+    return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
