@@ -254,26 +254,26 @@ class Models:
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
         """Return some nuisance parameters and the elements' unknowns."""
-        readings, small = self.readings, self._small.take(used)
+        readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)
         beside = with_small[used]
         empty, counts = np.zeros(0), [e.columns.shape[1] for e in elements]
+        own = _GROUPS + np.repeat(np.arange(len(elements)), counts)
         with_z = [empty, *(readings.own(e).T @ z for e in elements)]
+        given = [empty, *(e.given for e in elements)]
+        most = np.repeat([e.most for e in elements], counts)
         return Grouped(
             gram=np.block([
-                [readings.gram[np.ix_(used, used)], beside],
-                [beside.T, inner],
+                [readings.gram[np.ix_(used, used)], beside], [beside.T, inner]
             ]),
             along=np.concatenate([(readings.small.T @ z)[used], *with_z]),
             squares=float(z @ z),
             count=readings.count,
-            group=np.append(
-                small.group, _GROUPS + np.repeat(np.arange(len(elements)), counts)
-            ),
-            given=np.concatenate([small.given, empty, *(e.given for e in elements)]),
-            most=np.append(small.most, np.repeat([e.most for e in elements], counts)),
-        )
+            group=np.append(small.group[used], own),
+            given=np.concatenate([small.given[used], *given]),
+            most=np.append(small.most[used], most),
+        )  # fmt: skip
 
     def _score(
         self, elements: Sequence[Element], sizes: Sizes, used: NDArray, tau: float
