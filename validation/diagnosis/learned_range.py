@@ -19,7 +19,6 @@ from validation.campaign.campaign import LOAD, Campaign
 
 _MARGIN = 0.05  # of a range: so far it is continued without a word
 _SAME = 1e-3  # of a value: so far one that never varied is the same
-_OWN = ("time",)  # every session has its own
 # forms that repeat after a turn of any variable; of the first alone
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
@@ -133,6 +132,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name not in _OWN:
+        if name != "time":  # every session has its own
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables
