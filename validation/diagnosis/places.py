@@ -118,7 +118,9 @@ class Places:
                 answers.append(a)
         every = np.array(answers).reshape(len(shown), *over_sigma.shape)
         alike: dict[tuple[float, ...], list[int]] = {}
-        for k, key in enumerate(fingerprints(every.reshape(len(shown), -1).T)):
+        for k, key in enumerate(
+            fingerprints(every.reshape(len(shown), over_sigma.size).T)
+        ):
             alike.setdefault(key, []).append(k)
         self._answers = every[[own[0] for own in alike.values()]]
         same: list[list[tuple[Where, ...]]]
