@@ -11,7 +11,6 @@ o       ``offset``     (N,)       change of the model that no unknown scales
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,11 +131,6 @@ class Tangents:
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
-    @cached_property
-    def residual(self) -> NDArray:
-        """(N,) whitened readings minus what is declared; nothing else reads them."""
-        return whiten(self.campaign, self.campaign.measured) - self.declared
-
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
         """(N,) whitened, what is read with effects; see :meth:`.Derivatives.model`."""
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
@@ -161,14 +155,11 @@ class Tangents:
 
     def _at_start(self, hypothesis: Hypothesis) -> Signature:
         """A hypothesis with numbers of all rows where it begins."""
-        if not hypothesis.slots and self._invisible(hypothesis):
-            nothing = np.zeros(len(self.declared))
-            return Signature(hypothesis, nothing, np.zeros((len(nothing), 0)))
         if not hypothesis.slots:
-            started = self.model({hypothesis.effect: {}})
-            return Signature(
-                hypothesis, started - self.declared, np.zeros((len(started), 0))
-            )
+            offset = np.zeros_like(self.declared)
+            if not self._invisible(hypothesis):
+                offset = self.model({hypothesis.effect: {}}) - self.declared
+            return Signature(hypothesis, offset, np.zeros((len(offset), 0)))
         shapes = {
             name: slot.start for slot in hypothesis.slots if slot.shape
             for name in slot.names
