@@ -98,23 +98,30 @@ def best_sizes(
     They begin at ``start``; ``eigen`` are eigenvalues and eigenvectors of some groups'
     blocks of the inner products.
     """
-    free, count = np.isnan(model.given), model.count
-    groups = np.unique(model.group[free]).tolist()
-    own = {g: np.flatnonzero((model.group == g) & free) for g in groups}
+    given, group, count = model.given, model.group, model.count
+    free = np.isnan(given)
+    own = {int(g): np.flatnonzero((group == g) & free) for g in np.unique(group[free])}
     diagonal = np.diag(model.gram)
     limits, size = {}, {}
     for g, which in own.items():
         unit = 1 / np.sqrt(max(float(diagonal[which].mean()), 1e-300))
         limits[g] = unit * _LEAST, float(model.most[which].max())
         size[g] = min(max(start.get(g, unit * _BEGIN), limits[g][0]), limits[g][1])
-    turned = _turned(model, own, eigen)
-    best, worth = dict(size), -np.inf
+    largest = max(own, key=lambda g: len(own[g]), default=None)
+    which = np.zeros(0, dtype=int) if largest is None else own[largest]
+    block = eigen.get(-1 if largest is None else largest)
+    turned = _turned(model.gram, model.along, which, block)
+    best: tuple[_Posterior, dict[int, float]] | None = None
+    worth = -np.inf
     for _ in range(_STEPS):
-        now = turned.posterior(_std(model, own, size))
-        value = -0.5 * (float(deviance(now.squares, count)) + now.log_det)
+        std = np.where(free, 0.0, given)
+        for g, which in own.items():
+            std[which] = size[g]
+        now = turned.posterior(std, model.squares)
+        value = -0.5 * (float(deviance(now.left, count)) + now.log_det)
         if value > worth:
-            worth, best = value, dict(size)
-        precision, change = (FREEDOM + count) / (FREEDOM + now.squares), 0.0
+            worth, best = value, (now, dict(size))
+        precision, change = (FREEDOM + count) / (FREEDOM + now.left), 0.0
         for g, which in own.items():
             seen = max(float(now.determined[which].sum()), 1e-9)
             step = np.sqrt(precision * float((now.x[which] ** 2).sum()) / seen)
@@ -124,59 +131,41 @@ def best_sizes(
             size[g] = new
         if change < _SETTLED:
             break
-    return _posterior(model, own, best)
-
-
-def _std(
-    model: Grouped, own: Mapping[int, NDArray], size: Mapping[int, float]
-) -> NDArray:
-    """(k,) standard deviations of all unknowns."""
-    std = np.where(np.isnan(model.given), 0.0, model.given)
-    for g, which in own.items():
-        std[which] = size[g]
-    return std
-
-
-def _posterior(
-    model: Grouped, own: Mapping[int, NDArray], size: dict[int, float]
-) -> Sizes:
-    """The posterior at the sizes of all groups."""
-    std = _std(model, own, size)
-    M = model.gram * np.outer(std, std)
-    M[np.diag_indices(len(M))] += 1.0
-    L = np.linalg.cholesky(M)
-    half = solve_triangular(L, np.diag(std), lower=True, check_finite=False)
-    covariance = half.T @ half
-    mean = covariance @ model.along
-    least = 1e-12 * model.squares
-    found = Sizes(
-        std=std,
+    assert best is not None
+    at, size = best
+    determined = [float(at.determined[which].sum()) for which in own.values()]
+    return Sizes(
+        std=at.std,
         of_group=size,
-        mean=mean,
-        covariance=covariance,
-        squares=max(model.squares - float(model.along @ mean), least),
-        log_det=2 * float(np.log(np.diag(L)).sum()),
-        cost=0.0,
+        mean=turned.back(at.std * at.x),
+        covariance=turned.covariance(at),
+        squares=at.left,
+        log_det=at.log_det,
+        cost=sum(map(size_penalty, determined)),
     )
-    determined = [float(found.determined[which].sum()) for which in own.values()]
-    return replace(found, cost=sum(map(size_penalty, determined)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
-    """Posterior in the turned unknowns over their standard deviations.
+class _Posterior:
+    """Posterior at given standard deviations, in the turned unknowns over them.
 
     Attributes:
+        std: (k,) standard deviations.
         x: (k,) means.
         determined: (k,) 1 minus the variances; those of the largest group by their sum.
-        squares: z' C^-1 z.
+        left: z' C^-1 z.
         log_det: ln det C.
+        D, E, L: 1 + s^2 values, C D^-1, and L L' = A - C D^-1 C'.
     """
 
+    std: NDArray
     x: NDArray
     determined: NDArray
-    squares: float
+    left: float
     log_det: float
+    D: NDArray
+    E: NDArray
+    L: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,22 +180,21 @@ class _Turned:
     A - C D^-1 C', which is small, while a group may have hundreds of unknowns.
 
     Attributes:
-        values: eigenvalues of the group's block.
+        values, V: eigenvalues and eigenvectors of the group's block.
         group, rest: indices of its unknowns and of all others.
         inner, across: inner products of the others, and of them with the group.
         along: (k,) inner products with the readings.
-        squares: sum of squares of the readings.
     """
 
     values: NDArray
+    V: NDArray
     group: NDArray
     rest: NDArray
     inner: NDArray
     across: NDArray
     along: NDArray
-    squares: float
 
-    def posterior(self, std: NDArray) -> _Step:
+    def posterior(self, std: NDArray, squares: float) -> _Posterior:
         """Return the posterior at standard deviations (k,)."""
         o, g = self.rest, self.group
         s, S = (float(std[g[0]]) if len(g) else 0.0), std[o]
@@ -222,24 +210,43 @@ class _Turned:
         inverse = solve_triangular(
             L, np.hstack([np.eye(len(o)), E]), lower=True, check_finite=False
         )
-        variance, shown = np.empty(len(std)), (inverse**2).sum(axis=0)
+        variance = np.empty(len(std))
+        shown = (inverse**2).sum(axis=0)
         variance[o], variance[g] = shown[: len(o)], 1 / D + shown[len(o) :]
-        left = max(self.squares - float(b @ x), 1e-12 * self.squares)
-        log_det = float(np.log(D).sum()) + 2 * float(np.log(np.diag(L)).sum())
-        return _Step(x, 1 - variance, left, log_det)
+        return _Posterior(
+            std, x, 1 - variance, max(squares - float(b @ x), 1e-12 * squares),
+            float(np.log(D).sum()) + 2 * float(np.log(np.diag(L)).sum()), D, E, L,
+        )  # fmt: skip
+
+    def back(self, x: NDArray) -> NDArray:
+        """Return unknowns along the last axis, turned back."""
+        turned = x.copy()
+        turned[..., self.group] = x[..., self.group] @ self.V.T
+        return turned
+
+    def covariance(self, at: _Posterior) -> NDArray:
+        """Return the (k, k) posterior covariance."""
+        o, g = self.rest, self.group
+        inverse = solve_triangular(
+            at.L, np.hstack([np.eye(len(o)), -at.E]), lower=True, check_finite=False
+        )
+        rows = np.empty((len(o), len(at.std)))
+        rows[:, o], rows[:, g] = inverse[:, : len(o)], inverse[:, len(o) :]
+        rows = self.back(rows * at.std)
+        C = rows.T @ rows
+        C[np.ix_(g, g)] += (self.V * (at.std[g] ** 2 / at.D)) @ self.V.T
+        return C
 
 
 def _turned(
-    model: Grouped, own: Mapping[int, NDArray], eigen: Mapping[int, Eigen]
+    gram: NDArray, along: NDArray, group: NDArray, eigen: Eigen | None
 ) -> _Turned:
-    """Turn the unknowns of the largest group: their inner products are diagonal."""
-    largest = max(own, key=lambda g: len(own[g]), default=-1)
-    group = own.get(largest, np.zeros(0, dtype=int))
-    rest = np.setdiff1d(np.arange(len(model.gram)), group)
-    values, V = eigen.get(largest) or np.linalg.eigh(model.gram[np.ix_(group, group)])
-    along = model.along.copy()
-    along[group] = V.T @ along[group]
+    """Turn the unknowns of a group so that their inner products are diagonal."""
+    rest = np.setdiff1d(np.arange(len(gram)), group)
+    values, V = eigen or np.linalg.eigh(gram[np.ix_(group, group)])
+    turned = along.copy()
+    turned[group] = V.T @ along[group]
     return _Turned(
-        np.maximum(values, 0.0), group, rest, model.gram[np.ix_(rest, rest)],
-        model.gram[np.ix_(rest, group)] @ V, along, model.squares,
+        np.maximum(values, 0.0), V, group, rest, gram[np.ix_(rest, rest)],
+        gram[np.ix_(rest, group)] @ V, turned,
     )  # fmt: skip
