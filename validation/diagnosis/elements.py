@@ -18,9 +18,7 @@ from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import Signature
 from validation.diagnosis.whitening import Whitening
 
-_PLAUSIBLE = (
-    1e3  # largest ratio of an unknown to its plausible size: the campaigns' limit
-)
+_PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
 _NO_OFFSET = 1e-9  # [sigma] below which an offset is rounding
 
 

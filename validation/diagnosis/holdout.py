@@ -17,9 +17,7 @@ FEWEST = 8  # blocks of rows by which something can be judged
 _SPLIT = 60  # configurations from which one split judges
 _SHARES = (1 / 4, 1 / 10)  # of the blocks held out: of 60, and of many
 _ENOUGH = 60  # blocks held out that judge well, however many there are
-_FOLDS = (
-    5  # usual (Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10)
-)
+_FOLDS = 5  # Hastie, Tibshirani, Friedman, Elements of Statistical Learning, 7.10
 SPANS = "spans of time"
 
 
