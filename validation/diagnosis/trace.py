@@ -20,9 +20,7 @@ from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import (
-    predict,
-)
+from assembly.measurement.predict import predict
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.claims import supported
 from validation.diagnosis.columns import FUNCTION, Columns
@@ -31,7 +29,7 @@ from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.fit import MachineFit, fit_machine
 from validation.diagnosis.holdout import drawn, hidden
 from validation.diagnosis.hypotheses import Hypothesis, in_one_session, sessions_of
-from validation.diagnosis.lack_of_fit import outlying
+from validation.diagnosis.lack_of_fit import OUTLIERS, outlying
 from validation.diagnosis.noise import cell_weights
 from validation.diagnosis.plausible import impossible_rows
 from validation.diagnosis.prediction import residual_of
@@ -49,7 +47,6 @@ _SEARCHED = 2000  # rows by which models are chosen; all are fitted
 _TURNS = 6  # of the search, without gross blunders
 _BENDS = 1  # of them, with what finite geometric errors add
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
-_MOST = 20  # one row in so many may be one
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
 
@@ -61,23 +58,19 @@ class Traced:
     Attributes:
         campaign: of R rows; sigma is as large as the search believed, of a blunder
             many times as large, and so is the noise in common.
-        unregistered: conditions of all rows, before any registration.
-        conditions: the same, registered, with what finite geometric errors add.
+        conditions: of all rows, registered, with what finite geometric errors add.
         used: (R,) bool, rows that were fitted.
         outliers: (R,) bool, rows whose readings are blunders, left out.
         selected: models with their probabilities.
         columns: of the campaign's cells.
-        finite: whether motions of the declared model are finite.
     """
 
     campaign: Campaign
-    unregistered: Conditions
     conditions: Conditions
     used: NDArray
     outliers: NDArray
     selected: Selected
     columns: Columns
-    finite: bool
 
     @property
     def fitting(self) -> Campaign:
@@ -181,18 +174,16 @@ def trace(
     blunders, bends = np.zeros(len(campaign), dtype=bool), 0
     seen = hidden(campaign, ~fitted)
     for turn in range(_TURNS):
-        cells = (fitted & ~blunders)[columns.row]
+        good = fitted & ~blunders
+        cells = good[columns.row]
         z = whiten(sample, sample.measured - predict(conditions).deviation)
         cells &= np.isfinite(z)
         selected = _searched(columns, z[cells], cells, update)
-        traced = _traced(
-            campaign, declared, conditions, fitted & ~blunders, cells, selected,
-            columns,
-        )  # fmt: skip
+        traced = _traced(campaign, conditions, good, cells, selected, columns)
         traced = replace(traced, outliers=traced.outliers | blunders)
         fit = _fitted(traced)
         gross = _gross(campaign, fit, traced.used)
-        few = _MOST * (gross | blunders).sum() <= fitted.sum()
+        few = OUTLIERS * (gross | blunders).sum() <= fitted.sum()
         if gross.any() and few and turn < _TURNS - 1:
             blunders = blunders | gross
             continue
@@ -240,9 +231,7 @@ def _with_its_errors(
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
-        traced = _traced(
-            campaign, declared, conditions, fitted, known, selected, columns
-        )
+        traced = _traced(campaign, conditions, fitted, known, selected, columns)
         fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
         bent = declared.bent(seen, conditions, _errors(fit), _BENT)
         if bent is None:
@@ -282,8 +271,8 @@ def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> S
 
 
 def _traced(
-    campaign: Campaign, declared: Declared, conditions: Conditions, fitted: NDArray,
-    cells: NDArray, selected: Selected, columns: Columns,
+    campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
+    selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
     """What was found, with the sigma that was believed and rows that are blunders."""
     weights = np.ones(len(columns.row))
@@ -302,13 +291,11 @@ def _traced(
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
         campaign=replace(campaign, sigma=sigma, common=common),
-        unregistered=declared.conditions,
         conditions=conditions,
         used=fitted & ~outliers,
         outliers=outliers,
         selected=selected,
         columns=columns,
-        finite=declared.finite,
     )
 
 
