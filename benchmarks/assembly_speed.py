@@ -42,9 +42,7 @@ from numpy.typing import NDArray
 from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import Posture, place_many, place_robot
 from assembly.linear.energy import minimise_energies, solve_assembly
-from assembly.linear.fallback import reference_assembly, reference_margin
-from assembly.linear.moving_clearances import Asked
-from assembly.linear.pose_error import bound_pose_error, reference_pose_error
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
@@ -138,7 +136,9 @@ def print_energies(robot: Robot, postures: list[Posture], kappa: float) -> None:
         "Clarabel, full problem, scaled": timed(clarabel_full, few),
         "Clarabel, our reduction (numpy)": timed(clarabel_reduced, few),
         "moreau, batched, full problem": moreau_batched(own),
-        "ours, reference in numpy": timed(reference_assembly, few),
+        "ours, reference in numpy": timed(
+            partial(solve_assembly, method="reference"), few
+        ),
         "ours, one at a time": timed(solve_assembly, own),
         "ours, batched": batched(minimise_energies, own),
     }
@@ -161,7 +161,9 @@ def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
     dpp = Dpp(robot, "elastic", False, data)
     rows = {
         "cvxpy DPP, scaled": timed(dpp, data),
-        "ours, reference in numpy": timed(partial(reference_assembly, **loaded), few),
+        "ours, reference in numpy": timed(
+            partial(solve_assembly, **loaded, method="reference"), few
+        ),
         "ours, one at a time": timed(partial(solve_assembly, **loaded), own),
         "ours, batched": batched(together, own),
     }
@@ -178,7 +180,7 @@ def print_margins(postures: list[Posture]) -> None:
     for reading in READINGS:
         ours = partial(zone_margin, compliant=reading)
         ours(few[0])
-        reference = partial(reference_margin, compliant=reading)
+        reference = partial(zone_margin, compliant=reading, method="reference")
         data = [closure_matrices(p, reading) for p in few]
         rows = {
             "cvxpy DPP, scaled": timed(Dpp(few[0].robot, reading, True, data), data),
@@ -204,9 +206,8 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
         for reading in ("frozen", "free")
     }  # fmt: skip
     for reading in ("frozen", "free"):
-        asked = Asked(reading)
         calls[f"the same in numpy, {reading}"] = (
-            partial(reference_pose_error, asked=asked), some[::12]
+            partial(bound_pose_error, reading=reading, method="reference"), some[::12]
         )  # fmt: skip
     calls["place_robot"] = partial(place_robot, robot), poses[::4]
     print("\nother calls, us")

@@ -255,7 +255,7 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
         print(f"{'ours, one at a time':28}{single:10.2f}{single / batched:11.1f}")
         print(
             f"{'ours, batched':28}{batched:10.3f}{1:11d}  {batch.supports.mean():.1f} "
-            f"supports a point, {batch.fallback.sum()} by the fallback"
+            f"supports a point, {batch.one_by_one.sum()} one by one"
         )
 
 
@@ -278,8 +278,8 @@ def print_study(robot: Robot, poses: NDArray) -> None:
         float(np.diff(getattr(one, f"{part}_error")).max())
         for one in errors for part in PARTS
     )  # fmt: skip
-    slow = sum(int(one.fallback.sum()) for one in errors)
-    slow += sum(int(one.fallback.sum()) for one in zones)
+    slow = sum(int(one.one_by_one.sum()) for one in errors)
+    slow += sum(int(np.sum(one.method == "reference")) for one in zones)
     print(
         f"\nthe study, {len(T)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "

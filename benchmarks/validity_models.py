@@ -56,7 +56,7 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
         SolverFailed: the cone solver gave up.
     """
     joints = bush_joints(virtual_joints(posture.robot, compliant))
-    return Zone(*margin_with(linearise(posture), joints)[:2])
+    return Zone(*margin_with(linearise(posture), joints)[:2], "reference")
 
 
 def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:

@@ -37,6 +37,7 @@ from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
 from assembly.solvers.conic import cone_sizes
+from assembly.solvers.method import Method
 from forcefit.inputs.display import (
     Figures,
     html_table,
@@ -68,6 +69,7 @@ class Assembly:
         motions: (nq,) [rad, m] free motions.
         multipliers: (6 closures,) of the scaled closure rows.
         energy_without_clearance: [J] least energy with all clearances at zero.
+        method: which gave it: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
     """
 
     linearisation: Linearisation
@@ -79,6 +81,7 @@ class Assembly:
     motions: NDArray
     multipliers: NDArray
     energy_without_clearance: float
+    method: Method
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 

@@ -18,10 +18,10 @@ from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed
 
 # by the codes of assembly/kernels/linear/energies.h: the solver that solved, or, after
-# the second, why the point went to the fallback
+# the second, why the point was left to the reference
 OUTCOMES = (
     "dual Newton", "interior point", "rigid rows", "rank in doubt", "uncertified",
-    "bounded joint", "free motion", "one by one",
+    "bounded joint", "free motion", "one by one", "asked",
 )  # fmt: skip
 COMPILED = 2
 
@@ -49,6 +49,7 @@ class Assemblies(PointResults[Assembly]):
         motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         outcome: (k,) index into :data:`OUTCOMES`.
+        method: (k,) which gave it: ``"compiled"`` or ``"reference"``.
         loaded: (k,) bool, points under loads.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
             there is no solution or its certificate falls short.
@@ -68,6 +69,7 @@ class Assemblies(PointResults[Assembly]):
     motions: NDArray
     multipliers: NDArray
     outcome: NDArray
+    method: NDArray
     loaded: NDArray
     status: NDArray
     reason: NDArray
@@ -81,6 +83,7 @@ class Assemblies(PointResults[Assembly]):
         "platform_screw": "platform_screw",
         "closure_residual": "closure_residual",
         "clearance_excess": "clearance_excess",
+        "method": "method",
         "status": "status",
         "reason": "reason",
     }
@@ -105,7 +108,7 @@ class Assemblies(PointResults[Assembly]):
         return (self.gap <= allowed) & (self.status == "ok")
 
     def fallbacks(self) -> dict[str, int]:
-        """How many points the fallback solved, by reason."""
+        """How many points the compiled method left to be solved one by one, by why."""
         return {
             name: int(np.sum(self.outcome == code))
             for code, name in enumerate(OUTCOMES)
@@ -135,6 +138,7 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
         motions=assembly.motions[None],
         multipliers=assembly.multipliers[None],
         outcome=np.zeros(1, dtype=int),
+        method=np.full(1, assembly.method, dtype=object),
         loaded=np.array([bool(assembly.frame_loads)]),
         status=np.full(1, "ok", dtype=object),
         reason=np.full(1, "", dtype=object),
@@ -171,6 +175,7 @@ def solve_each(robot: Robot, count: int, one: Callable[[int], Assembly]) -> Asse
         motions=unknown(joints.free.shape[1]),
         multipliers=unknown(6 * len(robot.closures)),
         outcome=np.full(count, OUTCOMES.index("one by one")),
+        method=np.full(count, "reference", dtype=object),
         loaded=np.ones(count, dtype=bool),
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),
@@ -207,6 +212,7 @@ def solve_again(energies: Assemblies, i: int) -> None:
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         a.status[i], a.reason[i] = failure_status(error), str(error)
         return
+    a.method[i] = assembly.method
     a.energy[i] = assembly.energy
     a.energy_without_clearance[i] = assembly.energy_without_clearance
     a.work[i] = assembly.work

@@ -2,7 +2,7 @@
 
 Compiled from the frames' poses to the certificate (:mod:`assembly.linear.lanes`), with
 loads and without.  What this does not cover, or where its certificate falls short, is
-solved by :mod:`assembly.linear.fallback`, and is counted.
+solved by the reference (:mod:`assembly.linear.fallback`), and the answer says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,6 +40,7 @@ from assembly.linear.solutions import Solutions
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
+from assembly.solvers.method import Method, check_method
 
 __all__ = [
     "Assemblies", "Assembly", "CannotAssemble", "minimise_energies",
@@ -53,7 +54,7 @@ _Given = tuple[Structure, NDArray, NDArray, NDArray, Solutions]
 @overload
 def solve_assembly(
     posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
-    gravity: ArrayLike | None = None, errors: None = None,
+    gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
 ) -> Assembly: ...  # fmt: skip
 
 
@@ -61,7 +62,7 @@ def solve_assembly(
 def solve_assembly(
     posture: Sequence[Posture], load: ArrayLike | None = None,
     bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
-    errors: ArrayLike | None = None,
+    errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Assemblies: ...  # fmt: skip
 
 
@@ -69,6 +70,7 @@ def solve_assembly(
 def solve_assembly(
     posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None, *, errors: ArrayLike,
+    method: Method = "compiled",
 ) -> Assemblies: ...  # fmt: skip
 
 
@@ -78,6 +80,7 @@ def solve_assembly(
     bodies: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
+    method: Method = "compiled",
 ) -> Assembly | Assemblies:
     """Close a manipulator at least energy, problem (22), under optional loads.
 
@@ -92,20 +95,24 @@ def solve_assembly(
             then have weight.
         errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
             each of k postures, or k sets at one.
+        method: ``"compiled"``, and the reference where that does not prove its answer;
+            or ``"reference"``, numpy and Clarabel alone.  The answer's ``method`` says
+            which gave it.
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
-        where its certificate falls short after all fallbacks.  Of many postures or sets
+        where its certificate falls short even so.  Of many postures or sets
         of errors all of them, where one without a solution says so and raises nothing.
 
     Raises:
         CannotAssemble: a closure is open that no clearance and no spring can close.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
-        ValueError: errors do not fit the robot or the postures.
+        ValueError: errors do not fit the robot or the postures, or no such method.
     """
+    check_method(method)
     if isinstance(posture, Posture) and errors is None:
-        return _solve_one(posture, load, bodies, gravity)
+        return _solve_one(posture, load, bodies, gravity, method)
     postures = [posture] if isinstance(posture, Posture) else list(posture)
     robot = postures[0].robot
     sets = None if errors is None else np.asarray(errors, dtype=float)
@@ -114,23 +121,25 @@ def solve_assembly(
     T = np.array([p.transforms for p in postures])
     mismatch = np.array([p.mismatch for p in postures])
     if load is None and bodies is None and gravity is None:
-        return minimise_energies(robot, T, sets, mismatch)
+        return minimise_energies(robot, T, sets, mismatch, method=method)
     where = posture if isinstance(posture, Posture) else Posture(
         robot, np.array([p.coordinates for p in postures]), T, float(mismatch.max())
     )  # fmt: skip
     loads = all_loads(where, load, bodies, gravity)
     at = partial(_posture_at, robot, T, sets, mismatch)
     return minimise_under_loads(
-        robot, T, loads, lambda i: _solve_one(at(i), load, bodies, gravity), sets,
-        mismatch,
+        robot, T, loads, lambda i: _solve_one(at(i), load, bodies, gravity, method),
+        sets, mismatch, method,
     )  # fmt: skip
 
 
 def _solve_one(
     posture: Posture, load: ArrayLike | None, bodies: ArrayLike | None,
-    gravity: ArrayLike | None,
+    gravity: ArrayLike | None, method: Method,
 ) -> Assembly:  # fmt: skip
-    """One posture: compiled, or, in doubt, the fallback."""
+    """One posture: compiled, or, in doubt or if asked, by the reference."""
+    if method == "reference":
+        return reference_assembly(posture, load, bodies, gravity)
     frame_loads = None
     if load is not None or bodies is not None or gravity is not None:
         frame_loads = all_loads(posture, load, bodies, gravity) or None
@@ -143,7 +152,7 @@ def _solve_one(
 def _compiled_assembly(
     posture: Posture, load: ArrayLike | None, frame_loads: FrameLoads | None
 ) -> Assembly | None:
-    """One posture; None where it is left to the fallback."""
+    """One posture; None where it is left to the reference."""
     robot = posture.robot
     rounding = _rounding_of(robot)
     joints, _ = structure_of(robot)
@@ -172,6 +181,7 @@ def _compiled_assembly(
         motions=out.motions[0],
         multipliers=multipliers,
         energy_without_clearance=float(out.without_clearance[0]),
+        method="compiled",
     )
     # known already, and so not computed again when somebody asks
     vars(assembly).update(
@@ -196,7 +206,7 @@ def _any_load(loads: NDArray | None, count: int) -> NDArray:
 
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
-    springs: int, loads: NDArray | None,
+    springs: int, loads: NDArray | None, method: Method = "compiled",
 ) -> Solutions:  # fmt: skip
     """Rows of k points, and of the deformations of so many springs."""
     joints, structure = structure_of(robot, compliant)
@@ -215,8 +225,10 @@ def _solve_compiled(
         elastic=np.zeros((count if springs else 0, springs)),
     )
     given = structure, T, errors, mismatch, out
-    if stiffness_spread(joints, structure.size) > SPREAD:
-        out.outcome[:] = OUTCOMES.index("uncertified")  # left to the fallback
+    if method == "reference":
+        out.outcome[:] = OUTCOMES.index("asked")
+    elif stiffness_spread(joints, structure.size) > SPREAD:
+        out.outcome[:] = OUTCOMES.index("uncertified")  # left to the reference
     elif loads is None:
         _fill(given, None)
     else:  # points that no load acts on have the bits of those without
@@ -255,6 +267,7 @@ def minimise_energies(
     errors: ArrayLike | None = None,
     mismatch: ArrayLike = 0.0,
     compliant: Compliant = "elastic",
+    method: Method = "compiled",
 ) -> Assemblies:
     """Close a manipulator at least energy, problem (22), at many points.
 
@@ -266,13 +279,16 @@ def minimise_energies(
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
         compliant: ``"elastic"``, or ``"hinged"``: compliant joints turn freely about
             their own axis, see :func:`assembly.linear.closure.virtual_joints`.
+        method: as of :func:`solve_assembly`.
 
     Returns:
         Energies, screws and certificates, in the order given.
 
     Raises:
-        ValueError: a shape does not fit the robot, or a value is not finite.
+        ValueError: a shape does not fit the robot, a value is not finite, or no such
+            method.
     """
+    check_method(method)
     # writable and in C order, whatever comes: the kernels are compiled for one kind
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     count, n = len(T), len(robot.frames)
@@ -292,16 +308,16 @@ def minimise_energies(
     at = partial(_posture_at, robot, T, all_errors, off)
 
     def one(i: int) -> Assembly:
-        assembly = _solve_one(at(i), None, None, None)
+        assembly = _solve_one(at(i), None, None, None, method)
         return without_own_springs(assembly) if compliant == "hinged" else assembly
 
-    return _minimise_all(robot, T, all_errors, off, compliant, None, one)
+    return _minimise_all(robot, T, all_errors, off, compliant, None, one, method)
 
 
 def minimise_under_loads(
     robot: Robot, transforms: NDArray, loads: FrameLoads,
     one: Callable[[int], Assembly], errors: NDArray | None = None,
-    mismatch: ArrayLike = 0.0,
+    mismatch: ArrayLike = 0.0, method: Method = "compiled",
 ) -> Assemblies:  # fmt: skip
     """The same under loads.
 
@@ -309,9 +325,10 @@ def minimise_under_loads(
         robot: of n frames.
         transforms: (k, n, 4, 4) frames seen from the base.
         loads: (6n,) or (k, 6n), as of :func:`assembly.linear.load.loads_on_frames`.
-        one: solves a point by itself.
+        one: solves a point by itself, by the same method.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        method: as of :func:`solve_assembly`.
 
     Returns:
         Energies, screws and certificates, in the order given.
@@ -320,16 +337,16 @@ def minimise_under_loads(
     own = robot.errors if errors is None else errors
     own = np.require(own.reshape(-1, T.shape[1], 6), requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    return _minimise_all(robot, T, own, off, "elastic", loads.rows(len(T)), one)
+    return _minimise_all(robot, T, own, off, "elastic", loads.rows(len(T)), one, method)
 
 
 def _minimise_all(
     robot: Robot, T: NDArray, errors: NDArray, off: NDArray, compliant: Compliant,
-    loads: NDArray | None, one: Callable[[int], Assembly],
+    loads: NDArray | None, one: Callable[[int], Assembly], method: Method,
 ) -> Assemblies:  # fmt: skip
-    """All points compiled; one by one what that leaves."""
+    """All points compiled, unless asked otherwise; one by one what that leaves."""
     joints, structure = structure_of(robot, compliant)
-    out = _solve_compiled(robot, T, errors, off, compliant, 0, loads)
+    out = _solve_compiled(robot, T, errors, off, compliant, 0, loads, method)
     count = len(T)
     energies = Assemblies(
         energy=out.energy,
@@ -343,6 +360,7 @@ def _minimise_all(
         motions=out.motions,
         multipliers=out.multipliers,
         outcome=out.outcome,
+        method=np.where(out.outcome < COMPILED, "compiled", "reference").astype(object),
         loaded=_any_load(loads, count),
         status=np.full(count, "ok", dtype=object),
         reason=np.full(count, "", dtype=object),

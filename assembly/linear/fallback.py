@@ -127,6 +127,7 @@ def solve_with(
         motions=reduced.motions(u, y),
         multipliers=multipliers,
         energy_without_clearance=reduced.energy_without_clearance,
+        method="reference",
     )
     residual = assembly.closure_residual() + assembly.rounding
     if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
@@ -160,8 +161,9 @@ def _minimise(reduced: Reduction) -> LeastEnergy:
             f"reference length): no clearance or spring acts there{beyond}"
         )
     least = minimise_energy(
-        reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group
-    )
+        reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group,
+        "reference",
+    )  # fmt: skip
     if not least.feasible:
         raise CannotAssemble(
             f"no clearance within its bounds closes what no spring can{beyond}"

@@ -21,6 +21,7 @@ from assembly.linear.solutions import (
 )
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
+from assembly.solvers.method import Method, check_method
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Asked:
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
         offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        method: ``"compiled"`` or ``"reference"``.
     """
 
     reading: str = "frozen"
@@ -40,17 +42,19 @@ class Asked:
     tolerance_rotation: float = 1e-6
     tolerance_translation: float = 1e-6
     offset: ArrayLike = (0.0, 0.0, 0.0)
+    method: Method = "compiled"
 
     def __post_init__(self) -> None:
         if self.reading not in READINGS:
             raise ValueError(f"reading is {self.reading!r}, expected one of {READINGS}")
+        check_method(self.method)
 
 
 def compiled_bounds(
     robot: Robot, transforms: NDArray, off: NDArray, errors: ArrayLike | None,
     energies: Assemblies, asked: Asked,
 ) -> Bounds:  # fmt: skip
-    """Bounds of k points; NaN in the rows that are left to the fallback.
+    """Bounds of k points; NaN in the rows that are left to numpy.
 
     Args:
         robot: of n frames.
@@ -76,7 +80,7 @@ def compiled_bounds(
     left = (energies.status != "ok") | energies.loaded
     left |= ~np.isfinite(energies.clearances).all(axis=1)
     bounds.outcome[left] = FALLBACK
-    if asked.reading == "budget" or left.all():
+    if asked.reading == "budget" or asked.method == "reference" or left.all():
         bounds.outcome[:] = FALLBACK
         return bounds
     solution = energies

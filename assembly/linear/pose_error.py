@@ -14,12 +14,14 @@ Passive joints keep within the bounds of their own motion.  Rotation and transla
 bounded each by itself: a tool on a bearing turns freely, and its point still has a
 largest error.
 
-The set of platform screws (:mod:`assembly.linear.reach`) is convex; its farthest one is
-bracketed by :func:`assembly.solvers.one_problem.farthest`, compiled, with Clarabel as
-its fallback.  The first two readings are compiled whole
-(:mod:`assembly.linear.moving_clearances`): some tenths of a millisecond a point.
-``budget``, and a point that this does not cover, is
-left to numpy and counted.
+The set of platform screws (:mod:`assembly.linear.reach`) is convex.  By the method
+``"compiled"`` its farthest one is bracketed by
+:func:`assembly.solvers.one_problem.farthest`, which asks Clarabel for single supports
+in doubt; by ``"reference"`` by :func:`assembly.solvers.outer_cuts.farthest`, in numpy,
+and Clarabel for every support.  The first two readings are compiled whole
+(:mod:`assembly.linear.moving_clearances`): some tenths of a millisecond a point.  For
+``budget``, and a point that this does not cover, the set is set up in numpy, one by
+one.
 """
 
 from collections.abc import Callable
@@ -41,6 +43,7 @@ from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.solvers.method import Method
 from forcefit.inputs.display import (
     Figures,
     bracket,
@@ -60,6 +63,7 @@ class PoseError:
         rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
         translation_screw: (6,) [rad, m] attains that of the translation.
         cuts: support functions computed.
+        method: which searched: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
         proof: says what of it is not proved.
     """
 
@@ -69,6 +73,7 @@ class PoseError:
     rotation_screw: NDArray
     translation_screw: NDArray
     cuts: int
+    method: Method
     proof: Callable[[], str] = str
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
@@ -102,7 +107,8 @@ class PoseErrors(PointResults[PoseError]):
         rotation_screw: (k, 6) [rad, m] attains the lower bound of the rotation.
         translation_screw: (k, 6) [rad, m] attains that of the translation.
         supports: (k,) support functions computed.
-        fallback: (k,) bool, solved by :mod:`assembly.linear.reach`.
+        method: (k,) which searched: ``"compiled"`` or ``"reference"``.
+        one_by_one: (k,) bool, whose set of screws was set up in numpy.
         status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
             there is no solution or its certificate falls short.
         reason: (k,) message where the status is not ok.
@@ -114,7 +120,8 @@ class PoseErrors(PointResults[PoseError]):
     rotation_screw: NDArray
     translation_screw: NDArray
     supports: NDArray
-    fallback: NDArray
+    method: NDArray
+    one_by_one: NDArray
     status: NDArray
     reason: NDArray
 
@@ -123,6 +130,7 @@ class PoseErrors(PointResults[PoseError]):
         "translation_error": "translation_error",
         "rotation_screw": "rotation_screw",
         "translation_screw": "translation_screw",
+        "method": "method",
         "status": "status",
         "reason": "reason",
     }
@@ -136,6 +144,7 @@ class PoseErrors(PointResults[PoseError]):
             rotation_screw=self.rotation_screw[i],
             translation_screw=self.translation_screw[i],
             cuts=int(self.supports[i]),
+            method=self.method[i],
             proof=partial(str, self.reason[i]),
         )
 
@@ -147,6 +156,7 @@ def bound_pose_error(
     tolerance_rotation: float = 1e-6,
     tolerance_translation: float = 1e-6,
     offset: ArrayLike = (0.0, 0.0, 0.0),
+    method: Method = "compiled",
 ) -> PoseError:
     """Bracket the largest rotation and translation error of the platform.
 
@@ -157,6 +167,8 @@ def bound_pose_error(
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
         offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone: tenths of
+            a second.
 
     Returns:
         Bounds; wider than asked only if 400 supports did not suffice, which
@@ -164,42 +176,33 @@ def bound_pose_error(
         move, without bound.
 
     Raises:
-        ValueError: the reading is unknown, or ``budget`` is asked under a load.
+        ValueError: reading or method is unknown, or ``budget`` is asked under a load.
         SolverFailed: the cone solver gave up.
     """
     asked = Asked(
-        reading, energy_budget, tolerance_rotation, tolerance_translation, offset
-    )
+        reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
+        method,
+    )  # fmt: skip
     posture = assembly.posture
     if assembly.joints is structure_of(posture.robot)[0] and not assembly.frame_loads:
         bounds = _pose_errors(
             posture.robot, posture.transforms[None], np.array([posture.mismatch]),
             posture.robot.errors[None], assemblies_of(assembly), asked,
         )  # fmt: skip
-        if not bounds.fallback[0]:
+        if not bounds.one_by_one[0]:
             return replace(bounds[0], proof=partial(unproved, assembly))
-    return reference_pose_error(assembly, asked)
+    return _bounds_of_one(assembly, asked)
 
 
-def reference_pose_error(assembly: Assembly, asked: Asked) -> PoseError:
-    """The bounds in numpy but for the search: the reference, and the fallback.
-
-    Args:
-        assembly: of least energy, without a load in reading ``budget``.
-        asked: reading, widths and point.
-
-    Returns:
-        The bounds.
-
-    Raises:
-        ValueError: ``budget`` is asked under a load.
-        SolverFailed: the cone solver gave up.
-    """
+def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
+    """The bounds of a set that is set up in numpy."""
     reachable = reachable_screws(assembly, asked.reading, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
-    rotation, rotation_screw, supports = reachable.farthest(0, asked.tolerance_rotation)
+    rotation, rotation_screw, supports = reachable.farthest(
+        0, asked.tolerance_rotation, asked.method
+    )
     translation, translation_screw, more = reachable.farthest(
-        3, asked.tolerance_translation
+        3, asked.tolerance_translation, asked.method
     )
 
     def proof() -> str:
@@ -217,6 +220,7 @@ def reference_pose_error(assembly: Assembly, asked: Asked) -> PoseError:
         rotation_screw=rotation_screw,
         translation_screw=translation_screw,
         cuts=supports + more,
+        method=asked.method,
         proof=proof,
     )
 
@@ -246,6 +250,7 @@ def bound_pose_errors(
     tolerance_rotation: float = 1e-6,
     tolerance_translation: float = 1e-6,
     offset: ArrayLike = (0.0, 0.0, 0.0),
+    method: Method = "compiled",
 ) -> PoseErrors:
     """Bracket the largest rotation and translation errors at many points.
 
@@ -262,18 +267,20 @@ def bound_pose_errors(
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
         offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        method: as of :func:`bound_pose_error`.
 
     Returns:
         The bounds, in the order given.
 
     Raises:
-        ValueError: the reading is unknown, or a shape does not fit the robot.
+        ValueError: reading or method is unknown, or a shape does not fit the robot.
     """
     asked = Asked(
-        reading, energy_budget, tolerance_rotation, tolerance_translation, offset
-    )
+        reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
+        method,
+    )  # fmt: skip
     if energies is None:
-        energies = minimise_energies(robot, transforms, errors, mismatch)
+        energies = minimise_energies(robot, transforms, errors, mismatch, method=method)
     T = np.asarray(transforms, dtype=float)
     if len(energies) != len(T):
         raise ValueError(
@@ -282,9 +289,9 @@ def bound_pose_errors(
         )
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     bounds = _pose_errors(robot, T, off, errors, energies, asked)
-    for i in np.flatnonzero(bounds.fallback).tolist():
+    for i in np.flatnonzero(bounds.one_by_one).tolist():
         try:
-            one = reference_pose_error(energies[i], asked)
+            one = _bounds_of_one(energies[i], asked)
         except (CannotAssemble, SolverFailed) as error:
             bounds.status[i], bounds.reason[i] = failure_status(error), str(error)
             continue
@@ -311,7 +318,8 @@ def _pose_errors(
         rotation_screw=bounds.rotation_screw,
         translation_screw=bounds.translation_screw,
         supports=bounds.supports,
-        fallback=(bounds.outcome > 0) & (energies.status == "ok"),
+        method=np.full(len(T), asked.method, dtype=object),
+        one_by_one=(bounds.outcome > 0) & (energies.status == "ok"),
         status=energies.status.copy(),
         reason=energies.reason.copy(),
     )

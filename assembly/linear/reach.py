@@ -39,13 +39,14 @@ from assembly.model.clearance import (
     component_bounds,
     scales_with_margin,
 )
-from assembly.solvers import one_problem
+from assembly.solvers import one_problem, outer_cuts
 from assembly.solvers.conic import (
     cone_sizes,
     cone_starts,
     into_cones,
     minimise_energy,
 )
+from assembly.solvers.method import Method
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
 
@@ -133,11 +134,12 @@ class ReachableSet:
             free=move @ self.free,
         )  # fmt: skip
 
-    def support(self, direction: ArrayLike) -> "Support":
+    def support(self, direction: ArrayLike, method: Method = "compiled") -> "Support":
         """Largest component of the platform screw along a direction.
 
         Args:
             direction: (6,) weights of the screw's components.
+            method: of :func:`assembly.solvers.conic.minimise_energy`.
 
         Returns:
             The height with the point that attains it; infinite where the platform
@@ -157,7 +159,7 @@ class ReachableSet:
             return Support(at_centre, self.centre, gradient)
         none, right = np.zeros((0, len(gradient))), self.rows @ self.start
         least = minimise_energy(
-            none, np.zeros(0), gradient / size, self.rows, right, self.group
+            none, np.zeros(0), gradient / size, self.rows, right, self.group, method
         )
         height = at_centre - least.bound * size - float(gradient @ self.start)
         screw = self._screw_near(least.clearances)
@@ -182,13 +184,14 @@ class ReachableSet:
         return self.centre + self.map @ (shares.min(initial=1.0) * step)
 
     def farthest(
-        self, part: int, tolerance: float
+        self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
         """Bounds of the largest size of half a screw, and what attains it.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
             tolerance: [rad or m] asked of upper minus lower bound.
+            method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone.
 
         Returns:
             (lower, upper); (6,) [rad, m] the screw that attains the lower; how many.
@@ -201,9 +204,11 @@ class ReachableSet:
         half = np.eye(6)[part : part + 3]
 
         def along(direction: NDArray) -> tuple[float, NDArray, NDArray]:
-            found = self.support(direction @ half)
+            found = self.support(direction @ half, method)
             return found.height, found.screw, found.gradient
 
+        if method == "reference":
+            return outer_cuts.farthest(self.centre, part, tolerance, along)
         (low, high), screw, supports = one_problem.farthest(
             self.centre, self.map, self.rows, self.start, self.starts, part, tolerance,
             along,

@@ -20,12 +20,13 @@ from assembly.linear.closure import checked_size
 from assembly.linear.fallback import reference_margin
 from assembly.linear.lanes import margins_side_by_side
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import FALLBACK
+from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.solvers.method import Method, check_method
 
 _GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
 # readings of compliant joints, by the names of their margins
@@ -41,10 +42,12 @@ class Zone:
         margin: factor on the clearances at which it just assembles; None if no factor
             does.
         bound: certified lower bound of the margin; None if it is None.
+        method: which gave it: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
     """
 
     margin: float | None
     bound: float | None
+    method: Method
 
     @property
     def assemblable(self) -> bool:
@@ -72,19 +75,20 @@ class Margins(PointResults[Zone]):
             none does, NaN where the solver failed.
         bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
             method solved.
-        fallback: (k,) bool, solved by :mod:`assembly.linear.fallback`.
+        method: (k,) which gave it: ``"compiled"`` or ``"reference"``.
         reason: (k,) message where the solver failed, or what of the margin is not
             proved; else empty.
     """
 
     margin: NDArray
     bound: NDArray
-    fallback: NDArray
+    method: NDArray
     reason: NDArray
 
     VARIABLES: ClassVar = {
         "margin": "margin",
         "margin_bound": "bound",
+        "method": "method",
         "reason": "reason",
     }
 
@@ -93,31 +97,35 @@ class Margins(PointResults[Zone]):
         margin, bound = float(self.margin[i]), float(self.bound[i])
         if np.isnan(margin):
             raise SolverFailed("least factor on the clearances", self.reason[i])
-        return Zone(None, None) if np.isinf(margin) else Zone(margin, bound)
+        method = self.method[i]
+        none = np.isinf(margin)
+        return Zone(None, None, method) if none else Zone(margin, bound, method)
 
 
 @overload
 def zone_margin(
-    posture: Posture, compliant: Compliant = "rigid", errors: None = None
-) -> Zone: ...
+    posture: Posture, compliant: Compliant = "rigid", errors: None = None,
+    method: Method = "compiled",
+) -> Zone: ...  # fmt: skip
 
 
 @overload
 def zone_margin(
     posture: Sequence[Posture], compliant: Compliant = "rigid",
-    errors: ArrayLike | None = None,
+    errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Margins: ...  # fmt: skip
 
 
 @overload
 def zone_margin(
-    posture: Posture, compliant: Compliant = "rigid", *, errors: ArrayLike
-) -> Margins: ...
+    posture: Posture, compliant: Compliant = "rigid", *, errors: ArrayLike,
+    method: Method = "compiled",
+) -> Margins: ...  # fmt: skip
 
 
 def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
-    errors: ArrayLike | None = None,
+    errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Zone | Margins:  # fmt: skip
     """Factor on all clearances at which a rigid manipulator just assembles.
 
@@ -126,34 +134,39 @@ def zone_margin(
         compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness, see above.
         errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
             each of k postures, or k sets at one.
+        method: ``"compiled"``, and the reference where that does not prove its answer;
+            or ``"reference"``, numpy and Clarabel alone.  The answer's ``method`` says
+            which gave it.
 
     Returns:
         The margin with a certified lower bound; of many postures or sets all of them.
 
     Raises:
-        ValueError: ``compliant`` is something else.
+        ValueError: ``compliant`` or ``method`` is something else.
         SolverFailed: the cone solver gave up.
     """
+    check_method(method)
     if isinstance(posture, Posture) and errors is None:
         checked_size(posture.robot)
         T, off = posture.transforms[None], np.array([posture.mismatch])
-        margin, bound, outcome = _compiled(posture.robot, T, compliant, off, None)
-        if outcome[0]:
-            return Zone(*reference_margin(posture, compliant))
-        return Zone(float(margin[0]), float(bound[0]))
+        margin, bound, left = _compiled(posture.robot, T, compliant, off, None, method)
+        if left[0]:
+            return Zone(*reference_margin(posture, compliant), "reference")
+        return Zone(float(margin[0]), float(bound[0]), "compiled")
     postures = [posture] if isinstance(posture, Posture) else list(posture)
     sets = None if errors is None else np.asarray(errors, dtype=float)
     if sets is not None and len(postures) == 1:
         postures = postures * len(sets)
     return zone_margins(
         postures[0].robot, np.array([p.transforms for p in postures]), compliant,
-        np.array([p.mismatch for p in postures]), sets,
+        np.array([p.mismatch for p in postures]), sets, method,
     )  # fmt: skip
 
 
 def zone_margins(
     robot: Robot, transforms: ArrayLike, compliant: Compliant = "rigid",
     mismatch: ArrayLike = 0.0, errors: ArrayLike | None = None,
+    method: Method = "compiled",
 ) -> Margins:  # fmt: skip
     """Margins of problem (21) at many postures, or for many errors.
 
@@ -163,19 +176,21 @@ def zone_margins(
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
+        method: as of :func:`zone_margin`.
 
     Returns:
         The margins, in the order given.
 
     Raises:
-        ValueError: ``compliant`` is something else.
+        ValueError: ``compliant`` or ``method`` is something else.
     """
+    check_method(method)
     T = np.asarray(transforms, dtype=float)
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     own = None if errors is None else np.asarray(errors, dtype=float)
-    margin, bound, outcome = _compiled(robot, T, compliant, off, own)
+    margin, bound, left = _compiled(robot, T, compliant, off, own, method)
     reason = np.full(len(T), "", dtype=object)
-    for i in np.flatnonzero(outcome).tolist():
+    for i in np.flatnonzero(left).tolist():
         erring = robot
         if own is not None:
             erring = robot.with_errors(own if own.ndim == 2 else own[i])
@@ -184,29 +199,32 @@ def zone_margins(
         )
         margin[i] = bound[i] = np.nan
         try:
-            zone = Zone(*reference_margin(posture, compliant))
+            zone = Zone(*reference_margin(posture, compliant), "reference")
         except SolverFailed as error:
             reason[i] = str(error)
             continue
         reason[i] = zone.unproved
         margin[i] = np.inf if zone.margin is None else zone.margin
         bound[i] = np.inf if zone.bound is None else zone.bound
-    return Margins(margin, bound, outcome > 0, reason)
+    gave = np.where(left, "reference", "compiled").astype(object)
+    return Margins(margin, bound, gave, reason)
 
 
 def _compiled(
     robot: Robot, T: NDArray, compliant: Compliant, mismatch: NDArray,
-    errors: NDArray | None,
+    errors: NDArray | None, method: Method,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """(k,) margins, their bounds, and whether each is left to the fallback."""
+    """(k,) margins, their bounds, and whether each is left to the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     own = robot.errors if errors is None else errors
-    if not own.any():  # no clearance is needed
-        return np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(T), dtype=np.int64)
-    joints, structure = structure_of(robot, compliant)
     margin, bound = np.full((2, len(T)), np.nan)
     outcome = np.full(len(T), FALLBACK)
+    if method == "reference":
+        return margin, bound, outcome > SOLVED
+    if not own.any():  # no clearance is needed
+        return np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(T), dtype=bool)
+    joints, structure = structure_of(robot, compliant)
     if joints.scaled.all():
         # writable and in C order, whatever comes: the kernels are compiled for one kind
         points = (
@@ -215,4 +233,4 @@ def _compiled(
             mismatch,
         )
         margins_side_by_side(structure, *points, (margin, bound, outcome))
-    return margin, bound, outcome
+    return margin, bound, outcome > SOLVED

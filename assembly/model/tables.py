@@ -48,6 +48,7 @@ _OF_POINTS = {
     "translation_error": ("m", ("bound",), "bounds of the largest translation error"),
     "rotation_screw": (*_SCREW, "attains the lower bound of the rotation"),
     "translation_screw": (*_SCREW, "attains the lower bound of the translation"),
+    "method": ("", (), "which gave it: compiled, or reference, numpy and Clarabel"),
     "status": ("", (), "ok, or why there is no result"),
     "reason": ("", (), "message where the status is not ok"),
 }

@@ -34,6 +34,7 @@ from assembly.linear.closure import (
 from assembly.linear.energy import Assembly
 from assembly.platform_stiffness.active_set import bound_forces, contacts, settle
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness, unit_screws
+from assembly.solvers.method import Method
 
 Side = Literal["holding", "letting go"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
@@ -51,7 +52,7 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
     """
     lin, joints = linearise(posture), virtual_joints(posture.robot)
     return _stiffness(lin, "without clearance", joints.elastic, owners(joints),
-                      joints.free)  # fmt: skip
+                      joints.free, "reference")  # fmt: skip
 
 
 def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
@@ -96,7 +97,7 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
             else:
                 free.append(along[:, None] / np.linalg.norm(along))
     return _stiffness(assembly.linearisation, "in contact", np.hstack(springs), names,
-                      np.hstack(free))  # fmt: skip
+                      np.hstack(free), assembly.method)  # fmt: skip
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:
@@ -115,8 +116,9 @@ def owners(joints: VirtualJoints) -> list[Part]:
 
 
 def _stiffness(
-    lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray
-) -> PlatformStiffness:
+    lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray,
+    method: Method,
+) -> PlatformStiffness:  # fmt: skip
     """Springs and free motions to modes; see the head of this module."""
     free = free / _sizes(free, lin.size)
     A_q, A_y = lin.rows @ free, lin.rows @ springs
@@ -140,6 +142,7 @@ def _stiffness(
         springs=modes,
         parts=tuple(parts),
         free=unit_screws(lin.platform @ free @ loose, lin.size),
+        method=method,
     )
 
 

@@ -14,6 +14,7 @@ from assembly.linear.solutions import SOLVED
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from assembly.solvers.method import Method, check_method
 from forcefit.inputs.display import html_table, short_repr
 
 _RANK = 1e-10  # relative size of a compliance's root that counts as rigid
@@ -30,7 +31,7 @@ class Stiffnesses:
             unit wrenches at the platform's origin, base axes; NaN where a motion of
             the platform is free.
         parts: (ny,) whose springs they are.
-        fallback: (k,) bool, where the compiled solver failed.
+        method: (k,) which gave it: ``"compiled"``, or ``"reference"``, numpy.
         singular: those where a motion of the platform is free, by their row.
     """
 
@@ -38,7 +39,7 @@ class Stiffnesses:
     length: float
     springs: NDArray
     parts: tuple[Part, ...]
-    fallback: NDArray
+    method: NDArray
     singular: dict[int, PlatformStiffness]
 
     __repr__, _repr_html_ = short_repr, html_table
@@ -134,37 +135,44 @@ class Stiffnesses:
 
 
 def platform_stiffnesses(
-    robot: Robot, transforms: ArrayLike, mismatch: ArrayLike = 0.0
-) -> Stiffnesses:
+    robot: Robot, transforms: ArrayLike, mismatch: ArrayLike = 0.0,
+    method: Method = "compiled",
+) -> Stiffnesses:  # fmt: skip
     """The classical K_C at many postures.
 
     Args:
         robot: of n frames.
         transforms: (k, n, 4, 4) frames seen from the base.
         mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        method: ``"compiled"``, and the reference where that does not cover a posture;
+            or ``"reference"``, numpy, one by one.
 
     Returns:
-        Compliances and shares in the order given; those that the compiled one does
-        not cover are found one by one.
+        Compliances and shares in the order given.
+
+    Raises:
+        ValueError: no such method.
     """
+    check_method(method)
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     joints, structure = structure_of(robot)
     inner = np.zeros((len(T), 6, len(structure.springs)))
     status = np.zeros(len(T), dtype=np.int64)
-    compliances_side_by_side(structure, T, off, inner, status)
+    if method == "compiled":
+        compliances_side_by_side(structure, T, off, inner, status)
+    left = (status != SOLVED) | (method == "reference")
     size = size_of(robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
     singular = {}
-    for i in np.flatnonzero(status != SOLVED).tolist():
+    for i in np.flatnonzero(left).tolist():
         q = np.full(len(robot.frames), np.nan)
         one = without_clearance(Posture(robot, q, T[i], float(off[i])))
         springs[i] = np.nan if one.free.size else one.springs @ one.root.T
         if one.free.size:
             singular[i] = one
-    return Stiffnesses(
-        robot, size, springs, tuple(owners(joints)), status != SOLVED, singular
-    )
+    gave = np.where(left, "reference", "compiled").astype(object)
+    return Stiffnesses(robot, size, springs, tuple(owners(joints)), gave, singular)

@@ -34,6 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import null_space
 
 from assembly.kinematics.posture import Posture
+from assembly.solvers.method import Method
 from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
@@ -97,6 +98,8 @@ class PlatformStiffness:
         springs: (m, k) [sqrt(2 J)].
         parts: (m,) whose springs they are.
         free: (6, f) [rad, m].
+        method: which gave it, or the equilibrium it belongs to: ``"compiled"``, or
+            ``"reference"``, numpy and Clarabel.
     """
 
     posture: Posture
@@ -108,6 +111,7 @@ class PlatformStiffness:
     springs: NDArray
     parts: tuple[Part, ...]
     free: NDArray
+    method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
 

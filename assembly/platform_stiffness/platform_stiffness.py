@@ -14,6 +14,7 @@ from assembly.platform_stiffness.linear_tangent import (
     without_clearance,
 )
 from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
+from assembly.solvers.method import Method, check_method
 
 State = Literal["without clearance", "in contact", "exact"]
 
@@ -25,6 +26,7 @@ def platform_stiffness(
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
     side: Side = "holding",
+    method: Method = "compiled",
 ) -> PlatformStiffness:
     """How stiff the platform is: the tangent of its small motion under a small wrench.
 
@@ -41,6 +43,9 @@ def platform_stiffness(
         at: (3,) [m] of the platform, in its axes: where screws and wrenches are read.
         side: of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
+        method: of :func:`assembly.linear.energy.solve_assembly`, state
+            ``"in contact"``; the classical model is numpy alone at one posture, and
+            the exact one has the method ``"compiled"`` only.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes.
@@ -50,8 +55,9 @@ def platform_stiffness(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
         BadInput: a point or a load that is no number.
-        ValueError: no such state or side.
+        ValueError: no such state, side or method, or not the method of this state.
     """
+    check_method(method)
     offset = numbers_of("at", at, 3, "m")
     if load is not None:
         load = numbers_of("load", load, 6, "N m, N")
@@ -60,9 +66,11 @@ def platform_stiffness(
     if state == "without clearance":
         tangent, platform = without_clearance(posture), posture.platform
     elif state == "in contact":
-        linear = solve_assembly(posture, load, gravity=gravity)
+        linear = solve_assembly(posture, load, gravity=gravity, method=method)
         tangent, platform = in_contact(linear, side), posture.platform
     elif state == "exact":
+        if method == "reference":
+            raise ValueError("platform_stiffness: state 'exact' has no reference")
         exact = solve_exact(posture, load, gravity=gravity)
         tangent, platform = exact_tangent(exact, side), exact.placement.platform
     else:

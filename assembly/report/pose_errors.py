@@ -98,6 +98,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
         "cuts": bound.cuts,
+        "method": bound.method,
     }
 
 

@@ -129,6 +129,7 @@ def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
     return {
         **_screws_and_wrenches(assembly),
         "certificate": certificate,
+        "method": assembly.method,
         "ranks": assembly.ranks,
     }
 

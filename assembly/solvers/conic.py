@@ -1,10 +1,12 @@
 """Second-order cone programmes in the clearances, each solution with its certificate.
 
 There are two problems: the least energy of a reduced problem (22), and the least factor
-on the clearances of problem (21).  Both are scaled here to size 1.  The first is solved
-by the compiled interior-point method, with Clarabel as its fallback; each solution is
-refined by Newton's method on the dual (:mod:`assembly.solvers.one_problem`).  The
-certified gap, which does not depend on the solvers, decides which solution is kept.
+on the clearances of problem (21).  Both are scaled here to size 1.  The second is
+solved by Clarabel.  So is the first by the method ``"reference"``, each solution
+refined in :mod:`assembly.solvers.pressed_cones`; by ``"compiled"`` by the compiled
+interior-point method, in doubt by Clarabel, each solution refined by Newton's method on
+the dual (:mod:`assembly.solvers.one_problem`).  The certified gap, which does not
+depend on the solvers, decides which solution is kept.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -21,6 +23,8 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csc_matrix, diags_array, hstack, vstack
 
 from assembly.solvers import one_problem
+from assembly.solvers.method import Method
+from assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
@@ -88,8 +92,9 @@ class ConeProgramme(NamedTuple):
 
 
 def minimise_energy(
-    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
-) -> LeastEnergy:
+    G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
+    method: Method = "compiled",
+) -> LeastEnergy:  # fmt: skip
     """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and every cone's |u_k| <= 1.
 
     Args:
@@ -99,6 +104,7 @@ def minimise_energy(
         H: (p, nu) of full row rank.
         k: (p,).
         group: (nu,) cone of each column, counted from 0.
+        method: ``"compiled"``, in doubt Clarabel; ``"reference"``, Clarabel alone.
 
     Returns:
         The minimiser with a certified lower bound.
@@ -119,7 +125,7 @@ def minimise_energy(
         G / size, h / size, d / size**2, H / rows[:, None], k / rows, group
     )
     best, status = None, ""
-    for solve in _SOLVERS:
+    for solve in _SOLVERS[method]:
         u, rigid, status = solve(*scaled)
         if status == "PrimalInfeasible":
             return LeastEnergy(
@@ -132,7 +138,7 @@ def minimise_energy(
             )
         if u is None:
             continue
-        for candidate in _certified(scaled, into_cones(u, group), rigid):
+        for candidate in _certified(scaled, into_cones(u, group), rigid, method):
             if best is None or candidate.gap < best.gap:
                 best = candidate
             if _proved(best, scaled.h):
@@ -202,29 +208,41 @@ def _by_clarabel(
     return (None if x is None else x[:nu]), rigid, status
 
 
-_SOLVERS: tuple[Callable[..., tuple[NDArray | None, NDArray, str]], ...] = (
-    _compiled,
-    *(partial(_by_clarabel, value) for value in _REGULARISATIONS),
-)
+_BY_CLARABEL = tuple(partial(_by_clarabel, value) for value in _REGULARISATIONS)
+_Solver = Callable[..., tuple[NDArray | None, NDArray, str]]
+_SOLVERS: dict[Method, tuple[_Solver, ...]] = {
+    "compiled": (_compiled, *_BY_CLARABEL), "reference": _BY_CLARABEL,
+}  # fmt: skip
 
 
 def _certified(
-    problem: ConeProgramme, u: NDArray, rigid: NDArray
+    problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[LeastEnergy]:
-    """A solution with the bound of its own springs; the same refined by Newton."""
+    """A solution with the bound of its own springs, and the same refined by Newton."""
+    own = _certify(problem, u, problem.G @ u + problem.h, rigid)
+    if method == "reference":  # Clarabel's own is rarely the better one
+        for refined in refine(problem, u, rigid):
+            yield from _checked(problem, *refined)
+    yield own
+    if method == "reference" or np.bincount(problem.group).max() > 2:
+        return  # the compiled Newton's method knows discs and intervals only
     G, h, d, H, k, group = problem
-    yield _certify(problem, u, G @ u + h, rigid)
-    if np.bincount(group).max() > 2:
-        return  # Newton's method knows discs and intervals only
     u, y, starts = u.copy(), np.concatenate([h, -rigid]), cone_starts(group)
     relative = _STOP * GAP
     absolute = _STOP * GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     limits = one_problem.SolverLimits(relative, absolute, _FIRST_SIGMA, _STEPS)
     one_problem.newton((G, h, d, H, k), starts, limits, u, y)
-    u = into_cones(u, group)
-    if np.isfinite(u).all() and np.isfinite(y).all():
-        if np.abs(H @ u - k).max(initial=0.0) <= _RESIDUAL:
-            yield _certify(problem, u, y[: len(h)], -y[len(h) :])
+    yield from _checked(problem, u, y[: len(h)], -y[len(h) :])
+
+
+def _checked(
+    problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
+) -> Iterator[LeastEnergy]:
+    """What Newton's method ended at, if it is a solution."""
+    u = into_cones(u, problem.group)
+    if all(np.isfinite(part).all() for part in (u, springs, rigid)):
+        if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
+            yield _certify(problem, u, springs, rigid)
 
 
 def _certify(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.fallback import reference_margin
-from assembly.linear.zone import Zone, zone_margins
+from assembly.linear.zone import zone_margin, zone_margins
 from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import coaxial_beams, random_robot, stack
@@ -26,9 +25,11 @@ def test_margins_equal_one_at_a_time(grid, compliant):
     robot, postures = grid
     T, mismatch = stack(postures)
     batch = zone_margins(robot, T, compliant, mismatch)
-    assert not batch.fallback.any()
+    assert set(batch.method) == {"compiled"}
     for i in range(0, len(postures), 5):
-        assert_same_margin(batch, i, Zone(*reference_margin(postures[i], compliant)))
+        assert_same_margin(
+            batch, i, zone_margin(postures[i], compliant, method="reference")
+        )
     assert np.all(batch.bound >= batch.margin * (1 - 1e-8))
 
 
@@ -43,10 +44,10 @@ def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rn
         errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
         robot = home.robot.with_errors(errors)
         batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
-        compiled += not batch.fallback[0]
-        assert_same_margin(
-            batch, 0, Zone(*reference_margin(replace(home, robot=robot), compliant))
-        )
+        compiled += batch.method[0] == "compiled"
+        erring = replace(home, robot=robot)
+        one = zone_margin(erring, compliant, method="reference")
+        assert_same_margin(batch, 0, one)
     assert compiled
 
 
@@ -56,7 +57,7 @@ def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
     robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
     batch = zone_margins(robot, home_posture(robot).transforms[None])
     assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
-    assert not batch.fallback[0]
+    assert batch.method[0] == "compiled"
 
 
 def test_a_margin_has_two_readings():
@@ -65,11 +66,11 @@ def test_a_margin_has_two_readings():
         zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")
 
 
-def test_margins_of_a_perfect_robot_are_zero_and_none_goes_to_the_fallback(grid):
+def test_margins_of_a_perfect_robot_are_zero_and_are_compiled(grid):
     robot, postures = grid
     T, mismatch = stack(postures)
     for compliant in ("rigid", "free"):
         margins = zone_margins(robot, T, compliant, mismatch, 0.0 * robot.errors)
-        assert not margins.fallback.any()
+        assert set(margins.method) == {"compiled"}
         assert np.array_equal(margins.margin, np.zeros(len(T)))
         assert np.array_equal(margins.bound, margins.margin)

@@ -7,9 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import minimise_energies, solve_assembly
-from assembly.linear.fallback import reference_assembly
-from assembly.linear.moving_clearances import Asked
-from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
 from tests.assembly.linear.test_pose_error import hinged_frame
@@ -55,8 +53,10 @@ def test_batch_brackets_what_one_at_a_time_brackets(grid, reading, kappa):
     batch = bound_pose_errors(scaled, T, reading, mismatch=off)
     assert set(batch.status) == {"ok"}
     for i in range(0, len(T), 4):
-        one = reference_pose_error(
-            reference_assembly(replace(postures[i], robot=scaled)), Asked(reading)
+        one = bound_pose_error(
+            solve_assembly(replace(postures[i], robot=scaled), method="reference"),
+            reading,
+            method="reference",
         )
         assert_overlap(batch, i, one)
 
@@ -82,8 +82,10 @@ def test_errors_of_their_own_another_point_and_tighter_tolerances(grid, rng):
     batch = bound_pose_errors(robot, T[:3], "free", errors, off[:3], **options)
     for i in range(3):
         own = robot.with_errors(errors[i])
-        answer = reference_assembly(replace(postures[i], robot=own))
-        assert_overlap(batch, i, reference_pose_error(answer, Asked("free", **options)))
+        answer = solve_assembly(replace(postures[i], robot=own), method="reference")
+        assert_overlap(
+            batch, i, bound_pose_error(answer, "free", **options, method="reference")
+        )
     assert np.diff(batch.rotation_error).max() <= 1e-8
     assert np.diff(batch.translation_error).max() <= 1e-9
 
@@ -92,26 +94,26 @@ def test_errors_of_their_own_another_point_and_tighter_tolerances(grid, rng):
 def test_every_built_in_robot(name):
     robot = load_robot(name)
     posture = home_posture(robot)
-    answer = reference_assembly(posture)
+    answer = solve_assembly(posture, method="reference")
     for reading in ("frozen", "free"):
         batch = bound_pose_errors(
             robot, posture.transforms[None], reading, mismatch=posture.mismatch
         )
-        assert_overlap(batch, 0, reference_pose_error(answer, Asked(reading)))
+        assert_overlap(batch, 0, bound_pose_error(answer, reading, method="reference"))
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_robots(seed):
     robot = random_robot(np.random.default_rng(seed))
     posture = home_posture(robot)
-    answer = reference_assembly(posture)
+    answer = solve_assembly(posture, method="reference")
     for reading in ("frozen", "free"):
-        one = reference_pose_error(answer, Asked(reading))
+        one = bound_pose_error(answer, reading, method="reference")
         batch = bound_pose_errors(
             robot, posture.transforms[None], reading, mismatch=posture.mismatch
         )
         if np.isinf([one.rotation_error[0], one.translation_error[0]]).any():
-            assert batch.fallback[0]
+            assert batch.one_by_one[0]
             assert tuple(batch.rotation_error[0]) == one.rotation_error
             assert tuple(batch.translation_error[0]) == one.translation_error
         else:
@@ -123,10 +125,12 @@ def test_random_robots(seed):
 def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
     """Compiled where no clearance comes near them, else by the fallback."""
     posture = home_posture(hinged_frame(spin))
-    one = reference_pose_error(reference_assembly(posture), Asked(reading))
+    one = bound_pose_error(
+        solve_assembly(posture, method="reference"), reading, method="reference"
+    )
     batch = bound_pose_errors(posture.robot, posture.transforms[None], reading)
     assert_overlap(batch, 0, one)
-    assert batch.fallback[0] == (0.0 < spin < 1e-3)
+    assert batch.one_by_one[0] == (0.0 < spin < 1e-3)
     loose = home_posture(hinged_frame(None))
     most = bound_pose_errors(loose.robot, loose.transforms[None], reading)
     less = batch.rotation_error[0, 1] < 0.99 * most.rotation_error[0, 0]
@@ -139,9 +143,9 @@ def test_the_budget_goes_one_at_a_time():
     batch = bound_pose_errors(
         robot, posture.transforms[None], "budget", energy_budget=0.5
     )
-    one = reference_pose_error(solve_assembly(posture), Asked("budget", 0.5))
-    assert batch.fallback[0]
-    assert tuple(batch.translation_error[0]) == one.translation_error
+    one = bound_pose_error(solve_assembly(posture), "budget", 0.5, method="reference")
+    assert batch.one_by_one[0]
+    assert_overlap(batch, 0, one)
 
 
 def test_a_platform_that_moves_freely_has_no_bound():
@@ -151,7 +155,7 @@ def test_a_platform_that_moves_freely_has_no_bound():
     ))  # fmt: skip
     T = home_posture(robot).transforms[None]
     batch = bound_pose_errors(robot, T)
-    assert batch.fallback[0]
+    assert batch.one_by_one[0]
     assert np.isinf(batch.rotation_error[0]).all()
 
 

@@ -7,7 +7,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear import lanes, pose_error
 from assembly.linear.energy import minimise_under_loads, solve_assembly
 from assembly.linear.load import FrameLoads, loads_on_frames
-from assembly.linear.pose_error import bound_pose_error, reference_pose_error
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.linear.robot_structure import structure_of
 from assembly.model.robot import Clearance
@@ -52,17 +52,18 @@ def test_a_point_knows_its_own_errors():
 
 
 def test_what_is_solved_compiled_is_bounded_compiled(monkeypatch):
-    """The reference is asked for loads alone."""
+    """A set is set up in numpy for loads alone; the search is compiled all the same."""
     robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=2e-5))
     asked = []
     monkeypatch.setattr(
-        pose_error, "reference_pose_error",
-        lambda *given: asked.append(given) or reference_pose_error(*given),
+        pose_error, "reachable_screws",
+        lambda *given: asked.append(given) or reachable_screws(*given),
     )  # fmt: skip
     bound_pose_error(solve_assembly(home_posture(robot)))
     assert not asked
-    bound_pose_error(solve_assembly(home_posture(robot), LOAD))
+    found = bound_pose_error(solve_assembly(home_posture(robot), LOAD))
     assert len(asked) == 1
+    assert found.method == "compiled"
 
 
 def test_supports_of_both_halves_are_counted():
@@ -70,11 +71,13 @@ def test_supports_of_both_halves_are_counted():
     play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], clearance=play)
     assembly = solve_assembly(home_posture(robot), LOAD)
-    asked = pose_error.Asked("frozen", 0.05, 1e-6, 1e-6, (0.0, 0.3, 0.0))
-    reachable = reachable_screws(assembly, "frozen").at_point(asked.offset)
-    both = [reachable.farthest(part, 1e-6)[2] for part in (0, 3)]
-    assert min(both) > 0
-    assert reference_pose_error(assembly, asked).cuts == sum(both)
+    at = (0.0, 0.3, 0.0)
+    reachable = reachable_screws(assembly, "frozen").at_point(at)
+    for method in ("compiled", "reference"):
+        both = [reachable.farthest(part, 1e-6, method)[2] for part in (0, 3)]
+        assert min(both) > 0
+        found = bound_pose_error(assembly, offset=at, method=method)
+        assert found.cuts == sum(both)
 
 
 def test_bounds_are_too_wide_beyond_what_was_asked():

@@ -7,8 +7,10 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.fallback import margin_with, reference_assembly, reference_margin
+from assembly.linear.energy import solve_assembly
+from assembly.linear.fallback import margin_with
 from assembly.linear.reduction import FreeMotion
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from tests.robots_for_tests import random_robot
 
@@ -32,22 +34,28 @@ SPRING = Frame("stop", link=MatrixLink(K * np.eye(6)))
 def test_a_motion_is_free_up_to_its_bound_only():
     """It takes up an error of 0.9 L; of 1.5 L half an L is left to the spring."""
     at = home_posture(pin_against(SPRING, error=0.9 * L))
-    assert reference_assembly(at).energy == 0.0
-    held = reference_assembly(home_posture(pin_against(SPRING, error=1.5 * L)))
+    assert solve_assembly(at, method="reference").energy == 0.0
+    held = solve_assembly(
+        home_posture(pin_against(SPRING, error=1.5 * L)), method="reference"
+    )
     assert held.energy == pytest.approx(K * (0.5 * L) ** 2 / 2, rel=1e-6)
     free = home_posture(pin_against(SPRING, limit=None, error=1.5 * L))
-    assert reference_assembly(free).energy == 0.0
+    assert solve_assembly(free, method="reference").energy == 0.0
 
 
 def test_a_load_drives_a_joint_to_its_bound_or_without_end():
     """An open chain: a pin, pulled about z."""
     frames = pin_against(SPRING).frames[:2]
     load = np.array([0, 0, 2.0, 0, 0, 0])
-    held = reference_assembly(home_posture(Robot("pin", "end", frames)), load)
+    held = solve_assembly(
+        home_posture(Robot("pin", "end", frames)), load, method="reference"
+    )
     assert held.platform_screw[2] == pytest.approx(L, rel=1e-6)
     loose = (replace(frames[0], clearance=None), frames[1])
     with pytest.raises(FreeMotion):
-        reference_assembly(home_posture(Robot("pin", "end", loose)), load)
+        solve_assembly(
+            home_posture(Robot("pin", "end", loose)), load, method="reference"
+        )
 
 
 def test_a_margin_counts_what_a_bounded_motion_leaves():
@@ -55,11 +63,12 @@ def test_a_margin_counts_what_a_bounded_motion_leaves():
     play = 2e-4
     stop = Frame("stop", clearance=Clearance(spin=play))
     at = home_posture(pin_against(stop, error=1.5 * L))
-    margin, bound = reference_margin(at, "rigid")
-    assert margin == pytest.approx(0.5 * L / play, rel=1e-6)
-    assert bound == pytest.approx(margin, rel=1e-6)
+    zone = zone_margin(at, "rigid", method="reference")
+    assert zone.margin == pytest.approx(0.5 * L / play, rel=1e-6)
+    assert zone.bound == pytest.approx(zone.margin, rel=1e-6)
     at = home_posture(pin_against(stop, error=0.9 * L))
-    assert reference_margin(at, "rigid") == (0.0, 0.0)
+    none = zone_margin(at, "rigid", method="reference")
+    assert (none.margin, none.bound) == (0.0, 0.0)
 
 
 def test_the_screws_of_a_margin_close_the_robot():

@@ -9,8 +9,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear import zone
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import minimise_energies
-from assembly.linear.fallback import reference_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margins
@@ -43,7 +42,7 @@ def test_random_robots_springs_hold_their_energies_and_those_are_the_references(
             assert stored == pytest.approx(lanes.energy[i], rel=1e-10, abs=1e-25)
             if seed % 4 == i:
                 own = replace(home, robot=robot.with_errors(errors[i]))
-                least = reference_assembly(own).energy
+                least = solve_assembly(own, method="reference").energy
                 allowed = 2e-8 * least + 2e-12 * lanes.without_clearance[i] + 1e-30
                 assert abs(lanes.energy[i] - least) <= allowed
     assert solved > 150
@@ -70,7 +69,7 @@ def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
     T, mismatch = stack(postures)
     lanes = minimise_energies(robot, T, mismatch=mismatch)
     for i in (0, 11, 20, 33):
-        one = reference_assembly(postures[i])
+        one = solve_assembly(postures[i], method="reference")
         proved = replace(one, multipliers=lanes.multipliers[i]).bound
         assert proved == pytest.approx(lanes.bound[i], rel=1e-9)
 
@@ -125,7 +124,7 @@ def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
     orders = [rng.permutation(len(T)) for _ in range(4)] + [[i] for i in range(8)]
     for order in orders:
         other = zone_margins(robot, T[order], compliant, off[order], errors[order])
-        for name in ("margin", "bound", "fallback"):
+        for name in ("margin", "bound", "method"):
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
@@ -137,7 +136,7 @@ def test_margins_are_proportional_to_the_errors_and_proved(grid, compliant, kapp
     T, mismatch = stack(postures)
     lanes = zone_margins(robot, T, compliant, mismatch, kappa * robot.errors)
     whole = zone_margins(robot, T, compliant, mismatch)
-    assert not lanes.fallback.any()
+    assert set(lanes.method) == {"compiled"}
     assert lanes.margin == pytest.approx(kappa * whole.margin, rel=2e-8)
     assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
 
@@ -160,7 +159,7 @@ def test_what_is_not_solved_side_by_side_the_reference_solves_with_its_own_error
 
     monkeypatch.setattr(zone, "margins_side_by_side", all_but_the_last)
     found = zone_margins(robot, T, "free", mismatch, errors)
-    assert found.fallback.tolist() == [False] * (count - 1) + [True]
+    assert found.method.tolist() == ["compiled"] * (count - 1) + ["reference"]
     assert np.array_equal(found.margin[:-1], expected.margin[:-1])
     assert found.margin[-1] == pytest.approx(expected.margin[-1], rel=1e-7)
     assert found.bound[-1] <= found.margin[-1]

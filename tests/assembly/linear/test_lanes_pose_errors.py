@@ -5,11 +5,9 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import moving_clearances
-from assembly.linear.energy import minimise_energies
-from assembly.linear.fallback import reference_assembly
+from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.lanes import bounds_side_by_side
-from assembly.linear.moving_clearances import Asked
-from assembly.linear.pose_error import bound_pose_errors, reference_pose_error
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.solutions import FALLBACK, SOLVED, Bounds, Centres, ClearanceLoads
 from assembly.model.robot import Clearance
@@ -27,7 +25,7 @@ def test_brackets_of_the_papers_robot_are_as_narrow_as_asked(grid, reading, kapp
     robot, postures = grid
     T, off = stack(postures)
     lanes = bound_pose_errors(robot, T, reading, kappa * robot.errors, off)
-    assert not lanes.fallback.any()
+    assert not lanes.one_by_one.any()
     for half in HALVES:
         bounds = getattr(lanes, f"{half}_error")
         assert np.diff(bounds).max() <= 1e-6
@@ -44,7 +42,7 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
     for seed in range(24):
         draw = np.random.default_rng(seed)
         homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
-    asked, compiled = Asked(reading, offset=(0.1, -0.05, 0.2)), 0
+    at, compiled = (0.1, -0.05, 0.2), 0
     for home in homes:
         own = home.robot.errors
         if not own.any():
@@ -53,14 +51,12 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
         robot, T = home.robot, np.repeat(home.transforms[None], 4, axis=0)
         off = np.full(4, home.mismatch)
         energies = minimise_energies(robot, T, errors, off)
-        many = bound_pose_errors(
-            robot, T, reading, errors, off, energies, offset=asked.offset
-        )
-        solved = np.flatnonzero((many.status == "ok") & ~many.fallback)
+        many = bound_pose_errors(robot, T, reading, errors, off, energies, offset=at)
+        solved = np.flatnonzero((many.status == "ok") & ~many.one_by_one)
         compiled += len(solved)
         for i in solved[:2].tolist():
             # of the same solution of (22)
-            one = reference_pose_error(energies[i], asked)
+            one = bound_pose_error(energies[i], reading, offset=at, method="reference")
             for half in HALVES:
                 low, high = getattr(many, f"{half}_error")[i]
                 other = getattr(one, f"{half}_error")
@@ -99,10 +95,12 @@ def test_what_is_not_bounded_side_by_side_the_reference_bounds(grid, monkeypatch
 
     monkeypatch.setattr(moving_clearances, "bounds_side_by_side", every_other)
     found = bound_pose_errors(robot, T, "free", None, off, energies)
-    assert found.fallback.tolist() == [False, True, False, True]
+    assert found.one_by_one.tolist() == [False, True, False, True]
     assert np.all(found.rotation_error[::2] == 7.0)
     for i in (1, 3):
-        one = reference_pose_error(reference_assembly(postures[i]), Asked("free"))
+        one = bound_pose_error(
+            solve_assembly(postures[i], method="reference"), "free", method="reference"
+        )
         assert found.rotation_error[i] == pytest.approx(one.rotation_error, abs=2e-6)
 
 

@@ -130,14 +130,14 @@ def test_what_nothing_bounds_is_infinite_in_its_own_half():
 def test_the_search_asks_for_supports_where_its_own_are_not_close_enough(
     rng, monkeypatch
 ):
-    """Asked for less than rounding: each support is then found by the reference."""
+    """Asked for less than rounding: each support is then a problem of its own."""
     reachable, asked = body(rng, 1), []
     (low, high), _, _ = reachable.farthest(3, 1e-4)
     support = ReachableSet.support
 
-    def counted(self, direction):
+    def counted(self, direction, method):
         asked.append(direction)
-        return support(self, direction)
+        return support(self, direction, method)
 
     monkeypatch.setattr(ReachableSet, "support", counted)
     (own_low, own_high), screw, supports = reachable.farthest(3, 1e-15)
@@ -150,7 +150,7 @@ def test_the_search_asks_for_supports_where_its_own_are_not_close_enough(
 
 
 def test_a_support_that_fails_ends_the_search(rng, monkeypatch):
-    def fails(self, direction):
+    def fails(self, direction, method):
         raise SolverFailed("least energy", "NumericalError")
 
     monkeypatch.setattr(ReachableSet, "support", fails)

@@ -142,8 +142,8 @@ def test_many_errors_or_postures_have_their_own_margins():
 
 
 def test_a_margin_that_does_not_exist_needs_no_proof():
-    assert not Zone(None, None).unproved
-    assert not Zone(None, None).assemblable
-    assert not Zone(2.0, None).unproved  # what nothing was proved of
-    assert not Zone(2.0, 2.0).unproved
-    assert Zone(2.0, 1.99).unproved
+    assert not Zone(None, None, "reference").unproved
+    assert not Zone(None, None, "reference").assemblable
+    assert not Zone(2.0, None, "reference").unproved  # what nothing was proved of
+    assert not Zone(2.0, 2.0, "reference").unproved
+    assert Zone(2.0, 1.99, "reference").unproved

@@ -76,7 +76,7 @@ def test_within_all_cones_the_solution_is_that_of_linear_equations(rng, unit, sc
 def test_every_solver_of_the_chain_proves_the_same(rng):
     p = programme(rng)
     least = minimise_energy(*p)
-    for solve in conic._SOLVERS:
+    for solve in conic._SOLVERS["compiled"]:
         u, rigid, status = solve(*p)
         assert status in {"Solved", "AlmostSolved"}
         np.testing.assert_allclose(p.H @ u, p.k, atol=1e-11)
@@ -102,19 +102,19 @@ def test_the_smallest_gap_is_kept_and_a_proof_ends_the_search(rng, monkeypatch):
         raise AssertionError
 
     good = solution_of(u, n)
-    monkeypatch.setattr(conic, "_SOLVERS", (fails, good, refused))
+    monkeypatch.setitem(conic._SOLVERS, "compiled", (fails, good, refused))
     assert minimise_energy(*p).gap <= 1e-10
     assert asked == ["failed"]
     # without a proof all are asked, and the best one counts wherever it comes
     monkeypatch.setattr(conic, "_proved", lambda *_: False)
     poor, worse = solution_of(0.9 * u, 0.9 * n), solution_of(0.5 * u, 0.0 * n)
-    monkeypatch.setattr(conic, "_certified", lambda p, u, n: [
+    monkeypatch.setattr(conic, "_certified", lambda p, u, n, _: [
         _certify(p, u, p.G @ u + p.h, n)
     ])  # fmt: skip
     for order in ((worse, good, poor), (good, poor), (poor, worse, good)):
-        monkeypatch.setattr(conic, "_SOLVERS", order)
+        monkeypatch.setitem(conic._SOLVERS, "compiled", order)
         np.testing.assert_allclose(minimise_energy(*p).clearances, u, atol=1e-9)
-    monkeypatch.setattr(conic, "_SOLVERS", (fails, fails))
+    monkeypatch.setitem(conic._SOLVERS, "compiled", (fails, fails))
     with pytest.raises(conic.SolverFailed, match="NumericalError"):
         minimise_energy(*p)
 
@@ -161,7 +161,7 @@ def test_newton_proves_what_a_poor_guess_does_not(rng, push, rows):
     p = programme(rng, push, rows)
     u, n, _ = _compiled(*p)
     value = _certify(p, u, p.G @ u + p.h, n).value
-    poor, refined = _certified(p, 0.9 * u, 0.9 * n)
+    poor, refined = _certified(p, 0.9 * u, 0.9 * n, "compiled")
     assert poor.gap > 1e-4
     assert refined.gap <= 1e-9 * (abs(refined.value) + 0.01 * p.h @ p.h)
     assert refined.value == pytest.approx(value, abs=1e-9)
@@ -176,7 +176,7 @@ def test_newton_is_for_discs_and_intervals_and_its_ends_are_looked_at(rng, monke
     p = programme(rng)
     u, n, _ = _compiled(*p)
     ball = p._replace(group=np.array([0, 0, 0, 1, 1]))
-    assert len(list(_certified(ball, 0.1 * u, n))) == 1
+    assert len(list(_certified(ball, 0.1 * u, n, "compiled"))) == 1
     seen, change = [], [0.0, 0.0]
 
     def newton(problem, starts, limits, at, y):
@@ -189,7 +189,7 @@ def test_newton_is_for_discs_and_intervals_and_its_ends_are_looked_at(rng, monke
         ((0.0, 0.0), 2), ((np.nan, 0.0), 1), ((0.0, np.nan), 1),
         ((1e-9 * p.H[0], 0.0), 1), ((-1e-9 * p.H[0], 0.0), 1),
     ):  # fmt: skip
-        assert len(list(_certified(p, 0.1 * u, n))) == candidates
+        assert len(list(_certified(p, 0.1 * u, n, "compiled"))) == candidates
     limits = seen[0]  # the same part of both parts of the gap that counts
     least = GAP_WITHOUT_CLEARANCE * np.sum(p.h**2) / 2
     assert limits.relative / GAP == pytest.approx(limits.absolute / least, rel=1e-12)

@@ -1,5 +1,7 @@
 """The paper's robot with errors, and terms of the model broken for one test."""
 
+from functools import partial
+
 import pytest
 
 from assembly.kinematics.posture import place_robot
@@ -24,12 +26,13 @@ def broken(monkeypatch):
     In the model in numpy: the compiled one has each term once more.
     """
     from assembly.linear.closure import _virtual_joints
-    from assembly.linear.fallback import reference_assembly
+    from assembly.linear.energy import solve_assembly
     from validation.crosscheck import crosscheck
 
     def breaks(mutation):
         mutation(monkeypatch)
-        monkeypatch.setattr(crosscheck, "solve_assembly", reference_assembly)
+        reference = partial(solve_assembly, method="reference")
+        monkeypatch.setattr(crosscheck, "solve_assembly", reference)
         _virtual_joints.cache_clear()
 
     yield breaks

@@ -1,0 +1,102 @@
+r"""A minimum of :func:`assembly.solvers.conic.minimise_energy`, refined in numpy.
+
+A cone solver ends at a gap.  Once the cones that are pressed against their bound are
+known, with forces f, the minimum satisfies equations, which Newton's method solves to
+rounding; y are the springs, n the multipliers of H:
+
+    G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
+
+Sources:
+    Nocedal, Wright (2006), Numerical Optimization, section 18.1.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+_STEPS = 4  # two or three are usual
+_GUESSES = 6  # of the cones that are pressed; one is usual
+_NEAR = 1e-2, 0.0  # [-] slack of a cone that is guessed to be pressed by any force
+_BEYOND = 1e-9  # [-] by which a cone that is not pressed may be left
+
+_Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
+_Point = tuple[NDArray, NDArray, NDArray]
+
+
+def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
+    """The same minimum to rounding.
+
+    Args:
+        problem: G (r, nu), h (r,), d (nu,), H (p, nu), k (p,), and the cone of each
+            column (nu,).
+        u: (nu,) a solution.
+        n: (p,) its multipliers of H.
+
+    Yields:
+        u (nu,), y (r,) and n (p,) from each guess of what is pressed; worse ones where
+        it cannot be told.
+    """
+    G, h, d, H, _, group = problem
+    y = G @ u + h
+    force, slack = _sizes(G.T @ y - d - H.T @ n, group), 1.0 - _sizes(u, group)
+    # force times slack is about the solver's gap: one of the two is nearly zero
+    scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
+    for near in _NEAR:
+        pressed = (slack < near) | (force > scale * slack)
+        yield _settled(problem, (u, y, n), pressed, force)
+
+
+def _settled(
+    problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
+) -> _Point:
+    """The minimum after cones were added that are left, and let go that pull."""
+    for _ in range(_GUESSES):
+        settled, forces = _with_pressed(problem, start, pressed, force)
+        beyond = ~pressed & (_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
+        pulled = pressed & (forces < 0.0)
+        if not (beyond | pulled).any():
+            break
+        pressed = (pressed | beyond) & ~pulled
+    return settled
+
+
+def _with_pressed(
+    problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
+) -> tuple[_Point, NDArray]:
+    """Newton's method with these cones pressed, and the forces on all cones."""
+    G, h, d, H, k, group = problem
+    u, y, n = start
+    held = np.flatnonzero(pressed)
+    member, f = group[:, None] == held, force[held]
+    counts = np.cumsum([len(u), len(y), len(n)])
+    for _ in range(_STEPS):
+        N = member * u[:, None]
+        left = np.concatenate([
+            G @ u + h - y,
+            G.T @ y - d - H.T @ n + N @ f,
+            H @ u - k,
+            (_sizes(u, group)[held] ** 2 - 1.0) / 2,
+        ])  # fmt: skip
+        A = _derivatives(G, H, N, member @ f)
+        step = -np.linalg.lstsq(A, left, rcond=None)[0]
+        du, dy, dn, df = np.split(step, counts)
+        u, y, n, f = u + du, y + dy, n + dn, f + df
+    forces = np.zeros(len(force))
+    forces[held] = f
+    return (u, y, n), forces
+
+
+def _derivatives(G: NDArray, H: NDArray, N: NDArray, curvature: NDArray) -> NDArray:
+    """Of the equations above by u, y, n and f; N are the normals of pressed cones."""
+    r, p, m = len(G), len(H), N.shape[1]
+    return np.block([
+        [G, -np.eye(r), np.zeros((r, p + m))],
+        [np.diag(curvature), G.T, -H.T, N],
+        [np.vstack([H, N.T]), np.zeros((p + m, r + p + m))],
+    ])  # fmt: skip
+
+
+def _sizes(values: NDArray, group: NDArray) -> NDArray:
+    """(cones,) Euclidean size of a vector's part in each cone."""
+    return np.sqrt(np.bincount(group, weights=values**2))

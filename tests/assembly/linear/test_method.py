@@ -1,0 +1,146 @@
+"""Every solver takes a method, and its answer says which one gave it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear import energy, reach, zone
+from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.zone import zone_margin, zone_margins
+from assembly.model.robot import Clearance
+from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.robots import BUILT_IN
+from assembly.solvers import one_problem
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, stack
+
+METHODS = ("compiled", "reference")
+GAP = np.array([0, 0, 0, 1e-4, 0, 0])
+LOAD = [0.0, 0, 0, 10, 0, -50]
+
+
+def beams():
+    return home_posture(coaxial_beams(GAP, clearance=Clearance(radial=2e-5)))
+
+
+def rigid():
+    """Rigid rows: what the compiled method leaves to the reference."""
+    robot = coaxial_beams(GAP, clearance=Clearance(1e-3))
+    frames = tuple(replace(frame, link=None) for frame in robot.frames)
+    return home_posture(replace(robot, frames=frames))
+
+
+def questions(posture):
+    """Every public solver, of one posture and of many."""
+    T, off = stack([posture])
+    assembly = solve_assembly(posture)
+    return (
+        lambda method: solve_assembly(posture, method=method),
+        lambda method: solve_assembly([posture], method=method),
+        lambda method: solve_assembly(posture, LOAD, method=method),
+        lambda method: solve_assembly([posture], LOAD, method=method),
+        lambda method: minimise_energies(posture.robot, T, method=method),
+        lambda method: zone_margin(posture, method=method),
+        lambda method: zone_margin([posture], method=method),
+        lambda method: zone_margins(posture.robot, T, method=method),
+        lambda method: bound_pose_error(assembly, method=method),
+        lambda method: bound_pose_errors(posture.robot, T, method=method),
+        lambda method: platform_stiffness(posture, "in contact", method=method),
+        lambda method: platform_stiffnesses(posture.robot, T, method=method),
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_answer_says_the_method_that_was_asked_for(method):
+    for ask in questions(beams()):
+        found = ask(method).method
+        assert (found if isinstance(found, str) else found[0]) == method
+
+
+def test_another_word_is_refused_and_both_methods_are_named():
+    for ask in questions(beams()):
+        with pytest.raises(ValueError, match="is 'numpy', expected 'compiled' or 'ref"):
+            ask("numpy")
+
+
+def test_the_reference_calls_nothing_compiled(monkeypatch):
+    """Numpy and Clarabel alone, from the linearisation to the bracket."""
+
+    def refused(*given):
+        raise AssertionError("a compiled function was called")
+
+    posture = beams()
+    robot, (T, off) = posture.robot, stack([posture])
+    for module, names in (
+        (energy, ["assemble_side_by_side"]),
+        (zone, ["margins_side_by_side"]),
+        (one_problem, ["interior_point", "newton", "farthest"]),
+    ):
+        for name in names:
+            monkeypatch.setattr(module, name, refused)
+    found = solve_assembly(posture, method="reference")
+    assert found.energy > 0.0
+    assert zone_margin(posture, method="reference").margin > 0.0
+    for reading in reach.READINGS:
+        bounds = bound_pose_error(found, reading, method="reference")
+        assert 0.0 < np.diff(bounds.translation_error) <= 1e-6
+    many = bound_pose_errors(robot, T, mismatch=off, method="reference")
+    assert many[0].translation_error[0] > 0.0
+
+
+@pytest.mark.parametrize("load", [None, LOAD])
+def test_what_is_not_proved_compiled_is_the_references_answer_to_the_bit(load):
+    """It says so, of one posture and of many."""
+    posture = rigid()
+    asked = solve_assembly(posture, load, method="reference")
+    one, many = solve_assembly(posture, load), solve_assembly([posture], load)
+    assert one.method == many.method[0] == "reference"
+    assert np.array_equal(one.clearances, asked.clearances)
+    assert one.energy == many.energy[0] == asked.energy
+    assert np.array_equal(many.multipliers[0], asked.multipliers)
+    assert many.fallbacks() == {"rigid rows": 1}
+    assert solve_assembly([posture], load, method="reference").fallbacks() == {
+        "asked": 1
+    }
+
+
+def test_points_beside_one_that_is_not_proved_stay_compiled(monkeypatch):
+    robot = irsbot2_with(NUMBERS["cases"][0])
+    postures = [home_posture(robot)] * 3
+    solve = energy.assemble_side_by_side
+
+    def uncertified(structure, T, errors, mismatch, out, loads):
+        solve(structure, T, errors, mismatch, out, loads)
+        out.outcome[len(T) // 2] = 4
+
+    monkeypatch.setattr(energy, "assemble_side_by_side", uncertified)
+    found = solve_assembly(postures)
+    assert found.method.tolist() == ["compiled", "reference", "compiled"]
+    asked = solve_assembly(postures[1], method="reference")
+    assert found.energy[1] == asked.energy
+    assert found.to_xarray().method.values.tolist() == found.method.tolist()
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_brackets_of_both_methods_share_a_point_on_every_built_in_robot(name):
+    """Of the same solution of (22); the searches have nothing in common."""
+    answer = solve_assembly(home_posture(BUILT_IN[name]()))
+    for reading in reach.READINGS:
+        one, other = (
+            bound_pose_error(answer, reading, method=method) for method in METHODS
+        )
+        for half in ("rotation_error", "translation_error"):
+            (low, high), (least, most) = getattr(one, half), getattr(other, half)
+            assert low <= most * (1 + 1e-9)
+            assert least <= high * (1 + 1e-9)
+            assert max(high - low, most - least) <= 1e-6
+
+
+def test_the_exact_stiffness_has_no_reference():
+    with pytest.raises(ValueError, match="state 'exact' has no reference"):
+        platform_stiffness(beams(), "exact", method="reference")
+    assert platform_stiffness(beams(), "exact").method == "compiled"
+    assert platform_stiffness(beams()).method == "reference"
