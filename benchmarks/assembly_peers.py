@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
 from assembly.kinematics.posture import Posture
-from assembly.linear import reference
+from assembly.linear import as_printed
 from assembly.linear.assembled import all_loads
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reduction import reduce_problem
@@ -165,5 +165,5 @@ def moreau_batched(postures: list[Posture]) -> float:
 
 def cvxpy_rebuilt(posture: Posture) -> object:
     """As printed, in SI units, built anew."""
-    reference._UNIT = 1.0
-    return reference.reference_energy(posture)
+    as_printed._UNIT = 1.0
+    return as_printed.energy_as_printed(posture)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from assembly.linear.assembled import Assembly
 from assembly.linear.certificate import unproved
 from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.fallback import CannotAssemble
 from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference import CannotAssemble
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFailed

@@ -2,7 +2,7 @@
 
 Compiled from the frames' poses to the certificate (:mod:`assembly.linear.lanes`), with
 loads and without.  What this does not cover, or where its certificate falls short, is
-solved by the reference (:mod:`assembly.linear.fallback`), and the answer says so.
+solved by the reference (:mod:`assembly.linear.reference`), and the answer says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,13 +22,13 @@ from assembly.linear.assemblies import (
     solve_again,
 )
 from assembly.linear.closure import checked_size, linearise
-from assembly.linear.fallback import (
-    CannotAssemble,
-    reference_assembly,
-    without_own_springs,
-)
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads, no_loads
+from assembly.linear.reference import (
+    CannotAssemble,
+    least_energy,
+    without_own_springs,
+)
 from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
@@ -139,14 +139,14 @@ def _solve_one(
 ) -> Assembly:  # fmt: skip
     """One posture: compiled, or, in doubt or if asked, by the reference."""
     if method == "reference":
-        return reference_assembly(posture, load, bodies, gravity)
+        return least_energy(posture, load, bodies, gravity)
     frame_loads = None
     if load is not None or bodies is not None or gravity is not None:
         frame_loads = all_loads(posture, load, bodies, gravity) or None
     assembly = _compiled_assembly(posture, load, frame_loads)
     if assembly is not None:
         return assembly
-    return reference_assembly(posture, load, bodies, gravity)
+    return least_energy(posture, load, bodies, gravity)
 
 
 def _compiled_assembly(

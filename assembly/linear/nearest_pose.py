@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.linear.assembled import Assembly
 from assembly.linear.certificate import LARGEST_EXCESS, unproved
 from assembly.linear.closure import virtual_joints
-from assembly.linear.fallback import solve_with
 from assembly.linear.reach import loaded_cones
 from assembly.linear.reduction import complement
+from assembly.linear.reference import solve_with
 from assembly.linear.thresholds import (
     RANK,
     ROWS_RANK,

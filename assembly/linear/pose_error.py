@@ -36,9 +36,9 @@ from assembly.linear.assembled import Assembly
 from assembly.linear.assemblies import Assemblies, assemblies_of, failure_status
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import minimise_energies
-from assembly.linear.fallback import CannotAssemble
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.reach import reachable_screws
+from assembly.linear.reference import CannotAssemble
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import PointResults
 from assembly.model.robot import Robot

@@ -23,8 +23,8 @@ from scipy.linalg import svd
 
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.fallback import without_own_springs
 from assembly.linear.reduction import complement
+from assembly.linear.reference import without_own_springs
 from assembly.linear.thresholds import (
     RANK,
     ROWS_RANK,

@@ -1,151 +1,267 @@
-"""Problems (21) and (22) once more, written in cvxpy as the paper prints them.
+"""The reference, in numpy and Clarabel: problems (21), (22) and (27) at one posture.
 
-Slow and simple on purpose: every screw of every frame is a variable, every constraint
-an equation of the paper.  :mod:`assembly.linear.energy` and
-:mod:`assembly.linear.zone` are tested against it; the two share the robot, the bounds
-c-bar, the compliances and eqs (13)-(15), and nothing of how the problems are solved.
+Slow, and for everything: loads, rigid closures, ranks in doubt, bounds of passive
+joints that are active.  The method ``"reference"`` is this, and so is the answer where
+the compiled method does not cover a problem or falls short of its proof.
 
-Two departures from the printed problems: screws are in mrad and mm, to which the
-solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.
+=========  ==========================================  ===============================
+paper      what                                        where
+=========  ==========================================  ===============================
+(16)-(20)  A (dl + dc + de + db) = 0, dx_p from them   ``closure.linearise``
+(1)-(7)    dc = cones u + free q, de and db = springs  ``closure.virtual_joints``
+           y, so that E = |y|^2 / 2
+--         q and y eliminated: E = |G u + h|^2 / 2,    ``reduction.reduce_problem``
+           H u = k where no spring acts
+(21)       the least t with every |u_c| <= t           :func:`least_margin`, here
+(22)       the least E - work, every |u_c| <= 1        :func:`least_energy`, here
+(23)-(26)  wrenches, from multipliers of the closures  ``assembled.Assembly``
+(27)       the set of dx_p that (22) leaves; its       ``reach.reachable_screws``,
+           farthest                                    ``ReachableSet.farthest``
+=========  ==========================================  ===============================
+
+Cone programmes are :mod:`assembly.solvers.conic`'s.
 """
 
-import warnings
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
+from scipy.linalg import svd
 
 from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly, all_loads
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    linearise,
+    virtual_joints,
+)
+from assembly.linear.load import FrameLoads
+from assembly.linear.reduction import FreeMotion, Reduction, reduce_problem
+from assembly.linear.rounding import differs_from_zero, stiffness_spread
 from assembly.model.clearance import (
-    CONES,
     Compliant,
     clearance_bounds,
+    clearance_excess,
+    has_bounded_motion,
     scales_with_margin,
 )
-from assembly.model.links import joint_compliances, link_compliances
+from assembly.solvers.conic import (
+    LeastEnergy,
+    cone_sizes,
+    cone_starts,
+    least_factor,
+    minimise_energy,
+)
 
-OPTIMAL = {"optimal", "optimal_inaccurate"}
-_UNIT = 1e-3  # screws are in mrad and mm here
+_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 
 
-def reference_energy(
-    posture: Posture, load: ArrayLike | None = None
-) -> tuple[float, NDArray]:
-    """Minimum assembly energy as printed, (22).
+class CannotAssemble(Exception):
+    """No clearance and no elasticity of the model lets the closures hold.
+
+    A result, not a mistake of the caller: some closure is rigid in every direction.
+    """
+
+
+def least_energy(
+    posture: Posture,
+    load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> Assembly:
+    """Close a manipulator at least energy, as ``solve_assembly`` does.
 
     Args:
         posture: where the robot stands.
-        load: (6,) [N m, N] on the platform at its origin, base axes; energy minus its
-            work is then minimised.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        bodies: (n, 6) [N m, N] wrenches on the bodies of all frames, base axes.
+        gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        [J] the energy stored, and (6,) [rad, m] the platform's pose error.
+        The assembled manipulator.
 
     Raises:
-        RuntimeError: cvxpy found no optimum.
+        CannotAssemble: a closure is open that no clearance and no spring can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
     """
-    import cvxpy as cp
-
-    count = len(posture.robot.frames)
-    c, e, b = (cp.Variable((count, 6)) for _ in range(3))
-    x_p = cp.Variable(6)
-    bounds = clearance_bounds(posture.robot) / _UNIT
-    constraints = _clearance_constraints(c, bounds, np.ones_like(bounds))
-    errors = posture.robot.errors / _UNIT
-    constraints += _assembly_constraints(posture, x_p, errors + c + e + b)
-    energy: Any = cp.Constant(0.0)
-    for screws, compliances in ((e, link_compliances), (b, joint_compliances)):
-        C = np.array(compliances(posture.robot))
-        hard = np.diagonal(C, axis1=1, axis2=2) <= 0
-        constraints.append(screws[hard] == 0)
-        roots = [_root_of_stiffness(one) for one in C]
-        energy += cp.sum_squares(block_diag(*roots) @ cp.vec(screws, "C")) / 2
-    work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
-    _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
-    return float(energy.value), np.asarray(x_p.value) * _UNIT
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    frame_loads = all_loads(posture, wrench, bodies, gravity)
+    return _solve_within(linearise(posture), "elastic", wrench, frame_loads)
 
 
-def reference_margin(posture: Posture, compliant: Compliant = "rigid") -> float | None:
-    """Margin of problem (21): the least factor on the clearances that assembles.
+def _solve_within(
+    lin: Linearisation, compliant: Compliant, load: NDArray, frame_loads: FrameLoads
+) -> Assembly:
+    """Close a manipulator; bounds of passive joints' motion count where they matter."""
+    robot = lin.posture.robot
+    try:
+        joints = virtual_joints(robot, compliant)
+        assembly = solve_with(lin, joints, load, frame_loads)
+    except FreeMotion:
+        if not has_bounded_motion(robot):
+            raise
+    else:
+        if assembly.clearance_excess(compliant) <= 1e-9:
+            return assembly
+    # the bound of a passive joint's own motion was left out, but it is active
+    joints = virtual_joints(robot, compliant, bounded_motion=True)
+    return solve_with(lin, joints, load, frame_loads)
+
+
+def solve_with(
+    lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
+) -> Assembly:
+    """Close a manipulator at least energy with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        frame_loads: all loads, this one among them.
+
+    Returns:
+        The assembled manipulator.
+
+    Raises:
+        CannotAssemble: a closure is open that nothing can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
+    reduced = reduce_problem(lin, joints, frame_loads)
+    least = _minimise(reduced)
+    u = least.clearances
+    y = reduced.springs(u)
+    multipliers = reduced.multipliers(least.springs, least.rigid_multipliers)
+    assembly = Assembly(
+        linearisation=lin,
+        joints=joints,
+        load=load,
+        frame_loads=frame_loads,
+        elastic=y,
+        clearances=u,
+        motions=reduced.motions(u, y),
+        multipliers=multipliers,
+        energy_without_clearance=reduced.energy_without_clearance,
+        method="reference",
+    )
+    residual = assembly.closure_residual() + assembly.rounding
+    if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
+        return assembly
+    # no energy is needed: springs and wrenches are rounding of zero
+    return replace(
+        assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
+    )
+
+
+def without_own_springs(assembly: Assembly) -> Assembly:
+    """The least energy when compliant joints turn freely about their own axis."""
+    return _solve_within(
+        assembly.linearisation, "hinged", assembly.load, assembly.frame_loads
+    )
+
+
+def _minimise(reduced: Reduction) -> LeastEnergy:
+    """Least energy of a reduced problem; infeasible ones are named."""
+    joints = reduced.joints
+    spread = stiffness_spread(joints, reduced.linearisation.size)
+    beyond = ""
+    if spread > _RIGID_BESIDE:
+        beyond = (
+            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
+            "stiffest count as rigid"
+        )
+    if reduced.inconsistent:
+        raise CannotAssemble(
+            f"a rigid part stays open by {reduced.inconsistent:.3g} (rad, or m per "
+            f"reference length): no clearance or spring acts there{beyond}"
+        )
+    least = minimise_energy(
+        reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group,
+        "reference",
+    )  # fmt: skip
+    if not least.feasible:
+        raise CannotAssemble(
+            f"no clearance within its bounds closes what no spring can{beyond}"
+        )
+    return least
+
+
+def least_margin(
+    posture: Posture, compliant: Compliant
+) -> tuple[float | None, float | None]:
+    """Factor on all clearances at which a rigid manipulator just assembles, (21).
 
     Args:
         posture: where the robot stands.
-        compliant: ``"rigid"`` as printed, or ``"free"``.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
-        The factor; None if no factor helps.
+        The margin and its certified lower bound; None for both if no factor does.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
     """
-    import cvxpy as cp
-
-    count = len(posture.robot.frames)
-    c = cp.Variable((count, 6))
-    x_p, t = cp.Variable(6), cp.Variable(nonneg=True)
-    bounds = clearance_bounds(posture.robot, compliant) / _UNIT
-    factor = np.where(scales_with_margin(posture.robot), t, 1.0)
-    constraints = _clearance_constraints(c, bounds, factor)
-    errors = posture.robot.errors / _UNIT
-    constraints += _assembly_constraints(posture, x_p, errors + c)
-    problem = cp.Problem(cp.Minimize(t), constraints)
-    _solve(problem, OPTIMAL | {"infeasible"})
-    return None if problem.status == "infeasible" else float(t.value)
+    lin = linearise(posture)
+    margin, bound, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
+    bounds = clearance_bounds(posture.robot, compliant)
+    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
+    if margin is not None and clearance_excess(screws, ranges) > 1e-9:
+        # the range of a passive joint's motion was left out, but it is active
+        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
+        margin, bound, _ = margin_with(lin, joints)
+    return margin, bound
 
 
-def _root_of_stiffness(C: NDArray) -> NDArray:
-    """(6, 6) R with R^T R the stiffness, zero in directions that do not yield."""
-    soft = np.flatnonzero(np.diag(C) > 0)
-    root = np.zeros_like(C)
-    root[np.ix_(soft, soft)] = np.linalg.cholesky(
-        np.linalg.inv(C[np.ix_(soft, soft)])
-    ).T
-    return root * _UNIT
+def margin_with(
+    lin: Linearisation, joints: VirtualJoints
+) -> tuple[float | None, float | None, NDArray]:
+    """Margin with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move, without springs.
+
+    Returns:
+        The margin and its certified lower bound, None if no factor does; the (n, 6)
+        [rad, m] clearance screws that attain it.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
+    reduced = reduce_problem(lin, joints)
+    margin, bound, u = _margin_of(reduced)
+    if margin is None:
+        return None, None, np.zeros((len(joints.robot.frames), 6))
+    motions = reduced.motions(u, np.zeros(joints.elastic.shape[1]))
+    screws = joints.cones @ u + joints.free @ motions
+    return margin, bound, screws.reshape(-1, 6)
 
 
-def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
-    import cvxpy as cp
-
-    constraints = []
-    for k, rows in enumerate(CONES):
-        tight = np.flatnonzero(bounds[:, k] == 0)
-        constraints += [c[tight, r] == 0 for r in rows if len(tight)]
-        some = np.flatnonzero((bounds[:, k] > 0) & np.isfinite(bounds[:, k]))
-        if len(some):
-            most = cp.hstack([bounds[j, k] * factor[j, k] for j in some])
-            parts = [c[some, r] for r in rows]
-            if len(parts) == 1:
-                constraints.append(cp.abs(parts[0]) <= most)
-            else:
-                constraints.append(cp.SOC(most, cp.vstack(parts), axis=0))
-    return constraints
-
-
-def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
-    """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
-    import cvxpy as cp
-
-    robot = posture.robot
-    stacked = cp.vec(screws, "C")
-
-    def pose_error(name: str) -> Any:
-        """Eq. (8): displacement of a frame by the screws along its path."""
-        on_path = robot.on_path[robot.index(name)]
-        return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
-
-    closures = [pose_error(a) == pose_error(b) for a, b in robot.closures]
-    return [x_p == pose_error(robot.platform), *closures]
+def _margin_of(
+    reduced: Reduction,
+) -> tuple[float | None, float | None, NDArray]:
+    """Margin of a reduced problem, its bound, and the clearances that attain it."""
+    joints = reduced.joints
+    u = np.zeros(joints.cones.shape[1])
+    if reduced.inconsistent:
+        return None, None, u
+    if not np.any(reduced.k):
+        return 0.0, 0.0, u
+    # orthonormal rows, whatever the units of the closures
+    U, S, B = svd(reduced.H, full_matrices=False)
+    right = U.T @ reduced.k / S
+    t, u, y = least_factor(B, right, joints.group, joints.scaled)
+    bound = None if t is None else _margin_bound(B, right, joints, y)
+    return t, bound, u
 
 
-def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve with tight tolerances; raise if the status is not allowed."""
-    import cvxpy as cp
-
-    tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
-    try:
-        with warnings.catch_warnings():  # of inaccuracy: the status says it, too
-            warnings.simplefilter("ignore")
-            problem.solve(solver=cp.CLARABEL, **tight)
-    except cp.error.SolverError as error:
-        raise RuntimeError(f"cvxpy: {error}") from None
-    if problem.status not in allowed:
-        raise RuntimeError(f"cvxpy: the problem is {problem.status}")
+def _margin_bound(
+    B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
+) -> float:
+    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    sizes = cone_sizes(B.T @ y, joints.group)
+    scaled = joints.scaled[cone_starts(joints.group)[:-1]]
+    work = float(y @ right) - float(sizes[~scaled].sum())
+    return max(0.0, work / max(float(sizes[scaled].sum()), 1e-300))

@@ -14,7 +14,7 @@ class Solutions(NamedTuple):
     """Problem (22), as arrays that compiled functions fill.
 
     Attributes:
-        outcome: (k,) NEWTON or INTERIOR, or the reason for the fallback.
+        outcome: (k,) NEWTON or INTERIOR, or why it is left to the reference.
         energy: (k,) [J].
         bound: (k,) [J] certified lower bound of it.
         without_clearance: (k,) [J] energy if every clearance stayed at zero.

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import checked_size
-from assembly.linear.fallback import reference_margin
 from assembly.linear.lanes import margins_side_by_side
+from assembly.linear.reference import least_margin
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.linear.thresholds import MARGIN_GAP
@@ -151,7 +151,7 @@ def zone_margin(
         T, off = posture.transforms[None], np.array([posture.mismatch])
         margin, bound, left = _compiled(posture.robot, T, compliant, off, None, method)
         if left[0]:
-            return Zone(*reference_margin(posture, compliant), "reference")
+            return Zone(*least_margin(posture, compliant), "reference")
         return Zone(float(margin[0]), float(bound[0]), "compiled")
     postures = [posture] if isinstance(posture, Posture) else list(posture)
     sets = None if errors is None else np.asarray(errors, dtype=float)
@@ -199,7 +199,7 @@ def zone_margins(
         )
         margin[i] = bound[i] = np.nan
         try:
-            zone = Zone(*reference_margin(posture, compliant), "reference")
+            zone = Zone(*least_margin(posture, compliant), "reference")
         except SolverFailed as error:
             reason[i] = str(error)
             continue

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from assembly.batch.draws import Draws
 from assembly.batch.many_draws import OnePosture
-from assembly.linear.fallback import CannotAssemble
 from assembly.linear.reach import reachable_screws
 from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference import CannotAssemble
 from assembly.linear.thresholds import UNBOUNDED, rank_tolerance
 from assembly.solvers.conic import SolverFailed
 

@@ -28,11 +28,11 @@ def compare_printed(
         the verdict on each; ``verdict`` and ``passed``.  Where cvxpy has no solution,
         only the ``reason``.
     """
-    from assembly.linear.reference import reference_energy, reference_margin
+    from assembly.linear.as_printed import energy_as_printed, margin_as_printed
 
     try:
-        energy, screw = reference_energy(posture)
-        margin, free = (reference_margin(posture, key) for key in ("rigid", "free"))
+        energy, screw = energy_as_printed(posture)
+        margin, free = (margin_as_printed(posture, key) for key in ("rigid", "free"))
     except RuntimeError as error:
         return {"verdict": "no answer", "passed": False, "reason": str(error)}
     checks = {

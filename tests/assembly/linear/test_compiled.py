@@ -10,7 +10,7 @@ from assembly.linear import energy
 from assembly.linear.assemblies import OUTCOMES
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import minimise_energies, solve_assembly
-from assembly.linear.fallback import CannotAssemble
+from assembly.linear.reference import CannotAssemble
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
@@ -310,7 +310,7 @@ def test_no_points_are_no_answers():
     assert len(minimise_energies(robot, np.zeros((0, 6, 4, 4))).energy) == 0
 
 
-def test_postures_are_made_for_the_fallback_only(grid):
+def test_postures_are_made_for_the_reference_only(grid):
     """The batch needs frames, not coordinates: none are asked for."""
     robot, postures = grid
     bare = Posture(robot, np.full(42, np.nan), postures[0].transforms, 0.0)

@@ -123,7 +123,7 @@ def test_random_robots(seed):
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
 @pytest.mark.parametrize("reading", ["frozen", "free"])
 def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
-    """Compiled where no clearance comes near them, else by the fallback."""
+    """Compiled where no clearance comes near them, else set up in numpy."""
     posture = home_posture(hinged_frame(spin))
     one = bound_pose_error(
         solve_assembly(posture, method="reference"), reading, method="reference"

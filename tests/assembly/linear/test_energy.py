@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import reference_energy
 from assembly.linear.without_clearance import flexibility
 from assembly.linear.zone import zone_margin
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -347,13 +347,13 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
         answer = solve_assembly(posture, load)
     except (CannotAssemble, FreeMotion):
         with pytest.raises(RuntimeError, match="infeasible|unbounded|failed"):
-            reference_energy(posture, load)
+            energy_as_printed(posture, load)
         return
     scale = max(answer.energy, 1e-6 * answer.energy_without_clearance, 1e-9)
     assert answer.duality_gap() < 1e-8 * (scale + abs(answer.potential))
     assert answer.closure_residual() < 1e-11
     assert answer.clearance_excess() < 1e-9
-    energy, screw = reference_energy(posture, load)
+    energy, screw = energy_as_printed(posture, load)
     work = 0.0 if load is None else load @ screw
     assert energy - work == pytest.approx(answer.potential, rel=1e-6, abs=1e-6 * scale)
 

@@ -23,7 +23,7 @@ ROWS = (
 
 
 def test_random_robots_springs_hold_their_energies_and_those_are_the_references():
-    """Whatever the ranks of a robot; what is left to the fallback is left for all."""
+    """Whatever the ranks of a robot; what is left to the reference is left for all."""
     solved = 0
     for seed in range(150):
         rng = np.random.default_rng(seed)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.assembled import Assembly
 from assembly.linear.assemblies import COMPILED
 from assembly.linear.energy import (
@@ -15,7 +16,6 @@ from assembly.linear.energy import (
     solve_assembly,
 )
 from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import reference_energy
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN, load_robot
@@ -37,7 +37,7 @@ ROWS = (
 
 
 def compiled(posture, *loads, **others):
-    """One posture by the compiled kernels; the fallback is none of them."""
+    """One posture by the compiled kernels; the reference is none of them."""
     many = solve_assembly([posture], *loads, **others)
     assert many.fallbacks() == {}
     assert many.certified.all()
@@ -110,7 +110,7 @@ def test_cvxpy_finds_the_same_energy_and_no_less(name, rng):
     if name == "irsbot2":
         errors = 0.2 * irsbot2_with(NUMBERS["cases"][0]).errors
     erring = replace(posture, robot=robot.with_errors(errors))
-    energy, screw = reference_energy(erring, LOAD)
+    energy, screw = energy_as_printed(erring, LOAD)
     many = compiled(erring, LOAD)
     assert many.energy[0] == pytest.approx(energy, rel=1e-5)
     assert many.platform_screw[0] @ LOAD == pytest.approx(screw @ LOAD, rel=1e-5)

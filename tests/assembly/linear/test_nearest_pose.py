@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.energy import solve_assembly
 from assembly.linear.nearest_pose import (
     _FreeClearances,
@@ -16,7 +17,6 @@ from assembly.linear.nearest_pose import (
     _moves,
     nearest_pose,
 )
-from assembly.linear.reference import reference_energy
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.clearance import CONES, clearance_bounds
@@ -69,7 +69,7 @@ def nearest_by_cvxpy(posture, point, load=None):
     if load is None:
         limits += [e == 0, b == 0]
     else:
-        energy, screw = reference_energy(posture, load)
+        energy, screw = energy_as_printed(posture, load)
         terms, least = [], energy - load @ screw
         for screws, compliances in ((e, link_compliances), (b, joint_compliances)):
             for j, C in enumerate(compliances(robot)):

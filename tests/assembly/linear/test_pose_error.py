@@ -153,7 +153,7 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
     """Put back into the closures by cvxpy, which also finds the supports; its 1e-6."""
     import cvxpy as cp
 
-    from assembly.linear.reference import OPTIMAL, _solve
+    from assembly.linear.as_printed import OPTIMAL, _solve
 
     posture = home_posture(hinged_frame(spin))
     answer = solve_assembly(posture)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.reference import reference_margin
+from assembly.linear.as_printed import margin_as_printed
 from assembly.linear.zone import Zone, zone_margin
 from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import (
@@ -113,7 +113,7 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
     for compliant in ("rigid", "free"):
         zone = zone_margin(posture, compliant)
         try:
-            expected = reference_margin(posture, compliant)
+            expected = margin_as_printed(posture, compliant)
         except RuntimeError:  # cvxpy gave up, as it does on some without an answer
             assert zone.margin is None
             continue

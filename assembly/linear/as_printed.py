@@ -1,0 +1,151 @@
+"""Problems (21) and (22) once more, written in cvxpy as the paper prints them.
+
+Slow and simple on purpose: every screw of every frame is a variable, every constraint
+an equation of the paper.  :mod:`assembly.linear.energy` and
+:mod:`assembly.linear.zone` are tested against it; the two share the robot, the bounds
+c-bar, the compliances and eqs (13)-(15), and nothing of how the problems are solved.
+
+Two departures from the printed problems: screws are in mrad and mm, to which the
+solver's absolute tolerances fit, and a rigid direction is a screw fixed at zero.
+"""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+from assembly.kinematics.posture import Posture
+from assembly.model.clearance import (
+    CONES,
+    Compliant,
+    clearance_bounds,
+    scales_with_margin,
+)
+from assembly.model.links import joint_compliances, link_compliances
+
+OPTIMAL = {"optimal", "optimal_inaccurate"}
+_UNIT = 1e-3  # screws are in mrad and mm here
+
+
+def energy_as_printed(
+    posture: Posture, load: ArrayLike | None = None
+) -> tuple[float, NDArray]:
+    """Minimum assembly energy as printed, (22).
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] on the platform at its origin, base axes; energy minus its
+            work is then minimised.
+
+    Returns:
+        [J] the energy stored, and (6,) [rad, m] the platform's pose error.
+
+    Raises:
+        RuntimeError: cvxpy found no optimum.
+    """
+    import cvxpy as cp
+
+    count = len(posture.robot.frames)
+    c, e, b = (cp.Variable((count, 6)) for _ in range(3))
+    x_p = cp.Variable(6)
+    bounds = clearance_bounds(posture.robot) / _UNIT
+    constraints = _clearance_constraints(c, bounds, np.ones_like(bounds))
+    errors = posture.robot.errors / _UNIT
+    constraints += _assembly_constraints(posture, x_p, errors + c + e + b)
+    energy: Any = cp.Constant(0.0)
+    for screws, compliances in ((e, link_compliances), (b, joint_compliances)):
+        C = np.array(compliances(posture.robot))
+        hard = np.diagonal(C, axis1=1, axis2=2) <= 0
+        constraints.append(screws[hard] == 0)
+        roots = [_root_of_stiffness(one) for one in C]
+        energy += cp.sum_squares(block_diag(*roots) @ cp.vec(screws, "C")) / 2
+    work = 0 if load is None else np.asarray(load, dtype=float) @ x_p * _UNIT
+    _solve(cp.Problem(cp.Minimize(energy - work), constraints), OPTIMAL)
+    return float(energy.value), np.asarray(x_p.value) * _UNIT
+
+
+def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float | None:
+    """Margin of problem (21): the least factor on the clearances that assembles.
+
+    Args:
+        posture: where the robot stands.
+        compliant: ``"rigid"`` as printed, or ``"free"``.
+
+    Returns:
+        The factor; None if no factor helps.
+    """
+    import cvxpy as cp
+
+    count = len(posture.robot.frames)
+    c = cp.Variable((count, 6))
+    x_p, t = cp.Variable(6), cp.Variable(nonneg=True)
+    bounds = clearance_bounds(posture.robot, compliant) / _UNIT
+    factor = np.where(scales_with_margin(posture.robot), t, 1.0)
+    constraints = _clearance_constraints(c, bounds, factor)
+    errors = posture.robot.errors / _UNIT
+    constraints += _assembly_constraints(posture, x_p, errors + c)
+    problem = cp.Problem(cp.Minimize(t), constraints)
+    _solve(problem, OPTIMAL | {"infeasible"})
+    return None if problem.status == "infeasible" else float(t.value)
+
+
+def _root_of_stiffness(C: NDArray) -> NDArray:
+    """(6, 6) R with R^T R the stiffness, zero in directions that do not yield."""
+    soft = np.flatnonzero(np.diag(C) > 0)
+    root = np.zeros_like(C)
+    root[np.ix_(soft, soft)] = np.linalg.cholesky(
+        np.linalg.inv(C[np.ix_(soft, soft)])
+    ).T
+    return root * _UNIT
+
+
+def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
+    """Eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
+    import cvxpy as cp
+
+    constraints = []
+    for k, rows in enumerate(CONES):
+        tight = np.flatnonzero(bounds[:, k] == 0)
+        constraints += [c[tight, r] == 0 for r in rows if len(tight)]
+        some = np.flatnonzero((bounds[:, k] > 0) & np.isfinite(bounds[:, k]))
+        if len(some):
+            most = cp.hstack([bounds[j, k] * factor[j, k] for j in some])
+            parts = [c[some, r] for r in rows]
+            if len(parts) == 1:
+                constraints.append(cp.abs(parts[0]) <= most)
+            else:
+                constraints.append(cp.SOC(most, cp.vstack(parts), axis=0))
+    return constraints
+
+
+def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
+    """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
+    import cvxpy as cp
+
+    robot = posture.robot
+    stacked = cp.vec(screws, "C")
+
+    def pose_error(name: str) -> Any:
+        """Eq. (8): displacement of a frame by the screws along its path."""
+        on_path = robot.on_path[robot.index(name)]
+        return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
+
+    closures = [pose_error(a) == pose_error(b) for a, b in robot.closures]
+    return [x_p == pose_error(robot.platform), *closures]
+
+
+def _solve(problem: Any, allowed: set[str]) -> None:
+    """Solve with tight tolerances; raise if the status is not allowed."""
+    import cvxpy as cp
+
+    tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+    try:
+        with warnings.catch_warnings():  # of inaccuracy: the status says it, too
+            warnings.simplefilter("ignore")
+            problem.solve(solver=cp.CLARABEL, **tight)
+    except cp.error.SolverError as error:
+        raise RuntimeError(f"cvxpy: {error}") from None
+    if problem.status not in allowed:
+        raise RuntimeError(f"cvxpy: the problem is {problem.status}")
