@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csc_matrix, diags_array, hstack, vstack
+from scipy.sparse import csc_matrix, hstack, vstack
 
 from assembly.solvers import one_problem
 from assembly.solvers.method import Method
@@ -186,16 +186,11 @@ def _by_clarabel(
     """The same by Clarabel, with v = -G u - h as variables of their own."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
-    A = vstack(
-        [
-            hstack([csc_matrix(G), diags_array(np.ones(r))]),
-            hstack([csc_matrix(H), csc_matrix((len(k), r))]),
-            hstack([cones, csc_matrix((cones.shape[0], r))]),
-        ],
-        format="csc",
-    )
+    rows = np.vstack([G, H, cones.toarray()])
+    # put together dense: so small a sparse matrix takes longer than its problem
+    A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
-    P = block_diag([csc_matrix((nu, nu)), diags_array(np.ones(r))], format="csc")
+    P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
     q = np.concatenate([-d, np.zeros(r)])
     x, z, status = _clarabel(
         P, q, A, b, _Cones(equal=r + len(k), group=group), regularisation

@@ -4,6 +4,7 @@ from typing import Literal, get_args
 
 # the C++ of assembly/kernels, or numpy and Clarabel alone
 Method = Literal["compiled", "reference"]
+METHODS = get_args(Method)
 
 
 def check_method(method: str) -> None:
@@ -15,6 +16,6 @@ def check_method(method: str) -> None:
     Raises:
         ValueError: it is neither.
     """
-    if method not in get_args(Method):
-        names = " or ".join(repr(name) for name in get_args(Method))
+    if method not in METHODS:
+        names = " or ".join(repr(name) for name in METHODS)
         raise ValueError(f"method is {method!r}, expected {names}")

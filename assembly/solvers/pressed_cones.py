@@ -15,7 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-_STEPS = 4  # two or three are usual
+_STEPS = 4  # two are usual
+_SETTLED = 1e-12  # [-] a last step of the clearances
 _GUESSES = 6  # of the cones that are pressed; one is usual
 _NEAR = 1e-2, 0.0  # [-] slack of a cone that is guessed to be pressed by any force
 _BEYOND = 1e-9  # [-] by which a cone that is not pressed may be left
@@ -82,6 +83,8 @@ def _with_pressed(
         step = -np.linalg.lstsq(A, left, rcond=None)[0]
         du, dy, dn, df = np.split(step, counts)
         u, y, n, f = u + du, y + dy, n + dn, f + df
+        if np.abs(du).max() <= _SETTLED:
+            break
     forces = np.zeros(len(force))
     forces[held] = f
     return (u, y, n), forces

@@ -21,6 +21,7 @@ from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
+from assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -63,9 +64,6 @@ def test_play_is_used_up_before_anything_bends(gap, left):
     if left:
         found = answer.clearance_screws[robot.index("joint")]
         assert np.allclose(found, 1e-4 * direction, atol=1e-12)
-
-
-METHODS = ("compiled", "reference")
 
 
 @pytest.mark.parametrize("method", METHODS)

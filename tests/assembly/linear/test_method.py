@@ -7,6 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import energy, reach, zone
+from assembly.linear.assemblies import OUTCOMES
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.zone import zone_margin, zone_margins
@@ -15,9 +16,9 @@ from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import BUILT_IN
 from assembly.solvers import one_problem
+from assembly.solvers.method import METHODS
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, stack
 
-METHODS = ("compiled", "reference")
 GAP = np.array([0, 0, 0, 1e-4, 0, 0])
 LOAD = [0.0, 0, 0, 10, 0, -50]
 
@@ -114,7 +115,7 @@ def test_points_beside_one_that_is_not_proved_stay_compiled(monkeypatch):
 
     def uncertified(structure, T, errors, mismatch, out, loads):
         solve(structure, T, errors, mismatch, out, loads)
-        out.outcome[len(T) // 2] = 4
+        out.outcome[len(T) // 2] = OUTCOMES.index("uncertified")
 
     monkeypatch.setattr(energy, "assemble_side_by_side", uncertified)
     found = solve_assembly(postures)
