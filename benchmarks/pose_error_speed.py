@@ -42,6 +42,7 @@ from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.linear.zone import zone_margins
 from assembly.model.robot import Robot
 from assembly.solvers import conic
+from assembly.solvers.cones import cone_sizes
 from benchmarks.assembly_speed import paper_robot, workspace
 
 SAMPLE = 6  # points of the other solvers
@@ -71,7 +72,7 @@ def scaled(
 
 def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
     """Bounds of x if no closure held."""
-    reach = np.array([conic.cone_sizes(row, group).sum() for row in X])
+    reach = np.array([cone_sizes(row, group).sum() for row in X])
     return c - reach, c + reach
 
 
@@ -192,7 +193,7 @@ def _secant_node(
     x = c + X @ v
     # the dual value, whatever the solver's status: an upper bound
     dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
-    value = b[: len(k) + 6] @ z[: len(k) + 6] + conic.cone_sizes(dual, group).sum()
+    value = b[: len(k) + 6] @ z[: len(k) + 6] + cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x
 
 

@@ -26,7 +26,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.model.function import Function
 from assembly.robots import load_robot
-from assembly.solvers.conic import into_cones
+from assembly.solvers.cones import into_cones
 from tests.robots_for_tests import random_robot
 
 CAMPAIGNS = Path(__file__).parent / "campaigns"

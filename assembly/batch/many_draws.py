@@ -19,7 +19,7 @@ from assembly.model.clearance import (
     component_bounds,
     has_bounded_motion,
 )
-from assembly.solvers.conic import cone_starts
+from assembly.solvers.cones import cone_starts
 
 __all__ = ["OnePosture", "prepare_energies"]
 

@@ -21,7 +21,8 @@ from assembly.linear.reduction import complement, reduce_problem
 from assembly.linear.thresholds import INFEASIBLE, RANK
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
-from assembly.solvers.conic import SolverFailed, cone_starts
+from assembly.solvers.cones import cone_starts
+from assembly.solvers.conic import SolverFailed
 
 _CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
 

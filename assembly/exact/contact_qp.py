@@ -29,7 +29,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.solvers.conic import cone_sizes, minimise_energy
+from assembly.solvers.cones import cone_sizes
+from assembly.solvers.conic import minimise_energy
 
 AT_BOUNDARY = 1e-5  # [-] below size 1 within which a cone may be active
 _STEPS = 15  # of Newton's method on the active boundaries

@@ -43,7 +43,8 @@ from assembly.exact.dead_load import (
 )
 from assembly.exact.placement import Placement, place
 from assembly.linear.thresholds import ROWS_RANK, rank_tolerance
-from assembly.solvers.conic import SolverFailed, into_cones
+from assembly.solvers.cones import into_cones
+from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from assembly.exact.contact_qp import AT_BOUNDARY, boundary_normals, cone_multipliers
 from assembly.exact.dead_load import load_magnitudes
 from assembly.exact.descent import Expansion
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 
 _ANGLE_ROUNDING = 1e-5  # of a small residual: rounding of an angle
 

@@ -65,7 +65,7 @@ from assembly.model.clearance import (
     clearance_excess,
     has_bounded_motion,
 )
-from assembly.solvers.conic import into_cones
+from assembly.solvers.cones import into_cones
 from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
 from stiffness.screws import rotation_matrix, screw_map, transform
 

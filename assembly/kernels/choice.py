@@ -27,7 +27,7 @@ def levels_here() -> list[str]:
     Raises:
         ImportError: the compiled modules are not there.
     """
-    if platform.machine().lower() not in {"x86_64", "amd64"}:
+    if not _on_x86_64():
         return []
     highest = _load("_processor").level()
     return [name for name, level in LEVELS.items() if level <= highest]
@@ -49,11 +49,16 @@ def chosen() -> ModuleType:
             f"{_VARIABLE} is {quoted(wanted)}; expected a level that this processor "
             f"has, {', '.join(here) or 'of which there are none'}"
         )
-    if platform.machine().lower() not in {"x86_64", "amd64"}:
+    if not _on_x86_64():
         return _load("_portable")
     if not here:
         raise ImportError("forcefit needs a processor with SSE4.2, x86-64-v2")
     return _load("_" + (wanted or here[-1]).replace("-", "_"))
+
+
+def _on_x86_64() -> bool:
+    """Whether this processor is of that kind."""
+    return platform.machine().lower() in {"x86_64", "amd64"}
 
 
 def _load(name: str) -> ModuleType:

@@ -36,7 +36,7 @@ from assembly.linear.load import (
 from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 from assembly.solvers.method import Method
 from forcefit.inputs.display import (
     Figures,

@@ -33,7 +33,8 @@ from assembly.linear.thresholds import (
     rank_tolerance,
 )
 from assembly.model.clearance import has_bounded_motion
-from assembly.solvers.conic import into_cones, minimise_energy
+from assembly.solvers.cones import into_cones
+from assembly.solvers.conic import minimise_energy
 from stiffness.screws import skew
 
 _STILL = 1e-11  # [rad, m] a pose that moves less counts as fixed

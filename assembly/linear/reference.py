@@ -46,13 +46,8 @@ from assembly.model.clearance import (
     has_bounded_motion,
     scales_with_margin,
 )
-from assembly.solvers.conic import (
-    LeastEnergy,
-    cone_sizes,
-    cone_starts,
-    least_factor,
-    minimise_energy,
-)
+from assembly.solvers.cones import cone_sizes, cone_starts
+from assembly.solvers.conic import LeastEnergy, least_factor, minimise_energy
 
 _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 

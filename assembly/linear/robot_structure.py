@@ -15,7 +15,7 @@ from assembly.linear.closure import (
 )
 from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
 from assembly.model.robot import Robot
-from assembly.solvers.conic import cone_starts
+from assembly.solvers.cones import cone_starts
 
 
 class Structure(NamedTuple):

@@ -25,7 +25,8 @@ from assembly.linear.reach import (
     clearances_in,
     within_bounds,
 )
-from assembly.solvers.conic import SolverFailed, cone_sizes
+from assembly.solvers.cones import cone_sizes
+from assembly.solvers.conic import SolverFailed
 
 _WIDTH = 3e-5  # of a distance: upper minus lower bound
 _HELD = 0.1  # [-] of a cone: a load that leaves it more room does not hold it

@@ -24,7 +24,7 @@ from assembly.exact.contact_qp import boundary_normals
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] within which a clearance counts as at its bound
 _NEAR_BOUND = 1e-3  # [-] within which one may still be pressed, see ``contacts``

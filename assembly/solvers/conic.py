@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, hstack, vstack
 
 from assembly.solvers import one_problem
+from assembly.solvers.cones import cone_sizes, cone_starts, into_cones
 from assembly.solvers.method import Method
 from assembly.solvers.pressed_cones import refine
 
@@ -174,11 +175,6 @@ def _compiled(
     return u, -n, "Solved"
 
 
-def cone_starts(group: NDArray) -> NDArray:
-    """(cones + 1,) first column of each cone, and nu; of (nu,) cones in order."""
-    return np.append(0, np.cumsum(np.bincount(group)))
-
-
 def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
@@ -277,11 +273,6 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
     return float(spring @ h - spring @ spring / 2 + rigid @ k) - gain
 
 
-def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
-    """(cones,) Euclidean size of a vector's part in each cone."""
-    return np.sqrt(np.bincount(group, weights=values**2))
-
-
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
@@ -328,11 +319,6 @@ def least_factor(
     if x is None:
         raise SolverFailed("zone margin", status)
     return max(0.0, float(x[-1] * size)), x[:nu] * size, -z[:m] / rows
-
-
-def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Cones' vectors shortened to length 1 where they are longer."""
-    return u / np.maximum(1.0, cone_sizes(u, group))[group]
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:

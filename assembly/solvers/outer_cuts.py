@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from assembly.solvers.one_problem import Support
 
 _MOST = 400  # support functions
-# what every cut leaves beside the body, so that a flat one has corners, too: of the
+# what every cut leaves around the body, so that a flat one has corners, too: of the
 # tolerance, and at least of its size
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 

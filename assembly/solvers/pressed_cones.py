@@ -15,6 +15,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.solvers.cones import cone_sizes
+
 _STEPS = 4  # two are usual
 _SETTLED = 1e-12  # [-] a last step of the clearances
 _GUESSES = 6  # of the cones that are pressed; one is usual
@@ -40,7 +42,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
     """
     G, h, d, H, _, group = problem
     y = G @ u + h
-    force, slack = _sizes(G.T @ y - d - H.T @ n, group), 1.0 - _sizes(u, group)
+    force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
     # force times slack is about the solver's gap: one of the two is nearly zero
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
@@ -54,7 +56,7 @@ def _settled(
     """The minimum after cones were added that are left, and let go that pull."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
-        beyond = ~pressed & (_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
+        beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
         pulled = pressed & (forces < 0.0)
         if not (beyond | pulled).any():
             break
@@ -77,7 +79,7 @@ def _with_pressed(
             G @ u + h - y,
             G.T @ y - d - H.T @ n + N @ f,
             H @ u - k,
-            (_sizes(u, group)[held] ** 2 - 1.0) / 2,
+            (cone_sizes(u, group)[held] ** 2 - 1.0) / 2,
         ])  # fmt: skip
         A = _derivatives(G, H, N, member @ f)
         step = -np.linalg.lstsq(A, left, rcond=None)[0]
@@ -98,8 +100,3 @@ def _derivatives(G: NDArray, H: NDArray, N: NDArray, curvature: NDArray) -> NDAr
         [np.diag(curvature), G.T, -H.T, N],
         [np.vstack([H, N.T]), np.zeros((p + m, r + p + m))],
     ])  # fmt: skip
-
-
-def _sizes(values: NDArray, group: NDArray) -> NDArray:
-    """(cones,) Euclidean size of a vector's part in each cone."""
-    return np.sqrt(np.bincount(group, weights=values**2))

@@ -1,6 +1,6 @@
 """Files that one program at a time may write.
 
-The lock is the operating system's, on a file ``FILE.lock`` beside the file; it ends
+The lock is the operating system's, on a file ``FILE.lock`` next to the file; it ends
 with the program that holds it.  A killed one leaves ``FILE.lock``, which the next takes
 away.
 """
@@ -38,19 +38,19 @@ def locked_file(path: Path, wait: bool = True) -> Generator[None, None, None]:
 
 
 @contextmanager
-def _lock(beside: Path, wait: bool) -> Generator[None, None, None]:
-    """Hold the lock on a file that stands beside another, and is removed."""
+def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
+    """Hold the lock on a file that is there for that alone, and is removed."""
     try:
         from filelock import FileLock, Timeout
     except ModuleNotFoundError:  # the least that forcefit is installed with
         yield
         return
-    lock = FileLock(beside, thread_local=False, poll_interval=_POLL)
+    lock = FileLock(own, thread_local=False, poll_interval=_POLL)
     try:
         try:
             lock.acquire(timeout=-1 if wait else 0)
         except Timeout:
-            raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(beside)) from None
+            raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(own)) from None
         except OSError as error:
             if error.errno not in _NO_LOCKS:
                 raise
@@ -60,5 +60,5 @@ def _lock(beside: Path, wait: bool) -> Generator[None, None, None]:
         # where no open file can be removed (Windows), releasing it does that
         if lock.is_locked:
             with suppress(OSError):
-                beside.unlink()
+                own.unlink()
             lock.release()

@@ -21,7 +21,7 @@ from assembly.linear.closure import linearise
 from assembly.linear.reduction import reduce_problem
 from assembly.model.links import link_compliance
 from assembly.model.robot import Robot
-from assembly.solvers.conic import into_cones
+from assembly.solvers.cones import into_cones
 from validation.crosscheck.limits import extrapolate, limit_difference, limit_of
 from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check

@@ -27,7 +27,7 @@ from assembly.kinematics.se3 import inverse
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers.conic import into_cones
+from assembly.solvers.cones import into_cones
 from tests.assembly.exact.test_dead_load import heavy, some_loads
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns

@@ -13,7 +13,7 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.robots.irsbot2 import irsbot2
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
 

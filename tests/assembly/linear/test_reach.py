@@ -9,7 +9,8 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.reach import ReachableSet, loaded_cones, reachable_screws
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers.conic import SolverFailed, cone_sizes
+from assembly.solvers.cones import cone_sizes
+from assembly.solvers.conic import SolverFailed
 from tests.answers_for_tests import machine
 from tests.robots_for_tests import coaxial_beams
 

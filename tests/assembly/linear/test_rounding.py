@@ -11,7 +11,7 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.model.robot import Clearance
-from assembly.solvers.conic import cone_starts
+from assembly.solvers.cones import cone_starts
 from tests.robots_for_tests import coaxial_beams
 
 EPS = 2.0**-52

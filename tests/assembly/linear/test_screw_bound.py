@@ -14,7 +14,7 @@ from assembly.linear.reach import ReachableSet
 from assembly.linear.screw_bound import _extents, _room, bound_screw
 from assembly.model.robot import Clearance, Frame, MatrixLink
 from assembly.robots import load_robot
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 

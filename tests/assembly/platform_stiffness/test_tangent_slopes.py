@@ -9,7 +9,7 @@ from assembly.model.robot import Clearance, Frame, Robot
 from assembly.platform_stiffness.active_set import bound_forces, contacts, settle
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.tangent_slopes import TangentState
-from assembly.solvers.conic import cone_sizes
+from assembly.solvers.cones import cone_sizes
 from assembly.sweeps.parameters import design_of
 from assembly.sweeps.stiffness_slopes import stiffness_slopes
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from assembly.solvers import conic, one_problem
+from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import (
     GAP,
     GAP_WITHOUT_CLEARANCE,
@@ -17,8 +18,6 @@ from assembly.solvers.conic import (
     _compiled,
     _proved,
     _proves_no_point,
-    cone_sizes,
-    cone_starts,
     least_factor,
     minimise_energy,
 )

@@ -8,7 +8,8 @@ import pytest
 
 from assembly.linear.reach import ReachableSet
 from assembly.solvers import conic, one_problem
-from assembly.solvers.conic import ConeProgramme, cone_sizes, cone_starts
+from assembly.solvers.cones import cone_sizes, cone_starts
+from assembly.solvers.conic import ConeProgramme
 
 GROUP = np.array([0, 0, 1, 2, 2, 3])  # discs and intervals
 SPRINGS = 4

@@ -1,0 +1,19 @@
+"""Vectors of clearances by their cones, discs and intervals of radius 1."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def cone_starts(group: NDArray) -> NDArray:
+    """(cones + 1,) first column of each cone, and nu; of (nu,) cones in order."""
+    return np.append(0, np.cumsum(np.bincount(group)))
+
+
+def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
+    """(cones,) Euclidean size of a vector's part in each cone."""
+    return np.sqrt(np.bincount(group, weights=values**2))
+
+
+def into_cones(u: NDArray, group: NDArray) -> NDArray:
+    """Cones' vectors shortened to length 1 where they are longer."""
+    return u / np.maximum(1.0, cone_sizes(u, group))[group]
