@@ -39,7 +39,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import Posture, place_many, place_robot
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
@@ -167,9 +166,9 @@ def print_loaded(robot: Robot, postures: list[Posture], kappa: float) -> None:
         "ours, one at a time": timed(partial(solve_assembly, **loaded), own),
         "ours, batched": batched(together, own),
     }
-    one = prepare_energies(own[len(own) // 2], **loaded)
     errors = kappa * np.linspace(-1, 1, 2000)[:, None, None] * robot.errors
-    taken = batched(lambda robot, T, mismatch: one.solve(errors), own)
+    draw = partial(solve_assembly, own[len(own) // 2], **loaded, errors=errors)
+    taken = batched(lambda robot, T, mismatch: draw(), own)
     rows["ours, draws at one posture"] = taken * len(own) / len(errors)
     print_table(f"energy (22) under loads, errors times {kappa:g}", rows)
 

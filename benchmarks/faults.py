@@ -20,7 +20,7 @@ from random import Random
 ROOT = Path(__file__).parents[1]
 CHAPTERS = (
     "stiffness/beam", "stiffness/surface", "stiffness/mesh", "stiffness/fem",
-    "assembly/solvers", "assembly/kinematics", "assembly/linear", "assembly/batch",
+    "assembly/solvers", "assembly/kinematics", "assembly/linear",
     "assembly/exact", "assembly/measurement", "assembly/effects",
     "assembly/statistics", "validation/diagnosis",
 )  # fmt: skip

@@ -4,9 +4,8 @@ The paper's robot, every delta l of its section IV drawn: uniform, random signs,
 up to a share of the paper's.  Printed for each share: how many of the draws cost
 nothing, how many were certified and how many needed the fallback; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
-the machine does not blur; draws per second of the clock on two threads; and the batched
-solver of :mod:`assembly.linear.energy`, which reduces each draw anew, per second
-of processor. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+the machine does not blur; and draws per second of the clock on two threads.
+``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
 import sys
@@ -17,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from assembly.batch.many_draws import OnePosture, prepare_energies
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import minimise_energies
 from assembly.model.error_distributions import ErrorSources
 from assembly.model.random_errors import frames_named
 from assembly.robots import load_robot
+from assembly.statistics.one_posture import OnePosture, prepare_energies
 
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
@@ -72,23 +70,16 @@ def main() -> None:
     print(f"{blocks * BLOCK} draws a line; goal {TARGET:.0e} in {GOAL:.0f} s")
     print(
         "errors  no energy  certified  fallback  per core s  1e7, 2 cores [s]  "
-        "2 threads, per s  batch, per core s"
+        "2 threads, per s"
     )
     for share in SHARES:
         sources = paper_sources(share)
-        solve_block(one, sources, 0)  # compiled before the clock starts
+        solve_block(one, sources, 0)  # loaded before the clock starts
         single, _, (without, certified, fallback) = run(one, sources, blocks, 1)
         _, double, _ = run(one, sources, blocks, 2)
-        few = sources.errors(sources.draw(0, 1000, seed=1))
-        T = np.repeat(posture.transforms[None], len(few), axis=0)
-        minimise_energies(posture.robot, T[:1], few[:1])
-        start = time.process_time()
-        minimise_energies(posture.robot, T, few)
-        batch = len(few) / (time.process_time() - start)
         print(
             f"{share:6.2f}  {without:9.3f}  {certified:9.5f}  {fallback:8.4f}  "
-            f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}  "
-            f"{batch:18.0f}"
+            f"{single:10.0f}  {TARGET / single / 2:17.0f}  {double:16.0f}"
         )
 
 

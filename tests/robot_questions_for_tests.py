@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.nominal import motion_screws, size_of
 from assembly.kinematics.pieces import cut_beams
 from assembly.kinematics.posture import place_many, place_many_joints, place_robot
@@ -36,6 +34,8 @@ from assembly.statistics.allocation import allocate
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.tolerances import present_errors, present_text

@@ -16,7 +16,7 @@ FLOORS = (
     "stiffness/screws", "stiffness/link", "stiffness/beam", "stiffness/surface",
     "stiffness/mesh", "stiffness/fem", "stiffness/report", "stiffness/exchange",
     "assembly/kernels", "assembly/solvers", "assembly/model", "assembly/kinematics",
-    "assembly/linear", "assembly/batch", "assembly/exact",
+    "assembly/linear", "assembly/exact",
     "assembly/platform_stiffness", "assembly/report", "assembly/measurement",
     "assembly/effects", "assembly/files", "assembly/robots", "assembly/exchange",
     "assembly/sweeps",

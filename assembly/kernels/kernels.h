@@ -37,13 +37,6 @@ int64_t farthest(const AskedBody &asked, double *bounds, double *screw);
 // Follows every target along its straight line.
 void follow_all(const Tree &tree, const Targets &targets, Tracks &out);
 
-// Least energies (22) of `count` draws, rows of h (count, r).
-void least_energies(
-    const Reduced &reduced, const double *h, int64_t count, DrawEnergies &out);
-
-// Least margins (21) of draws.
-void least_margins(const SharedRows &given, DrawMargins &out);
-
 // Farthest points of a set along directions.
 void farthest_points(const Directions &asked, FarthestPoints &out);
 

@@ -20,13 +20,13 @@ struct Robot {
     int64_t n, closures, np, ny, ng, nu, cones, nq;
 };
 
-// Points: (k, n, 4, 4) frames, (k or 1, n, 6) errors, (k,) nominal closure errors; (k, 2,
-// n, 6) loads on bodies and on joints, in the frames' axes, or none.
+// Points: (k or 1, n, 4, 4) frames with as many nominal closure errors, (k or 1, n, 6)
+// errors; (k or 1, 2, n, 6) loads on bodies and on joints, in the frames' axes, or none.
+// One row serves all points, where each has no own: 0 for 1.
 struct Points {
     int64_t count;
-    const double *T, *errors, *mismatch;
-    int64_t own_errors;
-    const double *loads;
+    const double *T, *mismatch, *errors, *loads;
+    int64_t own_posture, own_errors, own_loads;
 };
 
 // assembly/linear/solutions.py's Solutions, one row a point; no `elastic` where nobody
@@ -37,9 +37,10 @@ struct Solutions {
         *motions, *multipliers, *residual, *elastic;
 };
 
-// Margins (21) and their bounds, one a point.
+// Margins (21), their bounds, and the forces (k, nu) on clearances that prove these: their
+// sizes on all cones add up to 1; one row a point.
 struct Margins {
-    double *margin, *bound;
+    double *margin, *bound, *forces;
     int64_t *outcome;
 };
 
@@ -136,41 +137,6 @@ struct Targets {
 // (k, n) coordinates, (k,) progress, (k, n, 4, 4) frames, (k, closures) left open.
 struct Tracks {
     double *ends, *progress, *transforms, *still_open;
-};
-
-// What all draws of the errors at a posture share.
-struct Reduced {
-    int64_t nu, r, cones;
-    const double *Gt;       // (nu, r)
-    const int64_t *starts;
-    const double *inverse;  // (nu, r) pseudoinverse of G
-    const double *forces;   // (nu, r) `cones`
-    const double *gram;
-    bool loaded;            // else d is none
-    const double *d;        // (nu,) what clearances carry under the loads
-    double slip;            // [per size of y] how much free motions may gain by rounding
-    double slack;           // the same whatever y is
-    double stored;          // energy that loads alone bend
-};
-
-// The draws' answers, one row each.
-struct DrawEnergies {
-    double *u, *y, *energy, *bound;
-    int64_t *outcome;
-};
-
-// Rows B (p, nu), orthonormal, that draws at a posture share in (21), with a right side w
-// (count, p) for each.
-struct SharedRows {
-    int64_t count, p, cones;
-    const int64_t *starts;  // (cones + 1,)
-    const double *rows, *right;
-};
-
-// One row a draw: the margin, NaN where its certificate falls short; its certified lower
-// bound; multipliers (count, p) that prove it, multipliers.w = bound.
-struct DrawMargins {
-    double *margin, *bound, *multipliers;
 };
 
 // Unit cones of positions u (nu,), and in columns (nu, n) the axes M of Dikin's ellipsoid

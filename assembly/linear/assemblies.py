@@ -191,8 +191,8 @@ def excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
     """(k,) [-] by how much the worst of clearances (k, nu) leaves its cone."""
     if not clearances.shape[1]:
         return np.zeros(len(clearances))
-    sizes = np.sqrt(np.add.reduceat(clearances**2, starts[:-1], axis=1))
-    return np.maximum(0.0, sizes.max(axis=1) - 1.0)
+    squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)
+    return np.maximum(0.0, np.sqrt(squares.max(axis=0)) - 1.0)
 
 
 def solve_again(energies: Assemblies, i: int) -> None:

@@ -116,8 +116,6 @@ def solve_assembly(
     postures = [posture] if isinstance(posture, Posture) else list(posture)
     robot = postures[0].robot
     sets = None if errors is None else np.asarray(errors, dtype=float)
-    if sets is not None and len(postures) == 1:
-        postures = postures * len(sets)
     T = np.array([p.transforms for p in postures])
     mismatch = np.array([p.mismatch for p in postures])
     if load is None and bodies is None and gravity is None:
@@ -201,7 +199,7 @@ def _any_load(loads: NDArray | None, count: int) -> NDArray:
     """(k,) bool: which points are under loads."""
     if loads is None:
         return np.zeros(count, dtype=bool)
-    return np.any(loads, axis=(1, 2, 3))
+    return np.broadcast_to(np.any(loads, axis=(1, 2, 3)), (count,))
 
 
 def _solve_compiled(
@@ -210,7 +208,7 @@ def _solve_compiled(
 ) -> Solutions:  # fmt: skip
     """Rows of k points, and of the deformations of so many springs."""
     joints, structure = structure_of(robot, compliant)
-    count = len(T)
+    count = len(errors) if len(T) == 1 else len(T)
     out = Solutions(
         outcome=np.zeros(count, dtype=np.int64),
         energy=np.zeros(count),
@@ -232,7 +230,7 @@ def _solve_compiled(
     elif loads is None:
         _fill(given, None)
     else:  # points that no load acts on have the bits of those without
-        loaded = _any_load(loads, count)
+        loaded = _any_load(loads, len(loads))
         for some, acting in ((loaded, loads), (~loaded, None)):
             if some.all():
                 _fill(given, acting)
@@ -274,9 +272,11 @@ def minimise_energies(
     Args:
         robot: of n frames.
         transforms: (k, n, 4, 4) frames seen from the base, as of
-            :attr:`~assembly.kinematics.posture.Posture.transforms`.
+            :attr:`~assembly.kinematics.posture.Posture.transforms`; one row serves k
+            sets of errors.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
+            closure error of the frames.
         compliant: ``"elastic"``, or ``"hinged"``: compliant joints turn freely about
             their own axis, see :func:`assembly.linear.closure.virtual_joints`.
         method: as of :func:`solve_assembly`.
@@ -293,7 +293,8 @@ def minimise_energies(
     T = np.require(transforms, dtype=float, requirements=["C", "W"])
     count, n = len(T), len(robot.frames)
     errors = robot.errors if errors is None else np.asarray(errors, dtype=float)
-    if T.shape != (count, n, 4, 4) or errors.shape not in {(n, 6), (count, n, 6)}:
+    sets = len(errors) if count == 1 and errors.ndim == 3 else count
+    if T.shape != (count, n, 4, 4) or errors.shape not in {(n, 6), (sets, n, 6)}:
         raise ValueError(
             f"minimise_energies: transforms have shape {T.shape} and errors "
             f"{errors.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or (k, {n}, 6)"
@@ -323,11 +324,14 @@ def minimise_under_loads(
 
     Args:
         robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base.
-        loads: (6n,) or (k, 6n), as of :func:`assembly.linear.load.loads_on_frames`.
+        transforms: (k, n, 4, 4) frames seen from the base; one row serves k sets of
+            errors.
+        loads: (6n,), or a row for each of ``transforms``, as of
+            :func:`assembly.linear.load.loads_on_frames`.
         one: solves a point by itself, by the same method.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
+            closure error of the frames.
         method: as of :func:`solve_assembly`.
 
     Returns:
@@ -347,7 +351,7 @@ def _minimise_all(
     """All points compiled, unless asked otherwise; one by one what that leaves."""
     joints, structure = structure_of(robot, compliant)
     out = _solve_compiled(robot, T, errors, off, compliant, 0, loads, method)
-    count = len(T)
+    count = len(out.outcome)
     energies = Assemblies(
         energy=out.energy,
         bound=out.bound,
@@ -384,4 +388,6 @@ def _posture_at(
     own = robot.errors if errors is None else errors[i if len(errors) > 1 else 0]
     # one robot for all where the errors are its own: its columns are cached
     erring = robot if np.array_equal(own, robot.errors) else robot.with_errors(own)
-    return Posture(erring, np.full(len(robot.frames), np.nan), T[i], float(mismatch[i]))
+    where = i if len(T) > 1 else 0
+    unknown = np.full(len(robot.frames), np.nan)
+    return Posture(erring, unknown, T[where], float(mismatch[where]))

@@ -27,9 +27,9 @@ def assemble_side_by_side(
 
     Args:
         structure: the robot.
-        T: (k, n, 4, 4) frames.
-        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
-        mismatch: (k,) [rad, m] nominal closure error of the frames.
+        T: (k, n, 4, 4) frames; of these and what follows one row serves all.
+        errors: (k, n, 6) [rad, m].
+        mismatch: [rad, m] nominal closure errors of the frames, as many.
         out: arrays to fill.
         loads: (k, 2, n, 6) [N m, N] on bodies and on joints in the frames' axes.
 
@@ -41,16 +41,18 @@ def assemble_side_by_side(
 
 def margins_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: tuple[NDArray, NDArray, NDArray],
+    out: tuple[NDArray, NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
     """Margins of all points, with their lower bounds.
 
     Args:
         structure: the robot, without springs.
-        T: (k, n, 4, 4) frames.
-        errors: (k, n, 6) [rad, m], or (1, n, 6) for all.
-        mismatch: (k,) [rad, m] nominal closure error of the frames.
-        out: (k,) margins, their bounds, and outcomes, SOLVED or FALLBACK, to fill.
+        T: (k, n, 4, 4) frames; of these and what follows one row serves all.
+        errors: (k, n, 6) [rad, m].
+        mismatch: [rad, m] nominal closure errors of the frames, as many.
+        out: to fill: (k,) margins, their bounds, (k, nu) forces on the clearances that
+            prove these, sizes on all cones adding up to 1, and (k,) outcomes, SOLVED or
+            FALLBACK.
 
     Raises:
         ValueError: as above.

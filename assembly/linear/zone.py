@@ -76,6 +76,9 @@ class Margins(PointResults[Zone]):
         bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
             method solved.
         method: (k,) which gave it: ``"compiled"`` or ``"reference"``.
+        forces: (k, nu) on the clearances, in units that each cone's size works: what
+            proves the bound, sizes of all cones adding up to 1; zero where no clearance
+            is needed, NaN where the reference solved.
         reason: (k,) message where the solver failed, or what of the margin is not
             proved; else empty.
     """
@@ -83,6 +86,7 @@ class Margins(PointResults[Zone]):
     margin: NDArray
     bound: NDArray
     method: NDArray
+    forces: NDArray
     reason: NDArray
 
     VARIABLES: ClassVar = {
@@ -149,14 +153,14 @@ def zone_margin(
     if isinstance(posture, Posture) and errors is None:
         checked_size(posture.robot)
         T, off = posture.transforms[None], np.array([posture.mismatch])
-        margin, bound, left = _compiled(posture.robot, T, compliant, off, None, method)
+        margin, bound, _, left = _compiled(
+            posture.robot, T, compliant, off, None, method
+        )
         if left[0]:
             return Zone(*least_margin(posture, compliant), "reference")
         return Zone(float(margin[0]), float(bound[0]), "compiled")
     postures = [posture] if isinstance(posture, Posture) else list(posture)
     sets = None if errors is None else np.asarray(errors, dtype=float)
-    if sets is not None and len(postures) == 1:
-        postures = postures * len(sets)
     return zone_margins(
         postures[0].robot, np.array([p.transforms for p in postures]), compliant,
         np.array([p.mismatch for p in postures]), sets, method,
@@ -172,9 +176,11 @@ def zone_margins(
 
     Args:
         robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base.
+        transforms: (k, n, 4, 4) frames seen from the base; one row serves k sets of
+            errors.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
-        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
+            closure error of the frames.
         errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
         method: as of :func:`zone_margin`.
 
@@ -188,15 +194,15 @@ def zone_margins(
     T = np.asarray(transforms, dtype=float)
     off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
     own = None if errors is None else np.asarray(errors, dtype=float)
-    margin, bound, left = _compiled(robot, T, compliant, off, own, method)
-    reason = np.full(len(T), "", dtype=object)
+    margin, bound, forces, left = _compiled(robot, T, compliant, off, own, method)
+    forces[left] = np.nan
+    reason = np.full(len(margin), "", dtype=object)
     for i in np.flatnonzero(left).tolist():
         erring = robot
         if own is not None:
             erring = robot.with_errors(own if own.ndim == 2 else own[i])
-        posture = Posture(
-            erring, np.full(len(robot.frames), np.nan), T[i], float(off[i])
-        )
+        unknown, where = np.full(len(robot.frames), np.nan), i if len(T) > 1 else 0
+        posture = Posture(erring, unknown, T[where], float(off[where]))
         margin[i] = bound[i] = np.nan
         try:
             zone = Zone(*least_margin(posture, compliant), "reference")
@@ -207,24 +213,26 @@ def zone_margins(
         margin[i] = np.inf if zone.margin is None else zone.margin
         bound[i] = np.inf if zone.bound is None else zone.bound
     gave = np.where(left, "reference", "compiled").astype(object)
-    return Margins(margin, bound, gave, reason)
+    return Margins(margin, bound, gave, forces, reason)
 
 
 def _compiled(
     robot: Robot, T: NDArray, compliant: Compliant, mismatch: NDArray,
     errors: NDArray | None, method: Method,
-) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """(k,) margins, their bounds, and whether each is left to the reference."""
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:  # fmt: skip
+    """Margins, their bounds and forces, and whether each is left to the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     own = robot.errors if errors is None else errors
-    margin, bound = np.full((2, len(T)), np.nan)
-    outcome = np.full(len(T), FALLBACK)
-    if method == "reference":
-        return margin, bound, outcome > SOLVED
-    if not own.any():  # no clearance is needed
-        return np.zeros(len(T)), np.zeros(len(T)), np.zeros(len(T), dtype=bool)
     joints, structure = structure_of(robot, compliant)
+    count = len(own) if len(T) == 1 and own.ndim == 3 else len(T)
+    forces = np.zeros((count, joints.cones.shape[1]))
+    margin, bound = np.full((2, count), np.nan)
+    outcome = np.full(count, FALLBACK)
+    if method == "reference":
+        return margin, bound, forces, outcome > SOLVED
+    if not own.any():  # no clearance is needed
+        return *np.zeros((2, count)), forces, np.zeros(count, dtype=bool)
     if joints.scaled.all():
         # writable and in C order, whatever comes: the kernels are compiled for one kind
         points = (
@@ -232,5 +240,5 @@ def _compiled(
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),
             mismatch,
         )
-        margins_side_by_side(structure, *points, (margin, bound, outcome))
-    return margin, bound, outcome > SOLVED
+        margins_side_by_side(structure, *points, (margin, bound, forces, outcome))
+    return margin, bound, forces, outcome > SOLVED

@@ -11,13 +11,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
 from assembly.linear.reach import reachable_screws
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.reference import CannotAssemble
 from assembly.linear.thresholds import UNBOUNDED, rank_tolerance
 from assembly.solvers.conic import SolverFailed
+from assembly.statistics.one_posture import Draws, OnePosture
 
 READING = "frozen"  # every spring as in the solution of (22)
 
@@ -44,8 +43,7 @@ def draws_at_bounds(prepared: OnePosture, draws: Draws) -> NDArray:
     nu = prepared.starts[-1]
     motions = prepared.motions[limited]
     middle = draws.errors.reshape(len(solved), -1) @ motions[:, nu:].T
-    if prepared.loads is not None:
-        middle += prepared.loads.motions[limited]
+    middle += prepared.load_motions[limited]
     by_cone = np.add.reduceat(motions[:, :nu] ** 2, prepared.starts[:-1], axis=1)
     reach = np.abs(middle) + (np.sqrt(by_cone).sum(axis=1) if nu else 0.0)
     return active | (solved & (reach > prepared.ranges[limited]).any(axis=1))

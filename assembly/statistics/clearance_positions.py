@@ -22,12 +22,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
 from assembly.kinematics.nominal import size_of
 from assembly.model.robot import Robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.bounded_motion import bounded_position, draws_at_bounds
+from assembly.statistics.one_posture import Draws, OnePosture
 
 # the option --play and its explanation
 CLEARANCE_MODELS = {
@@ -50,7 +49,7 @@ def position_clearances(
 
     Args:
         prepared: the posture.
-        draws: of :meth:`~assembly.batch.many_draws.OnePosture.solve`, k draws.
+        draws: of :meth:`~assembly.statistics.one_posture.OnePosture.solve`, k draws.
         clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
         generators: of random numbers, one for each draw; none for "least".
         contact_length: [m] of the contact model, see :func:`contact_length_of`.
@@ -201,7 +200,7 @@ def loaded_clearances(prepared: OnePosture, draws: Draws) -> NDArray:
     """(k, nu) bool: clearances loaded at their bound, by strict complementarity."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
-        forces += prepared.loads.frame_loads.joint @ prepared.joints.cones
+        forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
     # force times slack is about the solver's gap: one of the two is nearly zero

@@ -7,8 +7,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_draws import OnePosture, prepare_energies
-from assembly.batch.many_margins import PostureMargins, prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reduction import FreeMotion
@@ -21,6 +19,8 @@ from assembly.statistics.clearance_positions import (
     contact_length_of,
     position_clearances,
 )
+from assembly.statistics.one_posture import OnePosture, prepare_energies
+from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors

@@ -10,11 +10,10 @@ draws: where the answer is linear each draw has the same.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import SaltelliDesign
+from assembly.statistics.one_posture import Draws, OnePosture
 from assembly.statistics.sensitivity import solution_slopes
 
 DRAWS = 32  # whose slopes are averaged

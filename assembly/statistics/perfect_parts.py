@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_draws import OnePosture
 from assembly.model.clearance import BOUND_OF_COMPONENT
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.one_posture import OnePosture
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import kind_of
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes

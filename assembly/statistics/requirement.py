@@ -7,11 +7,11 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import Posture
 from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.replay import Replay
 from assembly.statistics.responses import respond

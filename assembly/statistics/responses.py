@@ -3,15 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
-from assembly.batch.many_margins import PostureMargins
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
 )
+from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes

@@ -19,10 +19,9 @@ gives the slopes with any number of errors (adjoint method).
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
 from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
+from assembly.statistics.one_posture import Draws, OnePosture
 
 _ACTIVE = 1e-7  # of the largest force on any cone: less is none
 _RANK = 1e-10  # of the equations: directions left undetermined do not move
@@ -61,12 +60,12 @@ def solution_slopes(
         a clearance is weakly active.  Undetermined clearances do not move; a passive
         joint at the end of its motion is treated as if its motion had no bound.
     """
-    A, nu, k = prepared.closures, len(prepared.cones), len(draws.energy)
+    A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
     closure_columns = A @ prepared.joints.cones
     H = prepared.redundant.T @ closure_columns
     forces = draws.multipliers @ closure_columns
     if prepared.loads is not None:
-        forces += prepared.loads.frame_loads.joint @ prepared.joints.cones
+        forces += prepared.loads.joint @ prepared.joints.cones
     P, N = _active_clearances(prepared, draws, forces)
     size = nu + len(H)
     K = np.zeros((k, size, size))

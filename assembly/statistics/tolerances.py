@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import Posture, place_many
 from assembly.kinematics.verdict import SINGULAR, SINGULAR_WORDS, verdicts
@@ -16,6 +15,7 @@ from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 from assembly.solvers.conic import SolverFailed
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.requirement import Plan
 from assembly.statistics.sensitivity import energy_slopes
 from assembly.sweeps.identity import program_hash, robot_hash

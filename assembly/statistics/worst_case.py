@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.many_draws import OnePosture
-from assembly.batch.many_margins import PostureMargins
 from assembly.model.error_distributions import ErrorSources
+from assembly.statistics.one_posture import OnePosture
+from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.responses import respond
 
 CORNERS = 24  # to start from

@@ -15,8 +15,6 @@ are free.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.batch.draws import Draws
-from assembly.batch.many_draws import OnePosture
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reduction import FreeMotion
@@ -27,6 +25,7 @@ from assembly.statistics.clearance_positions import (
     free_starts,
     loaded_clearances,
 )
+from assembly.statistics.one_posture import Draws, OnePosture
 from assembly.statistics.quantities import POSE_ERRORS
 
 READING = "frozen"

@@ -14,9 +14,12 @@ using namespace LANE_SPACE;
 
 void assemble_all(const Robot &robot, const Points &points, Solutions &out) {
     Energies energies(robot, points);
-    in_blocks(all_of(points.count), [&](const Block &block, Whole pending) {
+    const auto solve = [&](const Block &block, Whole pending) {
         return energies.solve(points, block, pending, out);
-    });
+    };
+    in_blocks(all_of(points.count), solve);
+    energies.postpones = false;
+    in_blocks(energies.waiting, solve);
 }
 
 // Of robots without springs.

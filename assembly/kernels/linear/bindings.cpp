@@ -42,16 +42,18 @@ KeptRobot robot_of(nb::object s) {
     return {std::move(s), r};
 }
 
-// Frames, their errors, and the closure error that they have already.
+// Frames, the closure error that they have already, and their errors: of each point, or
+// one row for all.
 Points points_of(
     const Robot &r, nb::handle T, nb::handle errors, nb::handle mismatch, Size &k) {
-    Size sets;
+    Size postures, sets;
     Points points = {};
-    points.T = reals(T, "T", k, r.n, 4, 4);
+    points.T = reals(T, "T", postures, r.n, 4, 4);
+    points.mismatch = reals(mismatch, "mismatch", postures);
     points.errors = reals(errors, "errors", sets, r.n, 6);
-    if (sets.value != k.value && sets.value != 1) reals(errors, "errors", k, r.n, 6);
-    points.own_errors = sets.value > 1;
-    points.mismatch = reals(mismatch, "mismatch", k);
+    points.own_posture = postures.value != 1, points.own_errors = sets.value != 1;
+    k = points.own_posture ? postures : sets;
+    if (points.own_errors) reals(errors, "errors", k, r.n, 6);
     points.count = k.value;
     return points;
 }
@@ -65,7 +67,12 @@ void call_assemble_all(
     const Robot &r = of.robot;
     Size k, rows, columns;
     Points points = points_of(r, T, errors, mismatch, k);
-    if (!loads.is_none()) points.loads = reals(loads, "loads", k, 2, r.n, 6);
+    if (!loads.is_none()) {
+        Size acting;
+        points.loads = reals(loads, "loads", acting, 2, r.n, 6);
+        points.own_loads = acting.value != 1;
+        if (points.own_loads) reals(loads, "loads", k, 2, r.n, 6);
+    }
     Solutions out;
     out.outcome = address<int64_t>(outcome, "outcome", k);
     out.energy = address<double>(energy, "energy", k);
@@ -88,11 +95,12 @@ void call_assemble_all(
 
 void call_all_margins(
     const KeptRobot &of, nb::handle T, nb::handle errors, nb::handle mismatch,
-    nb::handle margin, nb::handle bound, nb::handle outcome) {
+    nb::handle margin, nb::handle bound, nb::handle forces, nb::handle outcome) {
     Size k;
     const Points points = points_of(of.robot, T, errors, mismatch, k);
     Margins out = {
         address<double>(margin, "margin", k), address<double>(bound, "bound", k),
+        address<double>(forces, "forces", k, of.robot.nu),
         address<int64_t>(outcome, "outcome", k)};
     const nb::gil_scoped_release others;
     if (points.count <= 2)
@@ -145,46 +153,6 @@ void call_comply_all(
     comply_all(of.robot, points, out);
 }
 
-void call_least_energies(
-    nb::handle Gt, nb::handle cones, nb::handle inverse, nb::handle forces,
-    nb::handle gram, nb::handle d, double slip, double slack, double stored, nb::handle h,
-    nb::handle u, nb::handle y, nb::handle energy, nb::handle bound, nb::handle outcome) {
-    Size nu, r, ends, k;
-    Reduced own;
-    own.Gt = reals(Gt, "Gt", nu, r);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.inverse = reals(inverse, "inverse", nu, r);
-    own.forces = reals(forces, "forces", nu, r);
-    own.gram = reals(gram, "gram", r, r);
-    own.loaded = !d.is_none();
-    own.d = own.loaded ? reals(d, "d", nu) : nullptr;
-    own.nu = nu.value, own.r = r.value, own.cones = ends.value - 1;
-    own.slip = slip, own.slack = slack, own.stored = stored;
-    const double *rows = reals(h, "h", k, r);
-    DrawEnergies out = {
-        address<double>(u, "u", k, nu), address<double>(y, "y", k, r),
-        address<double>(energy, "energy", k), address<double>(bound, "bound", k),
-        address<int64_t>(outcome, "outcome", k)};
-    const nb::gil_scoped_release others;
-    least_energies(own, rows, k.value, out);
-}
-
-void call_least_margins(
-    nb::handle B, nb::handle cones, nb::handle right, nb::handle margin,
-    nb::handle bound, nb::handle multipliers) {
-    Size p, nu, ends, k;
-    SharedRows own;
-    own.rows = reals(B, "B", p, nu);
-    own.starts = starts(cones, "starts", nu.value, true, ends);
-    own.right = reals(right, "right", k, p);
-    own.count = k.value, own.p = p.value, own.cones = ends.value - 1;
-    DrawMargins out = {
-        address<double>(margin, "margin", k), address<double>(bound, "bound", k),
-        address<double>(multipliers, "multipliers", k, p)};
-    const nb::gil_scoped_release others;
-    least_margins(own, out);
-}
-
 }  // namespace
 
 void bind_linear(nb::module_ &m) {
@@ -200,7 +168,7 @@ void bind_linear(nb::module_ &m) {
     m.def(
         "all_margins", &call_all_margins,
         nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
-        nb::arg("margin"), nb::arg("bound"), nb::arg("outcome"));
+        nb::arg("margin"), nb::arg("bound"), nb::arg("forces"), nb::arg("outcome"));
     m.def(
         "bound_all", &call_bound_all,
         nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
@@ -214,14 +182,4 @@ void bind_linear(nb::module_ &m) {
         "comply_all", &call_comply_all,
         nb::arg("robot"), nb::arg("T"), nb::arg("errors"), nb::arg("mismatch"),
         nb::arg("springs"), nb::arg("status"));
-    m.def(
-        "least_energies", &call_least_energies,
-        nb::arg("Gt"), nb::arg("starts"), nb::arg("inverse"), nb::arg("forces"),
-        nb::arg("gram"), nb::arg("d").none(), nb::arg("slip"), nb::arg("slack"),
-        nb::arg("stored"), nb::arg("h"), nb::arg("u"), nb::arg("y"), nb::arg("energy"),
-        nb::arg("bound"), nb::arg("outcome"));
-    m.def(
-        "least_margins", &call_least_margins,
-        nb::arg("B"), nb::arg("starts"), nb::arg("right"), nb::arg("margin"),
-        nb::arg("bound"), nb::arg("multipliers"));
 }

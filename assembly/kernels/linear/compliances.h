@@ -36,8 +36,7 @@ inline Whole Compliance::comply(
     };
     Whole others = asked;
     read(points, block);
-    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Ranks ranks = eliminate(tolerance, asked);
+    const Ranks ranks = eliminate(tolerance(points, block), asked);
     others &= settle(ranks.unclear, UNCLEAR);
     if (!any(asked = ranks.same)) return others;
     const int rank = ranks.free, r = ranks.springs;

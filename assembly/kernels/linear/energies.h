@@ -22,15 +22,28 @@ constexpr double STOP = 3e-3;  // the solvers stop at this fraction of the accep
 class Energies : public Loaded {
 public:
     Energies(const Robot &s, const Points &points)
-        : Loaded(s, points), solver(cones, m), v(m) {}
+        : Loaded(s, points), postpones(!points.own_posture), solver(cones, m), v(m),
+          G(m, nu), unfelt(m, m) {}
+
+    // Where one posture serves all, points wait for others that need the interior point
+    // too, unless all of a block do: no lane is idle.
+    bool postpones;
+    std::vector<int64_t> waiting;
 
     Whole solve(const Points &points, const Block &block, Whole asked, Solutions &out);
 
 private:
     Solver solver;
     Row v;  // G u + h
+    // kept while the posture stays
+    int64_t prepared = -1;  // at which change of it
+    Table G, unfelt;        // of Z's other rows, orthonormal: nothing feels them
+    Whole stuck;            // clearances enter rows that no spring enters
 
+    void prepare(int r, int count);
+    Whole stuck_clearances(int rank, int count);
     Whole rigid_rows(int rank, int count, Real tolerance);
+    bool waits(Whole left, Whole asked) const { return postpones && any(asked & ~left); }
     Whole minimise(int r, Whole asked);
     Row least_multipliers(int r, int count);
     void own_springs(
@@ -41,8 +54,8 @@ private:
         int r, const Row &grouped, const Row &motions, const Row &multipliers);
 };
 
-// Lanes where clearances or errors enter rows that no spring enters.
-inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
+// Lanes where clearances enter rows that no spring enters.
+inline Whole Energies::stuck_clearances(int rank, int count) {
     Array<Real> most(np), sizes(nu);
     for (int g = 0; g < np; ++g)
         for (int i = rank; slot[g] >= 0 && i < count; ++i)
@@ -61,15 +74,44 @@ inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
             worst = near ? larger(magnitude(total), worst) : worst;
         }
     }
-    Whole rigid = worst > limit;
+    return worst > limit;
+}
+
+// Lanes where clearances or errors do.
+inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
+    Whole rigid = stuck;
     const Real allowed = 1e-12 / CLEAR + tolerance * largest_error;
     for (int i = rank; i < count; ++i)  // written so that NaN is rigid
         rigid |= ~(magnitude(inner(known.data(), Z[i], m)) <= allowed);
     return rigid;
 }
 
+// What depends on the posture alone, and G and h.
+inline void Energies::prepare(int r, int count) {
+    if (!posture.empty() && prepared == changes) {
+        right_sides(r);
+        for (int i = 0; i < r; ++i) std::copy(G[i], G[i] + nu, programme.M[i]);
+        return;
+    }
+    prepared = changes;
+    stuck = stuck_clearances(r, count);
+    small_problem(r);
+    for (int i = 0; i < r; ++i) std::copy(programme.M[i], programme.M[i] + nu, G[i]);
+    for (int i = 0; i < count - r; ++i) {
+        Real *own = unfelt[i];
+        std::copy(Z[r + i], Z[r + i] + m, own);
+        for (int l = 0; l < i; ++l) {
+            const Real along = inner(unfelt[l], own, m);
+            for (int a = 0; a < m; ++a) own[a] -= along * unfelt[l][a];
+        }
+        const Real over = 1.0 / root(inner(own, own, m));
+        for (int a = 0; a < m; ++a) own[a] *= over;
+    }
+}
+
 // Least |G u + h|^2 / 2 - d.u: u, v = G u + h, and the multipliers y.  Newton alone where
-// all constraints are active, else after an interior point.  Returns the outcomes.
+// all constraints are active, else after an interior point, unless these wait.
+// Returns the outcomes.
 inline Whole Energies::minimise(int r, Whole asked) {
     Programme &q = programme;
     Real square = inner(q.h.data(), q.h.data(), r), size = square;
@@ -104,7 +146,7 @@ inline Whole Energies::minimise(int r, Whole asked) {
         for (int c = 0; c < nu; ++c) q.d[c] *= over * over;
     }
     const Whole left = asked & ~solver.newton_alone(q, STOP * GAP, absolute, asked);
-    solver.interior_then_newton(q, STOP * GAP, absolute, near, left);
+    if (!waits(left, asked)) solver.interior_then_newton(q, STOP * GAP, absolute, near, left);
     multiply(q.M.rows(), r, q.u.data(), nu, v.data());
     for (int i = 0; i < r; ++i) {
         v[i] = (v[i] + q.h[i]) * size;
@@ -119,17 +161,8 @@ inline Whole Energies::minimise(int r, Whole asked) {
 inline Row Energies::least_multipliers(int r, int count) {
     Row multipliers = loaded ? holding : Row(m);
     combine(Z.data(), r, programme.y.data(), m, multipliers.data());
-    // nothing feels those along Z's other rows, made orthonormal here
-    Table unfelt(count - r, m);
     for (int i = 0; i < count - r; ++i) {
-        Real *own = unfelt[i];
-        std::copy(Z[r + i], Z[r + i] + m, own);
-        for (int l = 0; l < i; ++l) {
-            const Real along = inner(unfelt[l], own, m);
-            for (int a = 0; a < m; ++a) own[a] -= along * unfelt[l][a];
-        }
-        const Real over = 1.0 / root(inner(own, own, m));
-        for (int a = 0; a < m; ++a) own[a] *= over;
+        const Real *own = unfelt[i];
         const Real along = inner(own, multipliers.data(), m);
         for (int a = 0; a < m; ++a) multipliers[a] -= along * own[a];
     }
@@ -229,16 +262,15 @@ inline Whole Energies::solve(
             if (where[l]) out.outcome[block.point[l]] = outcome;
     };
     const Whole all = asked;
-    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
     const Ranks ranks = read_and_eliminate(points, block, asked);
     settle(ranks.unclear, AMBIGUOUS);
     const Whole settled = ranks.unclear | ranks.same;
     if (!any(asked = ranks.same)) return all & ~settled;
     const int rank = ranks.free, count = m - rank, r = ranks.springs;
-    const Whole rigid = rigid_rows(r, count, tolerance);
+    prepare(r, count);
+    const Whole rigid = rigid_rows(r, count, tolerance(points, block));
     settle(asked & rigid, RIGID);
     if (!any(asked &= ~rigid)) return all & ~settled;
-    small_problem(r);
     Real without = 0.5 * inner(programme.h.data(), programme.h.data(), r);
     if (loaded) {
         const Whole driven = bring_into_balance(points, block, rank, r);
@@ -246,7 +278,12 @@ inline Whole Energies::solve(
         if (!any(asked &= ~driven)) return all & ~settled;
         without += stored;
     }
-    const Whole solved = minimise(r, asked);
+    const Whole solved = minimise(r, asked), open = asked & (solved == whole(INTERIOR));
+    if (waits(open, asked)) {
+        for (int l = 0; l < LANES; ++l)
+            if (open[l]) waiting.push_back(block.point[l]);
+        if (!any(asked &= ~open)) return all & ~settled;
+    }
     // back to the full problem
     Row multipliers = least_multipliers(r, count);
     for (int i = 0; loaded && i < r; ++i) v[i] -= left[i];

@@ -48,6 +48,7 @@ protected:
     void move(int64_t pattern, double on_path, const Real *step, Row &open);
     void part(const Real *row, int64_t pattern, Real *out) const;
     Real enters(int c, const Real *part) const;
+    Real tolerance(const Points &points, const Block &block) const;
     Real largest_clearance() const;
 
     std::vector<double> posture;  // of all lanes: frames and closure error, if it is one
@@ -80,14 +81,20 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
 // Whether all lanes stand where all lanes of the block before stood: what depends on the
 // frames alone is then known.
 inline bool Linearised::stays(const Points &points, const Block &block) {
+    if (!points.own_posture && !posture.empty()) return true;
     const size_t count = 16 * size_t(n);
-    const double *own = points.T + block.point[0] * count;
-    const double mismatch = points.mismatch[block.point[0]];
+    const auto frames = [&](int l) {
+        return points.T + points.own_posture * block.point[l] * count;
+    };
+    const auto off = [&](int l) {
+        return points.mismatch[points.own_posture * block.point[l]];
+    };
+    const double *own = frames(0), mismatch = off(0);
     const auto stand = [&](const double *T, double off) {
         return off == mismatch && std::equal(own, own + count, T);
     };
     for (int l = 1; l < LANES; ++l)
-        if (!stand(points.T + block.point[l] * count, points.mismatch[block.point[l]])) {
+        if (!stand(frames(l), off(l))) {
             posture.clear(), ++changes;
             return false;
         }
@@ -104,7 +111,7 @@ inline void Linearised::read(const Points &points, const Block &block, bool stay
     if (!stay) {
         Real origin[3];
         for (int a = 0; a < 3; ++a)
-            origin[a] = block.read(points.T, n * 16, s.platform * 16 + 4 * a + 3);
+            origin[a] = block.read(points.T, points.own_posture * n * 16, s.platform * 16 + 4 * a + 3);
         for (int j = 0; j < n; ++j)
             if (felt[j] || erring[j]) read_frame(points, block, j, origin);
         columns();
@@ -120,7 +127,7 @@ inline void Linearised::read(const Points &points, const Block &block, bool stay
 inline void Linearised::read_frame(
     const Points &points, const Block &block, int j, const Real *origin) {
     const auto entry = [&](int a, int b) {
-        return block.read(points.T, n * 16, j * 16 + 4 * a + b);
+        return block.read(points.T, points.own_posture * n * 16, j * 16 + 4 * a + b);
     };
     const Real x = (entry(0, 3) - origin[0]) / s.size;
     const Real y = (entry(1, 3) - origin[1]) / s.size;
@@ -137,9 +144,8 @@ inline void Linearised::read_frame(
 inline void Linearised::read_errors(const Points &points, const Block &block, int j) {
     Real own[6] = {}, step[6];
     for (int axis = 0; axis < 6; ++axis) {
-        const Real error = points.own_errors
-                               ? block.read(points.errors, n * 6, j * 6 + axis)
-                               : real(points.errors[j * 6 + axis]);
+        const Real error =
+            block.read(points.errors, points.own_errors * n * 6, j * 6 + axis);
         column(j, axis, step);
         for (int a = axis < 3 ? 0 : 3; a < 6; ++a) {
             step[a] *= error;
@@ -201,6 +207,11 @@ inline Real Linearised::enters(int c, const Real *part) const {
     Real total = {};
     for (int a = s.cone_axis[c] < 3 ? 0 : 3; a < 6; ++a) total += play[c][a] * part[a];
     return total;
+}
+
+// Relative size of what may be rounding of rows that the frames leave open.
+inline Real Linearised::tolerance(const Points &points, const Block &block) const {
+    return RANK + MISMATCH_FACTOR * block.read(points.mismatch, points.own_posture, 0);
 }
 
 // Largest entry of the clearances' closure columns, for the noise floor.

@@ -83,7 +83,7 @@ inline Row Loaded::bent_groups() {
 inline Whole Loaded::balance(
     const Points &points, const Block &block, int rank, int r) {
     const auto load = [&](int64_t half, int64_t j, int64_t axis) {
-        return block.read(points.loads, 12 * n, 6 * (n * half + j) + axis);
+        return block.read(points.loads, points.own_loads * 12 * n, 6 * (n * half + j) + axis);
     };
     Row own(s.ny);
     Real most = {};
@@ -122,12 +122,16 @@ inline Whole Loaded::balance(
 inline Whole Loaded::bring_into_balance(
     const Points &points, const Block &block, int rank, int r) {
     const size_t count = 12 * size_t(n);
-    const double *own = points.loads + block.point[0] * count;
+    const auto of = [&](int l) {
+        return points.loads + points.own_loads * block.point[l] * count;
+    };
+    const double *own = of(0);
+    const bool each = points.own_loads;
     bool alike = !posture.empty();
-    for (int l = 1; alike && l < LANES; ++l)
-        alike = std::equal(own, own + count, points.loads + block.point[l] * count);
+    for (int l = 1; alike && each && l < LANES; ++l)
+        alike = std::equal(own, own + count, of(l));
     const bool known = alike && balanced == changes && acting.size() == count &&
-                       std::equal(own, own + count, acting.data());
+                       (!each || std::equal(own, own + count, acting.data()));
     if (!known) {
         driven = balance(points, block, rank, r);
         acting.assign(own, own + (alike ? count : 0));

@@ -16,13 +16,34 @@ enum { SOLVED, FALLBACK };
 class ZoneMargins : public Rows {
 public:
     ZoneMargins(const Robot &s, const Points &points)
-        : Rows(s, points), solver(cones, m) {}
+        : Rows(s, points), solver(cones, m), B(m, nu) {}
 
     Whole margins(const Points &points, const Block &block, Whole asked, Margins &out);
 
 private:
     Solver solver;
+    Table B;               // orthonormal rows, before the solver turns them
+    Ranks kept;            // of the last elimination ..
+    int left;              // .. and of its rows
+    int64_t reduced = -1;  // at which change of the posture
+
+    void reduce(Real tolerance, Whole asked);
 };
+
+// Everything of the lanes asked for but what their errors are.
+inline void ZoneMargins::reduce(Real tolerance, Whole asked) {
+    kept = eliminate_free(tolerance, asked);
+    if (!any(kept.same)) return;
+    const int count = m - kept.free;
+    const Whole clear = triangulate_rows(count, nullptr);
+    kept.unclear |= kept.same & (clear < 0);
+    if (!any(kept.same &= clear >= 0)) return;
+    left = rank_of_first(clear, kept.same);
+    kept.same &= clear == left;
+    orthonormal_rows(left);
+    for (int i = 0; i < left; ++i)
+        std::copy(programme.M[i], programme.M[i] + nu, B[i]);
+}
 
 // Margins of the lanes asked for that have the ranks of the first of them; returns the
 // others.  With every link and joint rigid, B u = w must hold (least_factor.h).
@@ -37,24 +58,28 @@ inline Whole ZoneMargins::margins(
     };
     const Real unknown = real(NAN);
     Whole others = asked;
-    read(points, block);
+    const bool stay = stays(points, block);
+    read(points, block, stay);
     const Whole closed = asked & (inner(known.data(), known.data(), m) == 0.0);
     others &= settle(closed, Real{}, Real{}, closed);  // no clearance is needed
     if (!any(asked = others)) return others;
-    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Ranks ranks = eliminate_free(tolerance, asked);
-    others &= settle(ranks.unclear, unknown, unknown, Whole{});
-    if (!any(asked = ranks.same)) return others;
-    const int count = m - ranks.free;
-    const Whole clear = triangulate_rows(count, nullptr);
-    others &= settle(asked & (clear < 0), unknown, unknown, Whole{});
-    if (!any(asked &= clear >= 0)) return others;
-    const int left = rank_of_first(clear, asked);
-    asked &= clear == left;
+    if (stay && reduced == changes) {  // in all lanes alike
+        const Whole unclear = any(kept.unclear) ? asked : Whole{};
+        kept.unclear = unclear, kept.same = asked & ~unclear;
+    } else {
+        reduce(tolerance(points, block), asked);
+        reduced = changes;
+    }
+    others &= settle(kept.unclear, unknown, unknown, Whole{});
+    if (!any(asked = kept.same)) return others;
+    const int count = m - kept.free;
+    right_sides(count);
     Row w(count);
     Whole possible = whole(-1);
     for (int i = 0; i < count; ++i) {
-        Real total = rows.F[i][nu];
+        Real total;
+        for (int l = 0; l < LANES; ++l)
+            total[l] = -programme.h[int(rows.order[i][l])][l];
         for (int l = 0; l < std::min(i, left); ++l) total -= rows.F[i][l] * w[l];
         if (i < left)
             w[i] = total / rows.diagonal[i];
@@ -62,18 +87,24 @@ inline Whole ZoneMargins::margins(
             possible &= magnitude(total) <= INFEASIBLE;
     }
     const Real size = root(inner(w.data(), w.data(), left));
-    possible &= size > 0.0;
-    Real reach = {}, most = real(1.0);
-    if (any(asked & possible)) {
-        orthonormal_rows(left);
-        first_along(programme, left, w.data(), size);
-        reach_along_first(solver, programme, left, asked & possible, reach, most);
+    possible &= size >= 0.0;
+    const Whole some = asked & possible & (size > 0.0);  // others need no clearance
+    Real reach = real(1.0), most = real(1.0);
+    std::fill(programme.u.begin(), programme.u.end(), Real{});
+    Row forces(nu);
+    if (any(some)) {
+        for (int i = 0; i < left; ++i) std::copy(B[i], B[i] + nu, programme.M[i]);
+        first_along(programme, left, w.data(), some ? size : real(1.0));
+        forces = reach_along_first(solver, programme, left, some, reach, most);
     }
-    possible &= reach > 0.0;
-    const Real margin = size / reach, bound = size / most;
+    possible &= ~some | (reach > 0.0);
+    const Real margin = some ? size / reach : Real{}, bound = some ? size / most : Real{};
+    for (int c = 0; c < nu; ++c)
+        block.write(
+            out.forces, nu, cones.column[c], some ? forces[c] / most : Real{}, asked);
     // motions of passive joints must stay within their ranges
-    for (Real &own : programme.u) own *= margin;
-    const Row motions = least_motions(ranks.free, moved_by(Row()));
+    for (Real &own : programme.u) own = some ? own * margin : Real{};
+    const Row motions = least_motions(kept.free, moved_by(Row()));
     for (int c = 0; c < nq; ++c) possible &= magnitude(motions[c]) <= s.free_bound[c];
     const Whole proved = possible & (margin - bound <= MARGIN_GAP * margin);
     return others & settle(

@@ -177,8 +177,7 @@ inline Whole ReachableSets::read_bodies(
     read(points, block);
     others &= leave(asked & ~held_cones(block));
     if (!any(asked = others)) return others;
-    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    const Ranks ranks = eliminate_free(tolerance, asked);
+    const Ranks ranks = eliminate_free(tolerance(points, block), asked);
     others &= leave(ranks.unclear);
     if (!any(asked = ranks.same)) return others;
     const int count = m - ranks.free;

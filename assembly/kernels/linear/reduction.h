@@ -63,6 +63,7 @@ protected:
     Ranks eliminate(Real tolerance, Whole asked);
     Ranks read_and_eliminate(const Points &points, const Block &block, Whole asked);
     void clearance_parts(int count);
+    void right_sides(int r);
     void small_problem(int r);
     Row spring_strains(int r, const Row &v);
     Row moved_by(const Row &grouped);
@@ -197,8 +198,7 @@ inline Reduction::Ranks Reduction::read_and_eliminate(
         const bool unclear = any(kept.unclear);
         return {kept.free, kept.springs, unclear ? Whole{} : asked, unclear ? asked : Whole{}};
     }
-    const Real tolerance = RANK + MISMATCH_FACTOR * block.read(points.mismatch, 1, 0);
-    kept = eliminate(tolerance, asked);
+    kept = eliminate(tolerance(points, block), asked);
     if (any(kept.same)) clearance_parts(m - kept.free);
     return kept;
 }
@@ -210,10 +210,15 @@ inline void Reduction::clearance_parts(int count) {
             if (slot[g] >= 0) part(Z[i], g, parts[i] + 6 * slot[g]);
 }
 
+// h.
+inline void Reduction::right_sides(int r) {
+    for (int i = 0; i < r; ++i) programme.h[i] = -inner(known.data(), Z[i], m);
+}
+
 // G and h, in the solver's order of columns.
 inline void Reduction::small_problem(int r) {
     programme.r = r;
-    for (int i = 0; i < r; ++i) programme.h[i] = -inner(known.data(), Z[i], m);
+    right_sides(r);
     for (int c = 0; c < nu; ++c) {
         const int own = int(cones.column[c]), g = slot[s.pattern_of[s.cone_frame[own]]];
         Real screw[6];

@@ -8,8 +8,6 @@ from dataclasses import is_dataclass
 
 import numpy as np
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import home_posture, place_many
 from assembly.linear.energy import minimise_energies, solve_assembly
@@ -19,6 +17,8 @@ from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.clearance_positions import position_clearances
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 
 LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
 

@@ -38,9 +38,19 @@ def test_what_is_right_is_taken():
     right = given()
     kernels.assemble_all(**right)
     assert (right["energy"] >= right["bound"]).all()
-    one_set = given() | {"errors": right["errors"][:1]}
-    kernels.assemble_all(**one_set)
-    assert np.array_equal(one_set["energy"], right["energy"])
+    loads = np.full((K, 2, N, 6), 2.0)
+    loaded = given() | {"loads": loads}
+    kernels.assemble_all(**loaded)
+    assert (loaded["energy"] != right["energy"]).all()
+
+
+@pytest.mark.parametrize("rows", [("errors",), ("T", "mismatch"), ("loads",)])
+def test_one_row_of_22_serves_all_points(rows):
+    loads = np.full((K, 2, N, 6), 2.0)
+    right, shared = given() | {"loads": loads}, given() | {"loads": loads}
+    kernels.assemble_all(**right)
+    kernels.assemble_all(**shared | {name: shared[name][:1] for name in rows})
+    assert np.array_equal(shared["energy"], right["energy"])
 
 
 def read_only(array):
@@ -168,15 +178,6 @@ def farther(rng):
     }  # fmt: skip
 
 
-def margins(rng):
-    """Of least margins of two draws."""
-    return {
-        "B": np.linalg.qr(rng.normal(size=(5, 2)))[0].T.copy(),
-        "starts": np.array([0, 2, 3, 5]), "right": rng.normal(size=(2, 2)),
-        "margin": np.zeros(2), "bound": np.zeros(2), "multipliers": np.zeros((2, 2)),
-    }  # fmt: skip
-
-
 def walk(rng):
     """Of a walk of two screws."""
     M = rng.normal(size=(5, 3))
@@ -187,7 +188,7 @@ def walk(rng):
     }  # fmt: skip
 
 
-CALLS = {"farthest_points": farther, "least_margins": margins, "billiard_walk": walk}
+CALLS = {"farthest_points": farther, "billiard_walk": walk}
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_many, place_robot
 from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.assemblies import excess_of, solve_each
@@ -20,6 +19,7 @@ from assembly.linear.energy import CannotAssemble, minimise_energies, solve_asse
 from assembly.linear.screw_bound import bound_screw
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
+from assembly.statistics.one_posture import prepare_energies
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,

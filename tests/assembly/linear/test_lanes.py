@@ -12,7 +12,7 @@ from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.zone import zone_margins
+from assembly.linear.zone import zone_margin, zone_margins
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import random_robot, stack
 
@@ -155,7 +155,7 @@ def test_what_is_not_solved_side_by_side_the_reference_solves_with_its_own_error
 
     def all_but_the_last(structure, T, errors, mismatch, out):
         out[0][:-1], out[1][:-1] = expected.margin[:-1], expected.bound[:-1]
-        out[2][:-1] = 0
+        out[3][:-1] = 0
 
     monkeypatch.setattr(zone, "margins_side_by_side", all_but_the_last)
     found = zone_margins(robot, T, "free", mismatch, errors)
@@ -181,6 +181,52 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa):
         one = zone_margins(robot, T[i : i + 1], "rigid", mismatch[i : i + 1], errors)
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
+
+
+@pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize("load", [None, [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]])
+def test_draws_at_one_posture_have_the_bits_of_points(grid, rng, kappa, load):
+    """One row for all, where some draws wait for others, or a row for each."""
+    robot, postures = grid
+    errors = kappa * robot.errors * rng.uniform(-1, 1, (61, 1, 1))
+    errors += kappa * robot.errors * rng.uniform(-1, 1, (61, *robot.errors.shape))
+    errors[::9] = 0.0
+    draws = solve_assembly(postures[3], load, errors=errors)
+    points = solve_assembly([postures[3]] * 61, load, errors=errors)
+    alone = [solve_assembly(postures[3], load, errors=errors[[i]]) for i in range(12)]
+    for name in ROWS:
+        assert np.array_equal(getattr(draws, name), getattr(points, name)), name
+        for i, one in enumerate(alone):
+            assert np.array_equal(getattr(one, name)[0], getattr(draws, name)[i]), name
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_at_one_posture_have_the_bits_of_points(grid, rng, compliant):
+    robot, postures = grid
+    errors = robot.errors * rng.uniform(-1, 1, (61, *robot.errors.shape))
+    errors[:20:7] = 0.0
+    draws = zone_margin(postures[3], compliant, errors=errors)
+    points = zone_margin([postures[3]] * 61, compliant, errors=errors)
+    for name in ("margin", "bound", "forces"):
+        assert np.array_equal(getattr(draws, name), getattr(points, name)), name
+
+
+def test_forces_on_clearances_prove_the_margin(grid, rng):
+    """Their sizes on all cones add up to 1, and they grow no work but the errors'."""
+    robot, postures = grid
+    joints, structure = structure_of(robot, "free")
+    errors = robot.errors * rng.uniform(-1, 1, (9, *robot.errors.shape))
+    found = zone_margin(postures[3], "free", errors=errors)
+    sizes = np.add.reduceat(found.forces**2, structure.starts[:-1], axis=1)
+    assert np.sqrt(sizes).sum(axis=1) == pytest.approx(1.0, rel=1e-12)
+    # multipliers of the closures with these forces and none on free motions
+    A = linearise(postures[3]).rows
+    columns = A @ np.hstack([joints.cones, joints.free])
+    asked = np.pad(found.forces, ((0, 0), (0, joints.free.shape[1])))
+    q, _, _, _ = np.linalg.lstsq(columns.T, asked.T, rcond=1e-10)
+    assert np.abs(columns.T @ q - asked.T).max() < 1e-8 * np.abs(found.forces).max()
+    work = np.einsum("mk,mi,ki->k", -q, A, errors.reshape(9, -1))
+    assert work == pytest.approx(found.bound, rel=1e-7)
 
 
 @pytest.mark.parametrize("load", ["none", "each its own", "the same"])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.one_posture import prepare_energies
 from tests.robots_for_tests import random_robot
 
 SPIN, RADIAL, ARM = 1e-4, 1e-6, 1.0

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import draw_generator, tolerance_sources
@@ -19,6 +17,8 @@ from assembly.statistics.clearance_positions import (
     loaded_clearances,
     position_clearances,
 )
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.uniform_clearance import (
     _ellipsoid,
     diagnose,

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import draw_generator
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.contact_positions import move_to_contact
+from assembly.statistics.one_posture import prepare_energies
 
 
 def moved(directions, starts, rows=(), free=None, positions=None):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
@@ -21,6 +20,7 @@ from assembly.statistics.importance import (
 )
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.one_posture import prepare_energies
 from assembly.statistics.summary import summarise, summary_text
 
 

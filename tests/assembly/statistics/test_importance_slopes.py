@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Frame, Robot
@@ -11,6 +10,7 @@ from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_slopes import platform_gains, platform_slopes
 from assembly.statistics.importance_table import ImportanceOptions, importance_design
+from assembly.statistics.one_posture import prepare_energies
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.link_stress import stressed_links
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import _stress_slopes, respond
 
 PLAY, STIFFNESS = 1e-4, 1e6  # [m], [N/m]

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import respond
 from assembly.statistics.sensitivity import energy_slopes, solution_slopes
 from tests.robots_for_tests import random_robot

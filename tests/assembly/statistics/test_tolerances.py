@@ -7,8 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
@@ -17,6 +15,8 @@ from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.replay import journalled
 from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.responses import respond

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
-from assembly.batch.many_margins import prepare_margins
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics import worst_case
+from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import (
     _reach,

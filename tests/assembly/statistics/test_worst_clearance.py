@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.batch.many_draws import prepare_energies
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
@@ -13,6 +12,7 @@ from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment, precision_for
 from assembly.statistics.monte_carlo import run_draws
+from assembly.statistics.one_posture import prepare_energies
 from assembly.statistics.responses import respond
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.worst_clearance import bound_worst_errors

@@ -4,25 +4,20 @@ The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``: co
 the errors e, proportional to them, and its slope is ``K^T q`` of the best q.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
-from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import Posture
-from assembly.linear.closure import (
-    VirtualJoints,
-    linearise,
-    virtual_joints,
-)
+from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reduction import complement, reduce_problem
-from assembly.linear.thresholds import INFEASIBLE, RANK
-from assembly.linear.zone import zone_margin
-from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
+from assembly.linear.thresholds import RANK
+from assembly.linear.zone import zone_margins
+from assembly.model.clearance import Compliant
 from assembly.solvers.cones import cone_starts
-from assembly.solvers.conic import SolverFailed
+from assembly.statistics.one_posture import checked_errors
 
 _CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
 
@@ -35,9 +30,9 @@ class DrawMargins:
         margin: (k,) factor on all clearances at which it just assembles; inf where
             none does, NaN where the solver failed.
         bound: (k,) certified lower bound.
-        slopes: (k, n, 6) [1/rad, 1/m] how the margin grows with each error; NaN where
-            the fallback solved.
-        fallback: (k,) bool, solved by :func:`assembly.linear.zone.zone_margin`.
+        slopes: (k, n, 6) [1/rad, 1/m] how the margin grows with each error, where it is
+            inf that of what clearances close; NaN where the reference solved.
+        fallback: (k,) bool, solved by :mod:`assembly.linear.reference`.
     """
 
     margin: NDArray
@@ -52,24 +47,18 @@ class PostureMargins:
 
     Attributes:
         posture: where the robot stands; its own errors do not matter.
-        joints: what may move.
         starts: (cones + 1,) first clearance of each cone, and nu.
         B: (p, nu) orthonormal rows that the clearances must satisfy.
         K: (p, 6n) and their right side by the errors: B u = K e.
         infeasible: (.., 6n) infeasible component of the errors.
-        motions: (nq, nu + 6n) free motions of clearances and errors.
-        ranges: (nq,) [rad or m] their bounds, which were left out.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
     """
 
     posture: Posture
-    joints: VirtualJoints
     starts: NDArray
     B: NDArray
     K: NDArray
     infeasible: NDArray
-    motions: NDArray
-    ranges: NDArray
     compliant: Compliant
 
     def solve(self, errors: ArrayLike) -> DrawMargins:
@@ -84,40 +73,22 @@ class PostureMargins:
         Raises:
             ValueError: the shape does not fit the robot, or a value is not finite.
         """
-        errors = np.asarray(errors, dtype=float)
-        count, n = len(errors), len(self.posture.robot.frames)
-        if errors.shape != (count, n, 6) or not np.isfinite(errors).all():
-            raise ValueError(
-                f"errors have shape {errors.shape}, expected (k, {n}, 6), all finite"
-            )
-        e = errors.reshape(count, 6 * n)
-        margin, bound = np.zeros(count), np.zeros(count)
-        q, unit = np.zeros((count, len(self.B))), np.ones(self.B.shape[1])
-        if len(self.B):
-            right = np.ascontiguousarray(e @ self.K.T)
-            kernels.least_margins(self.B, self.starts, right, margin, bound, q)
-        infeasible = np.abs(e @ self.infeasible.T).max(axis=1, initial=0.0)
-        no_factor = infeasible > _CLEARLY_INFEASIBLE
-        margin[no_factor] = bound[no_factor] = np.inf
-        most = np.concatenate(
-            [unit * np.nanmax(margin, initial=0.0, where=np.isfinite(margin)),
-             np.abs(e).max(axis=0, initial=0.0)]
+        errors = checked_errors(errors, len(self.posture.robot.frames))
+        left = errors.reshape(len(errors), -1) @ self.infeasible.T
+        no_factor = np.abs(left).max(axis=1, initial=0.0) > _CLEARLY_INFEASIBLE
+        if no_factor.any():  # slopes are those of what clearances close
+            both = np.linalg.pinv(np.vstack([self.K, self.infeasible]))
+            open_ = left[no_factor] @ both[:, len(self.K) :].T
+            errors = errors.copy()
+            errors[no_factor] -= open_.reshape(-1, *errors.shape[1:])
+        found = zone_margins(
+            self.posture.robot, self.posture.transforms[None], self.compliant,
+            self.posture.mismatch, errors,
         )  # fmt: skip
-        fallback = np.isnan(margin)
-        fallback |= (infeasible > INFEASIBLE) & ~no_factor
-        if (np.abs(self.motions) @ most > self.ranges).any():
-            fallback[:] = True
-        slopes = (q @ self.K).reshape(count, n, 6)
-        for i in np.flatnonzero(fallback).tolist():
-            robot = self.posture.robot.with_errors(errors[i])
-            slopes[i] = margin[i] = bound[i] = np.nan
-            try:
-                zone = zone_margin(replace(self.posture, robot=robot), self.compliant)
-            except SolverFailed:
-                continue
-            margin[i] = np.inf if zone.margin is None else zone.margin
-            bound[i] = np.inf if zone.bound is None else zone.bound
-        return DrawMargins(margin, bound, slopes, fallback)
+        found.margin[no_factor] = found.bound[no_factor] = np.inf
+        slopes = (found.forces @ self.B.T @ self.K).reshape(errors.shape)
+        again = (found.method == "reference") & ~no_factor
+        return DrawMargins(found.margin, found.bound, slopes, again)
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
@@ -144,17 +115,11 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
     redundant = reduced.basis @ complement(held, RANK)
     A = lin.rows
-    inverse = np.linalg.pinv(A @ joints.free, rcond=RANK)
-    screws = np.hstack([joints.cones, np.eye(A.shape[1])])
-    bounds = component_bounds(clearance_bounds(robot, compliant)).ravel()
     return PostureMargins(
         posture=posture,
-        joints=joints,
         starts=cone_starts(joints.group),
         B=np.ascontiguousarray(B),
         K=-(U.T / S[:, None]) @ rigid.T @ reduced.basis.T @ A,
         infeasible=redundant.T @ A,
-        motions=-inverse @ A @ screws,
-        ranges=bounds[np.flatnonzero(joints.free.any(axis=1))],
         compliant=compliant,
     )

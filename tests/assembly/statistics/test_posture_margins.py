@@ -1,0 +1,76 @@
+"""Margins of many draws of the errors at one posture: laws, and one solve at a time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import place_robot
+from assembly.linear.zone import zone_margin
+from assembly.model.error_distributions import tolerance_sources
+from assembly.robots import load_robot
+from assembly.statistics.posture_margins import prepare_margins
+from tests.robots_for_tests import random_robot
+
+ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod"]
+
+
+def some_errors(robot, scale=1.0, count=6):
+    sources = tolerance_sources(robot, scale * np.array([1e-3] * 3 + [1e-4] * 3))
+    return sources.errors(sources.draw(0, count, seed=4))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_agree_with_one_solve_at_a_time(name, compliant):
+    robot = load_robot(name)
+    posture = place_robot(robot)
+    errors = some_errors(robot)
+    found = prepare_margins(posture, compliant).solve(errors)
+    for i, own in enumerate(errors):
+        zone = zone_margin(replace(posture, robot=robot.with_errors(own)), compliant)
+        assert found.margin[i] == pytest.approx(zone.margin, rel=2e-8, abs=1e-12)
+        assert found.bound[i] <= found.margin[i]
+
+
+def test_margins_are_proportional_to_the_errors_and_convex():
+    """Euler: slope . errors is the margin; a mean of draws has no larger margin."""
+    robot = load_robot("irsbot2")
+    errors = some_errors(robot, count=40)
+    ready = prepare_margins(place_robot(robot), "free")
+    found = ready.solve(errors)
+    work = (found.slopes * errors).sum(axis=(1, 2))
+    np.testing.assert_allclose(work, found.margin, rtol=1e-8)
+    halves = ready.solve((errors[:20] + errors[20:]) / 2)
+    # bounds lie below the least factor, margins above it; both by less than 1e-8
+    assert (halves.bound <= (found.margin[:20] + found.margin[20:]) / 2).all()
+    np.testing.assert_allclose(halves.bound, halves.margin, rtol=1e-8)
+    np.testing.assert_allclose(ready.solve(3 * errors).margin, 3 * found.margin, 1e-8)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_margins_of_random_robots_agree(seed):
+    robot = random_robot(np.random.default_rng(seed))
+    posture = place_robot(robot)
+    draws = np.random.default_rng(seed + 100).normal(size=(3, len(robot.frames), 6))
+    draws *= np.array([1e-3] * 3 + [1e-4] * 3)
+    for compliant in ("rigid", "free"):
+        found = prepare_margins(posture, compliant).solve(draws)
+        for i, own in enumerate(draws):
+            one = replace(posture, robot=robot.with_errors(own))
+            zone = zone_margin(one, compliant)
+            expected = np.inf if zone.margin is None else zone.margin
+            assert found.margin[i] == pytest.approx(expected, rel=1e-6)
+
+
+def test_errors_that_nothing_closes_have_no_margin_and_ask_no_other_solver():
+    """A planar four-bar whose coupler is out of the plane, by any amount that shows."""
+    robot = load_robot("four_bar")
+    tight = tuple(replace(f, clearance=None) for f in robot.frames)
+    robot = replace(robot, frames=tight)
+    errors = np.zeros((5, len(robot.frames), 6))
+    errors[1:, 2, 5] = 1e-9, 1e-6, 1e-3, -1.0
+    for compliant in ("rigid", "free"):
+        found = prepare_margins(place_robot(robot), compliant).solve(errors)
+        assert not found.fallback.any()
+        assert found.margin.tolist() == found.bound.tolist() == [0.0] + [np.inf] * 4
