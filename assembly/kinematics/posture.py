@@ -13,10 +13,11 @@ Eq. (14) is off by one as printed: its product down to h = j maps a screw writte
 frame ant(j).  ``paths`` maps one written in frame j itself, ``[R 0; [p_j - p]x R, R]``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from hashlib import blake2b
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,17 +42,20 @@ _SMALL = 1e-5  # of the reference length: the same of robots smaller than 100 mm
 class Posture:
     """A robot whose nominal geometry closes; it exists only if it does.
 
+    Or many postures of it, as of :func:`together`: the arrays then have a leading axis.
+
     Attributes:
         robot: the manipulator.
-        coordinates: (n,) [rad or m] of every joint, 0 for fixed ones.
-        transforms: (n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: [rad, m] largest nominal closure error left (rounded files); dropped.
+        coordinates: (..., n) [rad or m] of every joint, 0 for fixed ones.
+        transforms: (..., n, 4, 4) frames seen from the base, without imperfections.
+        mismatch: (...) [rad, m] largest nominal closure error left (rounded files);
+            dropped.
     """
 
     robot: Robot
     coordinates: NDArray
     transforms: NDArray
-    mismatch: float
+    mismatch: Any
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -70,6 +74,14 @@ class Posture:
             "frames": str(len(frames)),
             "nominal mismatch": f"{self.mismatch:.2g} rad, m",
         }
+
+    def __getitem__(self, rows: Any) -> "Posture":
+        """One of many postures, by a whole number; or some of them."""
+        mismatch = np.broadcast_to(self.mismatch, self.transforms.shape[:-3])[rows]
+        return replace(
+            self, coordinates=self.coordinates[rows], transforms=self.transforms[rows],
+            mismatch=mismatch if np.ndim(mismatch) else float(mismatch),
+        )  # fmt: skip
 
     @cached_property
     def platform(self) -> NDArray:
@@ -96,6 +108,22 @@ class Posture:
     def pose(self) -> dict[str, float]:
         """Nominal platform pose by component, rotation vector in base axes."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
+
+
+def together(postures: Sequence[Posture]) -> Posture:
+    """Many postures of one robot in one.
+
+    Args:
+        postures: k of them, k > 0.
+
+    Returns:
+        The same with a leading axis.
+    """
+    return Posture(
+        postures[0].robot, np.array([p.coordinates for p in postures]),
+        np.array([p.transforms for p in postures]),
+        np.array([p.mismatch for p in postures]),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
-"""Results of many points: a sequence of single ones, and a table of them all."""
+"""Results of one point, or of many with a leading axis in every array."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
 
 from forcefit.inputs.display import html_table, short_repr
 
@@ -10,29 +12,45 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-One = TypeVar("One")
+# a number of one point, or an array (k,) of many
+Numbers = Any
 
 
-class PointResults(ABC, Generic[One]):
-    """Arrays with a row for each of k points; ``[i]`` is one of them.
+class PointResults(ABC):
+    """A result whose arrays have a leading axis where it is of many points.
 
     Attributes:
-        VARIABLES: the array of each variable of the table, by the names of
-            :mod:`assembly.model.tables`.
+        VARIABLES: the array of each variable of the table of many points, by the names
+            of :mod:`assembly.model.tables`.
     """
 
     VARIABLES: ClassVar[dict[str, str]]
 
     __repr__, _repr_html_ = short_repr, html_table
 
+    @property
+    def of_many(self) -> bool:
+        """Whether there is a leading axis."""
+        return np.ndim(self._first) > 0
+
+    @property
+    def _first(self) -> Numbers:
+        """One of the numbers that every point has."""
+        return getattr(self, next(iter(self.VARIABLES.values())))
+
     def __len__(self) -> int:
-        return len(getattr(self, next(iter(self.VARIABLES.values()))))
+        if not self.of_many:
+            raise TypeError(f"{type(self).__name__} of one point has no length")
+        return len(self._first)
+
+    def __bool__(self) -> bool:
+        return True
 
     @abstractmethod
-    def __getitem__(self, i: int) -> One:
-        """Point i."""
+    def __getitem__(self, rows: Any) -> Self:
+        """One point, by a whole number; or some, by a slice, numbers or a mask."""
 
-    def __iter__(self) -> Iterator[One]:
+    def __iter__(self) -> Iterator[Self]:
         return (self[i] for i in range(len(self)))
 
     def to_xarray(self) -> "xarray.Dataset":
