@@ -20,7 +20,7 @@ from assembly.kinematics.posture import place_robot
 from assembly.model.error_distributions import ErrorSources
 from assembly.model.random_errors import frames_named
 from assembly.robots import load_robot
-from assembly.statistics.one_posture import OnePosture, prepare_energies
+from assembly.statistics.linear_response import LinearResponse, linear_response
 
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
@@ -41,7 +41,7 @@ def paper_sources(share: float) -> ErrorSources:
     )  # fmt: skip
 
 
-def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
+def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArray:
     """Draws without energy, certified, and by the fallback, of one block."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
@@ -51,7 +51,7 @@ def solve_block(one: OnePosture, sources: ErrorSources, block: int) -> NDArray:
     return np.array([np.sum(draws.energy <= 1e-20), fine.sum(), draws.fallback.sum()])
 
 
-def run(one: OnePosture, sources: ErrorSources, blocks: int, threads: int) -> tuple:
+def run(one: LinearResponse, sources: ErrorSources, blocks: int, threads: int) -> tuple:
     """Draws per second of processor and of the clock, and shares of the draws."""
     clock, processor = time.perf_counter(), time.process_time()
     with threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
@@ -66,7 +66,7 @@ def main() -> None:
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     blocks = -(-draws // BLOCK)
     posture = place_robot(load_robot("irsbot2"), pose={"tx": 0.1, "tz": -0.5})
-    one = prepare_energies(posture)
+    one = linear_response(posture)
     print(f"{blocks * BLOCK} draws a line; goal {TARGET:.0e} in {GOAL:.0f} s")
     print(
         "errors  no energy  certified  fallback  per core s  1e7, 2 cores [s]  "

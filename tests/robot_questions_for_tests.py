@@ -33,8 +33,8 @@ from assembly.statistics.allocated_tolerances import allocation_of, allocation_t
 from assembly.statistics.allocation import allocate
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.one_posture import prepare_energies
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
 from assembly.statistics.summary import summarise, summary_text
@@ -77,8 +77,8 @@ def at_once(name: str, nudge: float) -> Any:
     errors = errors * (1 + nudge)
     load, gravity = np.array(LOAD) / 5, (0.5, 0.0, -9.81)
     return {
-        "alone": prepare_energies(posture).solve(errors),
-        "loaded": prepare_energies(posture, load, gravity).solve(errors),
+        "alone": linear_response(posture).solve(errors),
+        "loaded": linear_response(posture, load, gravity).solve(errors),
         "free": prepare_margins(posture, "free").solve(errors),
         "rigid": prepare_margins(posture, "rigid").solve(errors),
     }

@@ -67,7 +67,7 @@ class Zone:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Margins(PointResults[Zone]):
+class Margins(PointResults):
     """Zone margins of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:
