@@ -362,9 +362,11 @@ def _record(
     rows["excess"][i] = found.clearance_excess()
     rows["platform_screw"][i] = found.platform_screw
     rows["multipliers"][i] = found.multipliers
-    own = found.clearances.shape == rows["clearances"][i].shape
-    for name in ("clearances", "motions", "elastic"):
-        rows[name][i] = getattr(found, name) if own else np.nan
+    names = ("clearances", "motions", "elastic")
+    parts = {name: getattr(found, name) for name in names}
+    own = all(rows[name][i].shape == part.shape for name, part in parts.items())
+    for name, part in parts.items():
+        rows[name][i] = part if own else np.nan
     if not own:
         apart[i] = found
     open_ = unproved(found)
