@@ -6,11 +6,12 @@ several runs in turn, and how far K_C is from that of one posture at a time.
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from assembly.kinematics.posture import place_many
-from assembly.linear.energy import minimise_energies
+from assembly.kinematics.posture import place_many, together
+from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
@@ -49,11 +50,12 @@ def main() -> None:
     forced = robot.with_errors(errors)
     count = len(T)
     print(f"{count} postures of {robot.name}, one thread")
-    minimise_energies(robot, T[:2])
+    at = together(postures)
+    solve_assembly(postures[:2])
     platform_stiffnesses(robot, T[:2])
     for name, function in (
-        ("(22) without errors", lambda: minimise_energies(robot, T)),
-        ("(22) with errors", lambda: minimise_energies(forced, T)),
+        ("(22) without errors", lambda: solve_assembly(at)),
+        ("(22) with errors", lambda: solve_assembly(replace(at, robot=forced))),
         ("K_C", lambda: platform_stiffnesses(robot, T)),
         ("K_C, eigen-screws, shares", lambda: everything(robot, T)),
     ):
