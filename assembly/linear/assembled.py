@@ -488,7 +488,10 @@ def _with_known(
     assembly: Assembly, known: Mapping[str, Any], names: tuple[str, ...]
 ) -> Assembly:
     """What is known already, and so not computed again when somebody asks."""
-    vars(assembly).update({k: _plain(known[k]) for k in names if k in known})
+    own = vars(assembly)
+    for name in names:
+        if name in known:
+            own[name] = _plain(known[name])
     return assembly
 
 
@@ -509,7 +512,9 @@ def known_assembly(known: Mapping[str, Any], **fields: Any) -> Assembly:
 
 def _plain(values: Any) -> Any:
     """Arrays as they are; of one point the number itself."""
-    return values if np.ndim(values) else np.asarray(values).item()
+    if isinstance(values, np.ndarray):
+        return values if values.ndim else values.item()
+    return values.item() if isinstance(values, np.generic) else values
 
 
 def _flat(screws: NDArray) -> NDArray:

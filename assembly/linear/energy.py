@@ -162,13 +162,13 @@ def _solve_one(
         return least_energy(posture, load, loads)
     rounding, (joints, _) = _rounding_of(robot), structure_of(robot)
     acting = loads.rows() if loads else None
-    rows = _compiled(
-        robot, posture.transforms[None], robot.errors[None],
-        np.array([posture.mismatch]), "elastic", acting,
-    )  # fmt: skip
+    # a copy: the address of an array that may be written is found three times as fast
+    T = np.array(posture.transforms, ndmin=4)
+    off = np.array([posture.mismatch])
+    rows = _compiled(robot, T, robot.errors[None], off, "elastic", acting)
     if rows["outcome"][0] >= _LEFT:
         return least_energy(posture, load, loads)
-    _drop_rounding(rows, rows["residual"] + rounding, bool(loads))
+    _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
     return known_assembly(
         {key: rows[key][0] for key in ("energy", "platform_screw")},
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
@@ -233,6 +233,11 @@ def _checked(
             f"is larger than {LARGEST_LENGTH:g} [rad, m]"
         )
     off = np.broadcast_to(np.asarray(posture.mismatch, dtype=float), (len(T),))
+    # writable and in C order, whatever comes: the kernels are compiled for one kind
+    T, sets, off = (
+        np.require(array, dtype=float, requirements=["C", "W"])
+        for array in (T, sets, off)
+    )
     return T, sets, off
 
 
@@ -244,11 +249,7 @@ def _compiled(
     joints, structure = structure_of(robot, compliant)
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
-    # writable and in C order, whatever comes: the kernels are compiled for one kind
-    given = structure, *(
-        np.require(array, dtype=float, requirements=["C", "W"])
-        for array in (T, errors, mismatch)
-    )  # fmt: skip
+    given = structure, T, errors, mismatch
     if method == "reference" or stiffness_spread(joints, structure.size) > SPREAD:
         rows["outcome"][:] = _LEFT
     elif loads is None:
@@ -379,7 +380,8 @@ def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray | bool) -> No
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
     # without loads no wrenches mean no deformation but rounding
-    rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
+    if loaded is not True and np.count_nonzero(multipliers) < multipliers.size:
+        rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
