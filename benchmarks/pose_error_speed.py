@@ -35,11 +35,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly.kinematics.posture import Posture, place_many
+from assembly.kinematics.posture import Posture, place_many, together
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reach import ReachableSet, reachable_screws
-from assembly.linear.zone import zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Robot
 from assembly.solvers import conic
 from assembly.solvers.cones import cone_sizes
@@ -265,10 +265,10 @@ def print_study(robot: Robot, poses: NDArray) -> None:
     begin = time.process_time()
     postures = [p for p in place_many(robot, poses)[0] if p is not None]
     T = np.array([p.transforms for p in postures])
-    off = np.array([p.mismatch for p in postures])
+    off, at = np.array([p.mismatch for p in postures]), together(postures)
     placed = time.process_time()
     energies = minimise_energies(robot, T, mismatch=off)
-    zones = [zone_margins(robot, T, name, off) for name in ("rigid", "free")]
+    zones = [zone_margin(at, name) for name in ("rigid", "free")]
     solved = time.process_time()
     errors = [
         bound_pose_errors(robot, T, name, mismatch=off, energies=energies)
@@ -296,8 +296,7 @@ def main() -> None:
     perfect = robot.with_errors(0 * robot.errors)
     print(f"{robot.name}, {len(postures)} points, one core")
     print_case("clearances only", perfect, postures, "frozen")
-    T = np.array([p.transforms for p in postures])
-    inside = zone_margins(robot, T, "free").margin <= 1.0
+    inside = zone_margin(postures, "free").margin <= 1.0
     zone = [p for p, assembles in zip(postures, inside, strict=True) if assembles]
     print_case(f"first draw, free, {len(zone)} points of the zone", robot, zone, "free")
     print_case("first draw, free, all points", robot, postures, "free")

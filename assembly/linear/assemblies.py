@@ -33,7 +33,7 @@ _STATUS: dict[type[Exception], str] = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assemblies(PointResults[Assembly]):
+class Assemblies(PointResults):
     """Least energies of k points, each with its certificate; ``[i]`` is one of them.
 
     Attributes:

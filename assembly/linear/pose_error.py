@@ -97,7 +97,7 @@ class PoseError:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseErrors(PointResults[PoseError]):
+class PoseErrors(PointResults):
     """Certified bounds of the largest pose errors of k points; ``[i]`` is one of them.
 
     Attributes:

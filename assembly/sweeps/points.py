@@ -16,7 +16,7 @@ from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
-from assembly.linear.zone import MARGIN_READINGS, zone_margins
+from assembly.linear.zone import MARGIN_READINGS, zone_margin
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses, stressed_links
@@ -212,10 +212,11 @@ def _solve_reached(
         robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     failed: dict[int, str] = {}
+    at = Posture(robot, conditions.coordinates, T, mismatch)
     for key, compliant in MARGIN_READINGS.items():
-        zone = zone_margins(robot, T, compliant, mismatch, errors)
+        zone = zone_margin(at, compliant, errors)
         out[key][rows] = zone.margin
-        failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
+        failed = {i: r for i, r in enumerate(zone.unproved) if r} | failed
     wrenches = at_tips = None
     if is_loaded(conditions):
         energies, wrenches, at_tips = assemble_rows(conditions)

@@ -9,10 +9,10 @@ from dataclasses import is_dataclass
 import numpy as np
 
 from assembly.kernels.choice import kernels
-from assembly.kinematics.posture import home_posture, place_many
+from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_errors
-from assembly.linear.zone import zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
@@ -54,13 +54,13 @@ def answers():
             poses[:, 2:] = np.nan
         placed = [one for one in place_many(robot, poses)[0] if one is not None]
         yield f"{name} placed", [one.transforms for one in placed]
-        T = np.array([home.transforms] * k)
-        T[: len(placed)] = [one.transforms for one in placed]
+        at = together([*placed, *[home] * (k - len(placed))])
+        T = at.transforms
         errors = 1e-4 * rng.normal(size=(k, len(robot.frames), 6))
         yield f"{name} (22)", minimise_energies(robot, T, errors)
         yield f"{name} (22) of one", minimise_energies(robot, T[:1], errors[:1])
         yield f"{name} loaded", solve_assembly([home] * k, LOAD, errors=errors)
-        yield f"{name} (21)", zone_margins(robot, T, "free", errors=errors)
+        yield f"{name} (21)", zone_margin(at, "free", errors)
         yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
         yield f"{name} K_C", platform_stiffnesses(robot, T)
         one = prepare_energies(home)

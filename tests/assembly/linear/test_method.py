@@ -10,7 +10,7 @@ from assembly.linear import energy, reach, zone
 from assembly.linear.assemblies import OUTCOMES
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
-from assembly.linear.zone import zone_margin, zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
@@ -46,7 +46,6 @@ def questions(posture):
         lambda method: minimise_energies(posture.robot, T, method=method),
         lambda method: zone_margin(posture, method=method),
         lambda method: zone_margin([posture], method=method),
-        lambda method: zone_margins(posture.robot, T, method=method),
         lambda method: bound_pose_error(assembly, method=method),
         lambda method: bound_pose_errors(posture.robot, T, method=method),
         lambda method: platform_stiffness(posture, "in contact", method=method),
