@@ -297,9 +297,10 @@ def _record_stiffness(
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "classical":
         starts = [run.start for run in runs]
-        quantities, reasons = classical_stiffnesses(
-            conditions.robot, T[starts], conditions.mismatch[starts]
-        )
+        at = Posture(
+            conditions.robot, conditions.coordinates, T, conditions.mismatch
+        )  # fmt: skip
+        quantities, reasons = classical_stiffnesses(at[starts])
     else:
         quantities, reasons = tangent_stiffnesses(conditions, state)
         runs = [slice(i, i + 1) for i in range(len(T))]

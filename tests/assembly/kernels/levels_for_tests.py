@@ -13,7 +13,7 @@ from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_errors
 from assembly.linear.zone import zone_margin
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.clearance_positions import position_clearances
@@ -62,7 +62,7 @@ def answers():
         yield f"{name} loaded", solve_assembly([home] * k, LOAD, errors=errors)
         yield f"{name} (21)", zone_margin(at, "free", errors)
         yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
-        yield f"{name} K_C", platform_stiffnesses(robot, T)
+        yield f"{name} K_C", platform_stiffness(at)
         one = prepare_energies(home)
         draws = one.solve(errors)
         yield f"{name} draws", draws

@@ -12,7 +12,6 @@ from assembly.linear.energy import minimise_energies, solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import BUILT_IN
 from assembly.solvers import one_problem
@@ -49,7 +48,7 @@ def questions(posture):
         lambda method: bound_pose_error(assembly, method=method),
         lambda method: bound_pose_errors(posture.robot, T, method=method),
         lambda method: platform_stiffness(posture, "in contact", method=method),
-        lambda method: platform_stiffnesses(posture.robot, T, method=method),
+        lambda method: platform_stiffness([posture], method=method),
     )
 
 
