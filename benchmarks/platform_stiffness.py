@@ -6,12 +6,13 @@ several runs in turn, and how far K_C is from that of one posture at a time.
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from assembly.kinematics.posture import Posture, place_many, together
-from assembly.linear.energy import minimise_energies
+from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
@@ -51,11 +52,11 @@ def main() -> None:
     forced = robot.with_errors(errors)
     count = len(T)
     print(f"{count} postures of {robot.name}, one thread")
-    minimise_energies(robot, T[:2])
+    solve_assembly(postures[:2])
     platform_stiffness(postures[:2])
     for name, function in (
-        ("(22) without errors", lambda: minimise_energies(robot, T)),
-        ("(22) with errors", lambda: minimise_energies(forced, T)),
+        ("(22) without errors", lambda: solve_assembly(at)),
+        ("(22) with errors", lambda: solve_assembly(replace(at, robot=forced))),
         ("K_C", lambda: platform_stiffness(at)),
         ("K_C, eigen-screws, shares", lambda: everything(at)),
     ):

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
 from assembly.kinematics.posture import Posture, place_many, together
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reach import ReachableSet, reachable_screws
 from assembly.linear.zone import zone_margin
@@ -267,7 +267,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
     T = np.array([p.transforms for p in postures])
     off, at = np.array([p.mismatch for p in postures]), together(postures)
     placed = time.process_time()
-    energies = minimise_energies(robot, T, mismatch=off)
+    energies = solve_assembly(at)
     zones = [zone_margin(at, name) for name in ("rigid", "free")]
     solved = time.process_time()
     errors = [

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import motion_screws, size_of
 from assembly.kinematics.pieces import cut_beams
@@ -33,8 +34,8 @@ from assembly.statistics.allocated_tolerances import allocation_of, allocation_t
 from assembly.statistics.allocation import allocate
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
+from assembly.statistics.linear_response import LinearResponse, linear_response
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.one_posture import prepare_energies
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
 from assembly.statistics.summary import summarise, summary_text
@@ -82,11 +83,19 @@ def at_once(name: str, nudge: float) -> Any:
     errors = errors * (1 + nudge)
     load, gravity = np.array(LOAD) / 5, (0.5, 0.0, -9.81)
     return {
-        "alone": prepare_energies(posture).solve(errors),
-        "loaded": prepare_energies(posture, load, gravity).solve(errors),
+        "alone": drawn(linear_response(posture), errors),
+        "loaded": drawn(linear_response(posture, load, gravity), errors),
         "free": prepare_margins(posture, "free").solve(errors),
         "rigid": prepare_margins(posture, "rigid").solve(errors),
     }
+
+
+def drawn(response: LinearResponse, errors: NDArray) -> dict[str, Any]:
+    """What statistics read of draws."""
+    found = response.solve(errors)
+    names = ("energy", "clearances", "multipliers", "platform_screw", "method")
+    own = {name: getattr(found, name) for name in names}
+    return own | {"bound": found.energy - found.duality_gap()}
 
 
 def pressed(robot: Robot) -> Robot:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from assembly.kinematics.posture import place_many
+from assembly.kinematics.posture import Posture, place_many
+from assembly.linear.energy import solve_assembly
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots.irsbot2 import NAMES, irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, transform
@@ -196,3 +197,34 @@ def stack(postures):
         np.array([p.transforms for p in postures]),
         np.array([p.mismatch for p in postures]),
     )
+
+
+def standing(robot, T, mismatch=0.0):
+    """Postures with these transforms (k, n, 4, 4), their coordinates unknown."""
+    T = np.asarray(T)
+    return Posture(robot, np.full(T.shape[:2], np.nan), T, mismatch)
+
+
+def assemble_at(robot, T, errors=None, mismatch=0.0, method="compiled"):
+    """Least energies at such postures."""
+    postures = standing(robot, T, mismatch)
+    return solve_assembly(postures, errors=errors, method=method)
+
+
+# what is compared of an assembly of many points
+ROWS = (
+    "energy", "energy_without_clearance", "work", "platform_screw", "clearances",
+    "motions", "multipliers", "elastic", "method", "duality_gap", "closure_residual",
+    "clearance_excess",
+)  # fmt: skip
+
+
+def row(many, name):
+    """What an assembly of many points says, be it an attribute or a method."""
+    value = getattr(many, name)
+    return value() if callable(value) else value
+
+
+def proved(many):
+    """[J] certified lower bounds of the energies."""
+    return many.energy - many.duality_gap()

@@ -288,7 +288,7 @@ class ExactAssembly:
     def clearance_excess(self) -> float:
         """[-] by how much the worst clearance leaves its cone, relative to its size."""
         bounds = clearance_bounds(self.posture.robot)
-        return clearance_excess(self.clearance_screws, bounds)
+        return float(clearance_excess(self.clearance_screws, bounds))
 
 
 def solve_exact(

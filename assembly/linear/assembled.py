@@ -16,15 +16,16 @@ series carry the same wrench, which (23) adds to itself, and the paths to the pl
 alone, (24)-(26), sum to zero on an unloaded platform.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.posture import Posture
+from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import (
     FrameLoads,
@@ -36,11 +37,12 @@ from assembly.linear.load import (
 from assembly.linear.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
-from assembly.solvers.cones import cone_sizes
-from assembly.solvers.method import Method
+from assembly.model.point_results import Numbers, PointResults
+from assembly.solvers.cones import cone_sizes, cone_sums
+from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from forcefit.inputs.display import (
     Figures,
-    html_table,
+    largest,
     largest_row,
     numbers,
     screw_text,
@@ -55,21 +57,31 @@ _ROUNDED = 1e-9  # of the largest wrench
 _NOTHING = 1e-12  # [N m, N]
 
 
-@dataclass(frozen=True, eq=False)
-class Assembly:
-    """A manipulator forced together at least energy; it exists only if solved.
+@dataclass(frozen=True, eq=False, repr=False)
+class Assembly(PointResults):
+    """A manipulator forced together at least energy; or many, with a leading axis.
+
+    ``[i]`` of many is one of them; where it has no solution that raises why.
 
     Attributes:
         linearisation: the assembly constraints it satisfies; where it stands.
         joints: what was allowed to move.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (..., 6) [N m, N] on the platform at its origin, base axes.
         frame_loads: all loads, this one among them, on every small screw.
-        elastic: (ny,) [sqrt(2 J)] scaled deformation of the springs.
-        clearances: (nu,) clearances in units of their cones.
-        motions: (nq,) [rad, m] free motions.
-        multipliers: (6 closures,) of the scaled closure rows.
-        energy_without_clearance: [J] least energy with all clearances at zero.
-        method: which gave it: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
+        elastic: (..., ny) [sqrt(2 J)] scaled deformation of the springs.
+        clearances: (..., nu) clearances in units of their cones; of many NaN where the
+            bound of a passive joint's own motion is active, and ``[i]`` has more.
+        motions: (..., nq) [rad, m] free motions; NaN likewise.
+        multipliers: (..., 6 closures) of the scaled closure rows.
+        energy_without_clearance: (...) [J] least energy with all clearances at zero.
+        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
+            Clarabel.
+        errors: (..., n, 6) [rad, m] geometric errors; the robot's if absent.
+        status: (...) ``"ok"``; of many also ``"cannot assemble"``, ``"no equilibrium"``
+            or ``"solver failed"``, also where its certificate falls short.
+        reason: (...) message where the status is not ok.
+        apart: of many those with other columns than ``joints``, or why there is none,
+            by their row.
     """
 
     linearisation: Linearisation
@@ -80,13 +92,36 @@ class Assembly:
     clearances: NDArray
     motions: NDArray
     multipliers: NDArray
-    energy_without_clearance: float
-    method: Method
+    energy_without_clearance: Numbers
+    method: Any
+    errors: Any = None
+    status: Any = "ok"
+    reason: Any = ""
+    apart: dict[int, "Assembly | Exception"] = field(default_factory=dict)
 
-    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
+    VARIABLES: ClassVar = {
+        "energy": "energy",
+        "duality_gap": "_gap",
+        "energy_without_play": "energy_without_clearance",
+        "platform_screw": "platform_screw",
+        "closure_residual": "_residual",
+        "clearance_excess": "_excess",
+        "method": "method",
+        "status": "status",
+        "reason": "reason",
+    }
+
+    summary = short_repr
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly solve`` prints of it."""
+        if self.of_many:
+            solved = np.isfinite(self.energy)
+            return {
+                "points": f"{len(self)}, {np.count_nonzero(solved)} solved",
+                "energy": f"at most {self.energy[solved].max(initial=0.0):.6g} J",
+                "platform error": f"at most {largest(self.platform_screw[solved])}",
+            }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
         most = largest_row(forces)  # bodies in a row carry the same force
         return {
@@ -100,21 +135,117 @@ class Assembly:
             f"excess {self.clearance_excess():.1e}, gap {self.duality_gap():.1e} J",
         }
 
+    @property
+    def _first(self) -> Numbers:
+        return self.energy_without_clearance
+
+    def __getitem__(self, rows: Any) -> "Assembly":
+        """One of many, by a whole number, or why it has no solution; or some."""
+        if not isinstance(rows, (int, np.integer)):
+            return self._taken(np.arange(len(self))[rows])
+        i = range(len(self))[rows]
+        apart = self.apart.get(i)
+        if isinstance(apart, Exception):
+            raise apart.with_traceback(None)
+        if apart is not None:
+            return apart
+        one = self._taken(i)
+        lin, robot = one.linearisation, self.posture.robot
+        # one robot for all where the errors are its own: its columns are cached
+        if one.errors is not None and not np.array_equal(one.errors, robot.errors):
+            robot = robot.with_errors(one.errors)
+            lin = replace(lin, posture=replace(lin.posture, robot=robot))
+        alone = replace(one, linearisation=lin, errors=None)
+        return _with_known(alone, vars(one), _OF_ONE)
+
+    def in_columns(self, joints: VirtualJoints) -> "Assembly":
+        """Many with the columns of other virtual joints.
+
+        Args:
+            joints: those of some of the points apart.
+
+        Returns:
+            The same points; NaN for clearances and motions of all others.
+        """
+        parts = {
+            "elastic": joints.elastic, "clearances": joints.cones,
+            "motions": joints.free,
+        }  # fmt: skip
+        rows: dict[str, Any] = {
+            name: np.full((len(self), columns.shape[1]), np.nan)
+            for name, columns in parts.items()
+        }
+        for i, one in self.apart.items():
+            if isinstance(one, Assembly) and one.joints is joints:
+                for name, values in rows.items():
+                    values[i] = getattr(one, name)
+        known = {k: vars(self)[k] for k in _OF_MANY if k in vars(self)}
+        return _with_known(replace(self, joints=joints, **rows), known, _OF_MANY)
+
+    @property
+    def as_many(self) -> "Assembly":
+        """One point with a leading axis."""
+        lin = self.linearisation
+        many = replace(
+            self, linearisation=replace(lin, posture=together([lin.posture])),
+            elastic=self.elastic[None], clearances=self.clearances[None],
+            motions=self.motions[None], multipliers=self.multipliers[None],
+            energy_without_clearance=np.array([self.energy_without_clearance]),
+            method=np.array([self.method], dtype=object),
+            status=np.array([self.status], dtype=object),
+            reason=np.array([self.reason], dtype=object),
+        )  # fmt: skip
+        known = {"energy": np.array([self.energy])}
+        known["platform_screw"] = self.platform_screw[None]
+        return _with_known(many, known, _OF_ONE)
+
+    def _taken(self, rows: Any) -> "Assembly":
+        """Rows of every array that has them."""
+
+        def taken(values: Any, dimensions: int) -> Any:
+            own = values is not None and np.ndim(values) > dimensions
+            return values[rows] if own else values
+
+        lin, loads = self.linearisation, self.frame_loads
+        if lin.posture.transforms.ndim > 3:
+            lin = replace(lin, posture=lin.posture[rows])
+        order = {old: new for new, old in enumerate(np.atleast_1d(rows).tolist())}
+        part = replace(
+            self,
+            linearisation=lin,
+            load=taken(self.load, 1),
+            frame_loads=FrameLoads(
+                *(taken(a, 1) for a in (loads.body, loads.joint, loads.distributed))
+            ),
+            elastic=self.elastic[rows],
+            clearances=self.clearances[rows],
+            motions=self.motions[rows],
+            multipliers=self.multipliers[rows],
+            energy_without_clearance=_plain(self.energy_without_clearance[rows]),
+            method=self.method[rows],
+            errors=taken(self.errors, 2),
+            status=self.status[rows],
+            reason=self.reason[rows],
+            apart={order[i]: one for i, one in self.apart.items() if i in order},
+        )
+        known = {k: vars(self)[k][rows] for k in _OF_MANY if k in vars(self)}
+        return _with_known(part, known, _OF_MANY)
+
     def to_xarray(self) -> "xarray.Dataset":
-        """Frames, closures and platform; see :mod:`assembly.model.tables`."""
+        """Frames, closures and platform, or points; :mod:`assembly.model.tables`."""
         from assembly.model.tables import assembly_dataset
 
-        return assembly_dataset(self)
+        return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each frame, columns (variable, component)."""
+        """A row for each frame, or each point, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
-        return frame_table(self.to_xarray(), "frame")
+        return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Numbers of rows of the closures: free, elastic, rigid, redundant."""
+        """Numbers of rows of one point's closures: free, elastic, rigid, redundant."""
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
@@ -122,83 +253,96 @@ class Assembly:
         """Where the robot stands nominally."""
         return self.linearisation.posture
 
+    @property
+    def loaded(self) -> Any:
+        """(...) bool, whether there are loads."""
+        acting = np.any(self.frame_loads.body, axis=-1)
+        acting = acting | np.any(self.frame_loads.joint, axis=-1)
+        return _plain(np.broadcast_to(acting, np.shape(self._first)))
+
     @cached_property
-    def energy(self) -> float:
-        """[J] elastic energy stored; 0 where the certificate cannot tell it from 0."""
+    def energy(self) -> Numbers:
+        """(...) [J] elastic, stored; 0 where the certificate cannot tell it from 0."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
         )  # fmt: skip
-        return self.stored if nonzero else 0.0
+        return _plain(np.where(nonzero, self.stored, 0.0))
 
     @property
-    def stored(self) -> float:
-        """[J] in the springs of the numerical solution."""
-        return float(self.elastic @ self.elastic) / 2
+    def stored(self) -> Numbers:
+        """(...) [J] in the springs of the numerical solution."""
+        return _plain(np.vecdot(self.elastic, self.elastic) / 2)
 
-    @property
-    def potential(self) -> float:
-        """[J] energy minus the work of the loads."""
-        on_errors = self.frame_loads.body @ self.posture.robot.errors.ravel()
-        return self.stored - self.work - float(on_errors)
+    @cached_property
+    def potential(self) -> Numbers:
+        """(...) [J] energy minus the work of the loads."""
+        on_errors = np.vecdot(self.frame_loads.body, _flat(self._errors))
+        return _plain(self.stored - self.work - on_errors)
 
-    @property
-    def work(self) -> float:
-        """[J] of the loads on all small screws but the errors."""
+    @cached_property
+    def work(self) -> Numbers:
+        """(...) [J] of the loads on all small screws but the errors."""
         joints = self.clearance_screws + self.joint_screws
-        on_bodies = self.frame_loads.body @ self.link_screws.ravel()
-        return float(on_bodies + self.frame_loads.joint @ joints.ravel())
+        on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
+        return _plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
+
+    @property
+    def _errors(self) -> NDArray:
+        """(..., n, 6) [rad, m]."""
+        return self.posture.robot.errors if self.errors is None else self.errors
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] clearances, and small motions of passive joints."""
-        screws = self.joints.cones @ self.clearances + self.joints.free @ self.motions
-        return screws.reshape(-1, 6)
+        """(..., n, 6) [rad, m] clearances, and small motions of passive joints."""
+        screws = self.clearances @ self.joints.cones.T
+        return _by_frames(screws + self.motions @ self.joints.free.T)
 
     @cached_property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the bodies."""
-        return (self.joints.elastic @ (self.elastic * self.joints.links)).reshape(-1, 6)
+        """(..., n, 6) [rad, m] deformations of the bodies."""
+        springs = self.elastic * self.joints.links
+        return _by_frames(springs @ self.joints.elastic.T)
 
     @cached_property
     def joint_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the joints."""
+        """(..., n, 6) [rad, m] deformations of the joints."""
         springs = self.elastic * ~self.joints.links
-        return (self.joints.elastic @ springs).reshape(-1, 6)
+        return _by_frames(springs @ self.joints.elastic.T)
 
     @cached_property
     def screws(self) -> NDArray:
-        """(n, 6) [rad, m] total screw at each frame, geometric error included."""
+        """(..., n, 6) [rad, m] total screw at each frame, geometric error included."""
         moved = self.clearance_screws + self.link_screws + self.joint_screws
-        return self.posture.robot.errors + moved
+        return self._errors + moved
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(6,) [rad, m] platform's pose error at its origin, base axes, eq. (8)."""
-        return self.linearisation.platform @ self.screws.ravel()
+        """(..., 6) [rad, m] platform's pose error at its origin, base axes, eq. (8)."""
+        return _times(self.linearisation.platform, _flat(self.screws))
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """(closures, 6) [N m, N] what each closure's second chain exerts on its first.
+        """(..., closures, 6) [N m, N] each closure's second chain exerts on its first.
 
         At the platform's origin, base axes.  Where rigid parts are overconstrained
         they are not determined; these are then the smallest ones.
         """
         size = self.linearisation.size
-        return self.multipliers.reshape(-1, 6) / np.array([1, 1, 1, size, size, size])
+        return _by_frames(self.multipliers) / np.array([1, 1, 1, size, size, size])
 
     @cached_property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] of each link's spring: K_E times the link's deformation.
+        """(..., n, 6) [N m, N] of each link's spring: K_E times its deformation.
 
         At the frame's origin, in its axes.  The link's own weight counts at its two
         ends here; :attr:`tip_wrenches` are what its section at the tip transmits.
         """
-        return self._closing + self.frame_loads.body.reshape(-1, 6)
+        return self._closing + _by_frames(self.frame_loads.body)
 
     @cached_property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what the outer part exerts on each body, at its tip.
+        """(..., n, 6) [N m, N] what the outer part exerts on each body, at its tip.
 
         At the frame's origin, in its axes; the body's own weight acts along it.
         """
@@ -206,7 +350,7 @@ class Assembly:
 
     @cached_property
     def start_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] what links under their own weight transmit at their starts.
+        """(..., n, 6) [N m, N] of links under their own weight, at their starts.
 
         At the link's start, in its frame's axes; NaN for bodies without such a weight.
         """
@@ -216,35 +360,39 @@ class Assembly:
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] the same through each joint, equal to K_B times its screw.
+        """(..., n, 6) [N m, N] the same through each joint: K_B times its screw.
 
         They differ from :attr:`tip_wrenches` by loads on the body at the frame.
         """
-        return self._closing + self.frame_loads.joint.reshape(-1, 6)
+        return self._closing + _by_frames(self.frame_loads.joint)
 
     @cached_property
     def _closing(self) -> NDArray:
-        """(n, 6) [N m, N] through each frame from the closures alone."""
+        """(..., n, 6) [N m, N] through each frame from the closures alone."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
-        return np.einsum("nji,nj->ni", self.posture.paths, at_platform)
+        return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
     @cached_property
-    def bound(self) -> float:
-        """[J] certified lower bound of energy minus the load's work.
+    def bound(self) -> Numbers:
+        """(...) [J] certified lower bound of energy minus the load's work.
 
         The complementary energy of these wrenches, whatever they are: every assembly
         has at least -w.dl - w.C w/2 - (the most that clearances can gain).  How the
         problem was solved does not enter; free motions count as no larger than here.
         """
-        body, joint = self.wrenches.ravel(), self.joint_wrenches.ravel()
-        columns = self.joints
-        springs = np.where(
-            columns.links, columns.elastic.T @ body, columns.elastic.T @ joint
-        )
-        clearances = float(cone_sizes(columns.cones.T @ joint, columns.group).sum())
-        slip = float(np.abs(columns.free.T @ joint) @ np.abs(self.motions))
-        errors = float(body @ self.posture.robot.errors.ravel())
-        return -errors - float(springs @ springs) / 2 - clearances - slip
+        joint, springs = _flat(self.joint_wrenches), self._balancing
+        clearances = cone_sizes(joint @ self.joints.cones, self.joints.group)
+        slip = np.vecdot(np.abs(joint @ self.joints.free), np.abs(self.motions))
+        errors = np.vecdot(_flat(self.wrenches), _flat(self._errors))
+        gains = clearances.sum(axis=-1)
+        return _plain(-errors - np.vecdot(springs, springs) / 2 - gains - slip)
+
+    @property
+    def _balancing(self) -> NDArray:
+        """(..., ny) [sqrt(2 J)] the springs' deformations that balance the wrenches."""
+        columns, links = self.joints.elastic, self.joints.links
+        body, joint = _flat(self.wrenches), _flat(self.joint_wrenches)
+        return np.where(links, body @ columns, joint @ columns)
 
     def has_loads(
         self,
@@ -258,58 +406,130 @@ class Assembly:
             other.joint, self.frame_loads.joint
         )
 
-    def closure_residual(self) -> float:
-        """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
-        residual = self.linearisation.rows @ self.screws.ravel()
-        return float(np.abs(residual).max(initial=0.0))
+    def closure_residual(self) -> Numbers:
+        """(...) largest of abs(rad) and abs(m) / reference length open in a closure."""
+        return self._residual
 
-    def clearance_excess(self, compliant: Compliant = "elastic") -> float:
-        """[-] by how much the worst clearance leaves its cone, relative to its size."""
+    @cached_property
+    def _residual(self) -> Numbers:
+        residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
+        return _plain(residual.max(axis=-1, initial=0.0))
+
+    def clearance_excess(self, compliant: Compliant = "elastic") -> Numbers:
+        """(...) [-] by how much the worst clearance leaves its cone, of its size."""
+        if compliant == "elastic" and "_excess" in vars(self):
+            return self._excess
         bounds = clearance_bounds(self.posture.robot, compliant)
-        return clearance_excess(self.clearance_screws, bounds)
+        return _plain(clearance_excess(self.clearance_screws, bounds))
 
     @cached_property
-    def rounding(self) -> float:
-        """[rad, lengths] what rounding may leave open in a closure."""
-        lin = self.linearisation
-        return float(closure_rounding(self.posture.robot.errors, self.joints, lin.size))
+    def _excess(self) -> Numbers:
+        return self.clearance_excess()
 
     @cached_property
-    def uncertainty(self) -> float:
-        """[J] the duality gap without cancellation, and with rounding counted in.
+    def rounding(self) -> Numbers:
+        """(...) [rad, lengths] what rounding may leave open in a closure."""
+        size = self.linearisation.size
+        return _plain(closure_rounding(self._errors, self.joints, size))
+
+    @cached_property
+    def uncertainty(self) -> Numbers:
+        """(...) [J] the duality gap without cancellation, rounding counted in.
 
         Energy minus its bound is |y - s|^2 / 2, with s the springs' deformations that
         balance the wrenches, plus for each cone what its wrench could still gain, plus
         the work of the multipliers on the closures' residual.
         """
-        body, joint = self.wrenches.ravel(), self.joint_wrenches.ravel()
-        columns = self.joints.elastic.T
-        springs = self.elastic - np.where(
-            self.joints.links, columns @ body, columns @ joint
-        )
-        on_cones = self.joints.cones.T @ joint
-        sizes = cone_sizes(on_cones, self.joints.group)
-        gains = sizes - np.bincount(
-            self.joints.group, weights=on_cones * self.clearances, minlength=len(sizes)
-        )
-        slip = np.abs(self.joints.free.T @ joint) @ np.abs(self.motions)
-        residual = np.abs(self.linearisation.rows @ self.screws.ravel()) + self.rounding
-        work_on_residual = float(np.abs(self.multipliers) @ residual)
-        return float(
-            springs @ springs / 2 + np.maximum(gains, 0.0).sum() + 2 * slip
-            + work_on_residual + ROUNDING * (sizes.sum() + abs(self.work))
+        joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
+        group, on_cones = self.joints.group, joint @ self.joints.cones
+        sizes = cone_sizes(on_cones, group)
+        gains = sizes - cone_sums(on_cones * self.clearances, group)
+        slip = np.vecdot(np.abs(joint @ self.joints.free), np.abs(self.motions))
+        residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
+        rounding = np.asarray(self.rounding)[..., None]
+        work_on_residual = np.vecdot(np.abs(self.multipliers), residual + rounding)
+        return _plain(
+            np.vecdot(springs, springs) / 2
+            + np.maximum(gains, 0.0).sum(axis=-1) + 2 * slip + work_on_residual
+            + ROUNDING * (sizes.sum(axis=-1) + np.abs(self.work))
         )  # fmt: skip
 
-    def duality_gap(self) -> float:
-        """[J] certified: the energy is at most this above the least possible."""
-        # in this order NaN stays NaN
-        return max(self.potential - self.bound, 0.0)
+    def duality_gap(self) -> Numbers:
+        """(...) [J] certified: energy is at most this above the least possible."""
+        return self._gap
 
-    def relative_gap(self) -> float:
-        """[-] duality gap relative to energy, or to 1e-4 of that without clearance."""
+    @cached_property
+    def _gap(self) -> Numbers:
+        return _plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
+
+    def relative_gap(self) -> Numbers:
+        """(...) [-] duality gap by energy, or by 1e-4 of that without clearance."""
         # inside an assembly zone the least energy is zero, and no gap relative to it
-        scale = max(self.stored, 1e-4 * self.energy_without_clearance, 1e-300)
-        return self.duality_gap() / scale
+        least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
+        return _plain(self.duality_gap() / np.maximum(self.stored, least))
+
+    @property
+    def certified(self) -> Any:
+        """(...) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance.
+
+        Under loads also + 1e-12 of their work.
+        """
+        largest_energy = self.energy_without_clearance + np.abs(self.work)
+        allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
+        return (self.duality_gap() <= allowed) & (np.asarray(self.status) == "ok")
+
+
+# what compiled functions say beside a solution, of one point and of many
+_OF_ONE = ("energy", "platform_screw")
+_OF_MANY = (*_OF_ONE, "work", "potential", "bound", "_gap", "_residual", "_excess")
+
+
+def _with_known(
+    assembly: Assembly, known: Mapping[str, Any], names: tuple[str, ...]
+) -> Assembly:
+    """What is known already, and so not computed again when somebody asks."""
+    own = vars(assembly)
+    for name in names:
+        if name in known:
+            own[name] = _plain(known[name])
+    return assembly
+
+
+def known_assembly(known: Mapping[str, Any], **fields: Any) -> Assembly:
+    """An assembly of which more is known than its fields.
+
+    Args:
+        known: values of properties: ``energy``, ``platform_screw``, ``work``,
+            ``potential``, ``bound``, and, as ``_gap``, ``_residual``, ``_excess``, the
+            rest of its certificate.
+        fields: of the assembly.
+
+    Returns:
+        It.
+    """
+    return _with_known(Assembly(**fields), known, _OF_MANY)
+
+
+def _plain(values: Any) -> Any:
+    """Arrays as they are; of one point the number itself."""
+    if isinstance(values, np.ndarray):
+        return values if values.ndim else values.item()
+    return values.item() if isinstance(values, np.generic) else values
+
+
+def _flat(screws: NDArray) -> NDArray:
+    """(..., 6n) of (..., n, 6)."""
+    return screws.reshape(*screws.shape[:-2], -1)
+
+
+def _by_frames(screws: NDArray) -> NDArray:
+    """(..., n, 6) of (..., 6n)."""
+    return screws.reshape(*screws.shape[:-1], -1, 6)
+
+
+def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
+    """Matrices (..., a, b) times vectors (..., b)."""
+    return (matrices @ vectors[..., None])[..., 0]
 
 
 def without_rounding(wrenches: NDArray) -> NDArray:

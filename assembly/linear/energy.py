@@ -1,77 +1,55 @@
-"""The least energy that closes a manipulator, problem (22): one answer or many.
+"""The least energy that closes a manipulator, problem (22), at one point or at many.
 
 Compiled from the frames' poses to the certificate (:mod:`assembly.linear.lanes`), with
 loads and without.  What this does not cover, or where its certificate falls short, is
 solved by the reference (:mod:`assembly.linear.reference`), and the answer says so.
 """
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
-from typing import overload
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly, all_loads
-from assembly.linear.assemblies import (
-    COMPILED,
-    OUTCOMES,
-    Assemblies,
-    excess_of,
-    solve_again,
+from assembly.kinematics.posture import Posture, together
+from assembly.linear.assembled import Assembly, all_loads, known_assembly
+from assembly.linear.certificate import unproved
+from assembly.linear.closure import (
+    VirtualJoints,
+    checked_size,
+    linearise,
+    virtual_joints,
 )
-from assembly.linear.closure import checked_size, linearise
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads, no_loads
-from assembly.linear.reference import (
-    CannotAssemble,
-    least_energy,
-    without_own_springs,
-)
-from assembly.linear.robot_structure import Structure, structure_of
+from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference import CannotAssemble, least_energy
+from assembly.linear.robot_structure import structure_of
 from assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
     drop_zeros,
     stiffness_spread,
 )
-from assembly.linear.solutions import Solutions
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
+from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
-__all__ = [
-    "Assemblies", "Assembly", "CannotAssemble", "minimise_energies",
-    "minimise_under_loads", "solve_assembly",
-]  # fmt: skip
+__all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# structure, frames, errors, closure errors of the frames, rows to fill
-_Given = tuple[Structure, NDArray, NDArray, NDArray, Solutions]
-
-
-@overload
-def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
-    gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
-) -> Assembly: ...  # fmt: skip
-
-
-@overload
-def solve_assembly(
-    posture: Sequence[Posture], load: ArrayLike | None = None,
-    bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
-    errors: ArrayLike | None = None, method: Method = "compiled",
-) -> Assemblies: ...  # fmt: skip
-
-
-@overload
-def solve_assembly(
-    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
-    gravity: ArrayLike | None = None, *, errors: ArrayLike,
-    method: Method = "compiled",
-) -> Assemblies: ...  # fmt: skip
+_LEFT = 2  # outcomes from this on, of assembly/kernels/linear/energies.h, are no answer
+_STATUS: dict[type[Exception], str] = {
+    CannotAssemble: "cannot assemble",
+    FreeMotion: "no equilibrium",
+    SolverFailed: "solver failed",
+}
+_NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
+_VECTORS = ("clearances", "motions", "multipliers", "elastic")
+# arrays of k points by what they are; "tight" is the energy without clearance
+_Rows = dict[str, NDArray]
 
 
 def solve_assembly(
@@ -81,18 +59,18 @@ def solve_assembly(
     gravity: ArrayLike | None = None,
     errors: ArrayLike | None = None,
     method: Method = "compiled",
-) -> Assembly | Assemblies:
+) -> Assembly:
     """Close a manipulator at least energy, problem (22), under optional loads.
 
     Args:
         posture: where the robot stands; its errors, clearances, links and joint
-            springs are the robot's.  Or many postures of one robot.
-        load: (6,) [N m, N] wrench on the platform at its origin, base axes; energy
-            minus its work is then what is minimised.
-        bodies: (n, 6) [N m, N] wrenches on the bodies of all frames, each at its
-            frame's origin, base axes.
-        gravity: (3,) [m/s^2] base axes; links with a density and bodies with a mass
-            then have weight.
+            springs are the robot's.  Or k postures of one robot.
+        load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
+            energy minus its work is then what is minimised.
+        bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
+            at its frame's origin, base axes.
+        gravity: (3,) or (k, 3) [m/s^2] base axes; links with a density and bodies with
+            a mass then have weight.
         errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
             each of k postures, or k sets at one.
         method: ``"compiled"``, and the reference where that does not prove its answer;
@@ -101,91 +79,102 @@ def solve_assembly(
 
     Returns:
         The assembled manipulator; :func:`assembly.linear.certificate.unproved` says
-        where its certificate falls short even so.  Of many postures or sets
-        of errors all of them, where one without a solution says so and raises nothing.
+        where its certificate falls short even so.  Of many postures or sets of errors
+        all of them in one, where a point without a solution says so and raises nothing.
 
     Raises:
         CannotAssemble: a closure is open that no clearance and no spring can close.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
-        ValueError: errors do not fit the robot or the postures, or no such method.
+        ValueError: errors do not fit the robot or the postures, a transform is not
+            finite, an error is beyond 1e6 rad or m, or no such method.
     """
     check_method(method)
-    if isinstance(posture, Posture) and errors is None:
-        return _solve_one(posture, load, bodies, gravity, method)
-    postures = [posture] if isinstance(posture, Posture) else list(posture)
-    robot = postures[0].robot
+    if not isinstance(posture, Posture):
+        posture = together(posture)
+    loads = no_loads(posture.robot.errors.size)
+    if load is not None or bodies is not None or gravity is not None:
+        loads = all_loads(posture, load, bodies, gravity)
+    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
+    if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:
+        return _solve_one(posture, wrench, loads, method)
     sets = None if errors is None else np.asarray(errors, dtype=float)
-    T = np.array([p.transforms for p in postures])
-    mismatch = np.array([p.mismatch for p in postures])
-    if load is None and bodies is None and gravity is None:
-        return minimise_energies(robot, T, sets, mismatch, method=method)
-    where = posture if isinstance(posture, Posture) else Posture(
-        robot, np.array([p.coordinates for p in postures]), T, float(mismatch.max())
-    )  # fmt: skip
-    loads = all_loads(where, load, bodies, gravity)
-    at = partial(_posture_at, robot, T, sets, mismatch)
-    return minimise_under_loads(
-        robot, T, loads, lambda i: _solve_one(at(i), load, bodies, gravity, method),
-        sets, mismatch, method,
-    )  # fmt: skip
+    return _solve_many(posture, sets, wrench, loads, "elastic", method)
+
+
+def with_free_own_axes(assembly: Assembly) -> Assembly:
+    """The least energy when compliant joints turn freely about their own axis.
+
+    Args:
+        assembly: of one point or of many.
+
+    Returns:
+        The same points under the same loads, see ``"hinged"`` of
+        :func:`assembly.linear.closure.virtual_joints`.
+    """
+    posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
+    if not assembly.of_many:
+        return least_energy(posture, load, loads, "hinged")
+    return _solve_many(posture, assembly.errors, load, loads, "hinged", "compiled")
+
+
+def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
+    """Points that were solved each by itself, in one.
+
+    Args:
+        posture: k postures, of a robot that may differ from the points' in its springs
+            and clearances.
+        points: k of them, or why there is no solution.
+
+    Returns:
+        All of them; each is itself again by its row.
+    """
+    joints, count = virtual_joints(posture.robot), len(points)
+    rows = _empty(joints, count)
+    rows |= {"excess": np.zeros(count)} | _unsaid(count)
+    none = no_loads(posture.robot.errors.size)
+    many = _of_rows(posture, joints, rows, np.zeros(6), none, None)
+    for i, point in enumerate(points):
+        _record(rows, many.apart, i, point)
+        many.apart[i] = point
+    _certify(rows, many)
+    return many
+
+
+def failure_status(error: Exception) -> str:
+    """The status of a posture without a solution.
+
+    Args:
+        error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
+
+    Returns:
+        The status of the public format.
+    """
+    return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
 
 
 def _solve_one(
-    posture: Posture, load: ArrayLike | None, bodies: ArrayLike | None,
-    gravity: ArrayLike | None, method: Method,
-) -> Assembly:  # fmt: skip
+    posture: Posture, load: NDArray, loads: FrameLoads, method: Method
+) -> Assembly:
     """One posture: compiled, or, in doubt or if asked, by the reference."""
-    if method == "reference":
-        return least_energy(posture, load, bodies, gravity)
-    frame_loads = None
-    if load is not None or bodies is not None or gravity is not None:
-        frame_loads = all_loads(posture, load, bodies, gravity) or None
-    assembly = _compiled_assembly(posture, load, frame_loads)
-    if assembly is not None:
-        return assembly
-    return least_energy(posture, load, bodies, gravity)
-
-
-def _compiled_assembly(
-    posture: Posture, load: ArrayLike | None, frame_loads: FrameLoads | None
-) -> Assembly | None:
-    """One posture; None where it is left to the reference."""
     robot = posture.robot
-    rounding = _rounding_of(robot)
-    joints, _ = structure_of(robot)
+    if method == "reference":
+        return least_energy(posture, load, loads)
+    rounding, (joints, _) = _rounding_of(robot), structure_of(robot)
+    acting = loads.rows() if loads else None
     # a copy: the address of an array that may be written is found three times as fast
     T = np.array(posture.transforms, ndmin=4)
-    out = _solve_compiled(
-        robot, T, robot.errors[None],
-        np.array([posture.mismatch]), "elastic", len(joints.links),
-        None if frame_loads is None else frame_loads.rows(1),
+    off = np.array([posture.mismatch])
+    rows = _compiled(robot, T, robot.errors[None], off, "elastic", acting)
+    if rows["outcome"][0] >= _LEFT:
+        return least_energy(posture, load, loads)
+    _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
+    return known_assembly(
+        {key: rows[key][0] for key in ("energy", "platform_screw")},
+        linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
+        method="compiled", energy_without_clearance=float(rows["tight"][0]),
+        **{key: rows[key][0] for key in _VECTORS},
     )  # fmt: skip
-    if out.outcome[0] >= COMPILED:
-        return None
-    residual = out.residual + rounding
-    loaded = frame_loads is not None
-    drop_zeros(out.energy, out.bound, out.multipliers, residual, loaded)
-    multipliers = out.multipliers[0]
-    # without loads no wrenches mean no deformation but rounding
-    bent = len(out.elastic) > 0 and (loaded or np.count_nonzero(multipliers) > 0)
-    assembly = Assembly(
-        linearisation=linearise(posture),
-        joints=joints,
-        load=np.zeros(6) if load is None else np.array(load, dtype=float),
-        frame_loads=frame_loads or no_loads(robot.errors.size),
-        elastic=out.elastic[0] if bent else np.zeros(len(joints.links)),
-        clearances=out.clearances[0],
-        motions=out.motions[0],
-        multipliers=multipliers,
-        energy_without_clearance=float(out.without_clearance[0]),
-        method="compiled",
-    )
-    # known already, and so not computed again when somebody asks
-    vars(assembly).update(
-        energy=float(out.energy[0]), platform_screw=out.platform_screw[0]
-    )
-    return assembly
 
 
 @lru_cache(maxsize=32)  # of one robot at many postures
@@ -195,199 +184,209 @@ def _rounding_of(robot: Robot) -> float:
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
 
-def _any_load(loads: NDArray | None, count: int) -> NDArray:
-    """(k,) bool: which points are under loads."""
-    if loads is None:
-        return np.zeros(count, dtype=bool)
-    return np.broadcast_to(np.any(loads, axis=(1, 2, 3)), (count,))
-
-
-def _solve_compiled(
-    robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
-    springs: int, loads: NDArray | None, method: Method = "compiled",
-) -> Solutions:  # fmt: skip
-    """Rows of k points, and of the deformations of so many springs."""
+def _solve_many(
+    posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
+    compliant: Compliant, method: Method,
+) -> Assembly:  # fmt: skip
+    """All points compiled, unless asked otherwise; one by one what that leaves."""
+    robot = posture.robot
+    T, sets, off = _checked(posture, errors)
     joints, structure = structure_of(robot, compliant)
-    count = len(errors) if len(T) == 1 else len(T)
-    out = Solutions(
-        outcome=np.zeros(count, dtype=np.int64),
-        energy=np.zeros(count),
-        bound=np.zeros(count),
-        without_clearance=np.zeros(count),
-        work=np.zeros(count),
-        platform_screw=np.zeros((count, 6)),
-        clearances=np.zeros((count, joints.cones.shape[1])),
-        motions=np.zeros((count, joints.free.shape[1])),
-        multipliers=np.zeros((count, 6 * len(robot.closures))),
-        residual=np.zeros(count),
-        elastic=np.zeros((count if springs else 0, springs)),
-    )
-    given = structure, T, errors, mismatch, out
-    if method == "reference":
-        out.outcome[:] = OUTCOMES.index("asked")
-    elif stiffness_spread(joints, structure.size) > SPREAD:
-        out.outcome[:] = OUTCOMES.index("uncertified")  # left to the reference
-    elif loads is None:
-        _fill(given, None)
-    else:  # points that no load acts on have the bits of those without
-        loaded = _any_load(loads, len(loads))
-        for some, acting in ((loaded, loads), (~loaded, None)):
-            if some.all():
-                _fill(given, acting)
-            elif some.any():
-                _fill_some(some, given, acting)
-    return out
+    acting = loads.rows() if loads else None
+    if acting is not None and len(T) == len(sets) == 1:  # loads alone differ
+        sets = np.repeat(sets, len(acting), axis=0)
+    count = len(sets) if len(T) == 1 else len(T)
+    rows = _compiled(robot, T, sets, off, compliant, acting, method)
+    rows["excess"] = _excess_of(rows["clearances"], structure.starts)
+    rows |= _unsaid(count)
+    if len(T) == 1 and posture.transforms.ndim > 3:
+        posture = posture[0]
+    own = None if errors is None else np.broadcast_to(sets, (count, *sets.shape[1:]))
+    points = _of_rows(posture, joints, rows, load, loads, own)
+    for i in np.flatnonzero(rows["outcome"] >= _LEFT).tolist():
+        one = points[i]  # where it stands, and its loads
+        _record(rows, points.apart, i, _by_reference(one, compliant))
+    residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
+    _drop_rounding(rows, residual, points.loaded)
+    _certify(rows, points)
+    return points
 
 
-def _fill(given: _Given, loads: NDArray | None) -> None:
-    """Every point; zeros are the answer where nothing has to move."""
-    if loads is not None or np.count_nonzero(given[2]):
-        assemble_side_by_side(*given, loads)
-
-
-def _fill_some(some: NDArray, given: _Given, loads: NDArray | None) -> None:
-    """Fill the rows of some of the points."""
-    structure, T, errors, mismatch, out = given
-    again = Solutions._make(rows[some] if len(rows) else rows for rows in out)
-    own = errors[some] if len(errors) > 1 else errors
-    _fill(
-        (structure, T[some], own, mismatch[some], again),
-        None if loads is None else loads[some],
-    )
-    for rows, solved in zip(out, again, strict=True):
-        if len(rows):
-            rows[some] = solved
-
-
-def minimise_energies(
-    robot: Robot,
-    transforms: ArrayLike,
-    errors: ArrayLike | None = None,
-    mismatch: ArrayLike = 0.0,
-    compliant: Compliant = "elastic",
-    method: Method = "compiled",
-) -> Assemblies:
-    """Close a manipulator at least energy, problem (22), at many points.
-
-    Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base, as of
-            :attr:`~assembly.kinematics.posture.Posture.transforms`; one row serves k
-            sets of errors.
-        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
-            closure error of the frames.
-        compliant: ``"elastic"``, or ``"hinged"``: compliant joints turn freely about
-            their own axis, see :func:`assembly.linear.closure.virtual_joints`.
-        method: as of :func:`solve_assembly`.
-
-    Returns:
-        Energies, screws and certificates, in the order given.
-
-    Raises:
-        ValueError: a shape does not fit the robot, a value is not finite, or no such
-            method.
-    """
-    check_method(method)
-    # writable and in C order, whatever comes: the kernels are compiled for one kind
-    T = np.require(transforms, dtype=float, requirements=["C", "W"])
-    count, n = len(T), len(robot.frames)
-    errors = robot.errors if errors is None else np.asarray(errors, dtype=float)
-    sets = len(errors) if count == 1 and errors.ndim == 3 else count
-    if T.shape != (count, n, 4, 4) or errors.shape not in {(n, 6), (sets, n, 6)}:
+def _checked(
+    posture: Posture, errors: NDArray | None
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Transforms, sets of errors and closure errors, of each point or one for all."""
+    n = len(posture.robot.frames)
+    given = posture.robot.errors if errors is None else errors
+    T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
+    sets = given.reshape(-1, *given.shape[-2:])
+    fit = len(T) == 1 or len(sets) in {1, len(T)}
+    if not fit or T.shape[1:] != (n, 4, 4) or sets.shape[1:] != (n, 6):
         raise ValueError(
-            f"minimise_energies: transforms have shape {T.shape} and errors "
-            f"{errors.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or (k, {n}, 6)"
+            f"solve_assembly: transforms of shape {posture.transforms.shape} and "
+            f"errors of shape {given.shape}, expected (k, {n}, 4, 4) and ({n}, 6) or "
+            f"(k, {n}, 6)"
         )
-    if not (np.isfinite(T).all() and np.all(np.abs(errors) <= LARGEST_LENGTH)):
+    if not (np.isfinite(T).all() and np.all(np.abs(sets) <= LARGEST_LENGTH)):
         raise ValueError(
-            "minimise_energies: transforms or errors are not all finite, or an error "
+            "solve_assembly: transforms or errors are not all finite, or an error "
             f"is larger than {LARGEST_LENGTH:g} [rad, m]"
         )
-    all_errors = np.require(errors.reshape(-1, n, 6), requirements=["C", "W"])
-    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (count,)).copy()
-    at = partial(_posture_at, robot, T, all_errors, off)
-
-    def one(i: int) -> Assembly:
-        assembly = _solve_one(at(i), None, None, None, method)
-        return without_own_springs(assembly) if compliant == "hinged" else assembly
-
-    return _minimise_all(robot, T, all_errors, off, compliant, None, one, method)
+    off = np.broadcast_to(np.asarray(posture.mismatch, dtype=float), (len(T),))
+    # writable and in C order, whatever comes: the kernels are compiled for one kind
+    T, sets, off = (
+        np.require(array, dtype=float, requirements=["C", "W"])
+        for array in (T, sets, off)
+    )
+    return T, sets, off
 
 
-def minimise_under_loads(
-    robot: Robot, transforms: NDArray, loads: FrameLoads,
-    one: Callable[[int], Assembly], errors: NDArray | None = None,
-    mismatch: ArrayLike = 0.0, method: Method = "compiled",
-) -> Assemblies:  # fmt: skip
-    """The same under loads.
-
-    Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base; one row serves k sets of
-            errors.
-        loads: (6n,), or a row for each of ``transforms``, as of
-            :func:`assembly.linear.load.loads_on_frames`.
-        one: solves a point by itself, by the same method.
-        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
-            closure error of the frames.
-        method: as of :func:`solve_assembly`.
-
-    Returns:
-        Energies, screws and certificates, in the order given.
-    """
-    T = np.require(transforms, dtype=float, requirements=["C", "W"])
-    own = robot.errors if errors is None else errors
-    own = np.require(own.reshape(-1, T.shape[1], 6), requirements=["C", "W"])
-    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    return _minimise_all(robot, T, own, off, "elastic", loads.rows(len(T)), one, method)
-
-
-def _minimise_all(
-    robot: Robot, T: NDArray, errors: NDArray, off: NDArray, compliant: Compliant,
-    loads: NDArray | None, one: Callable[[int], Assembly], method: Method,
-) -> Assemblies:  # fmt: skip
-    """All points compiled, unless asked otherwise; one by one what that leaves."""
+def _compiled(
+    robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
+    loads: NDArray | None, method: Method = "compiled",
+) -> _Rows:  # fmt: skip
+    """Rows of k points, by the compiled method, or left to the reference."""
     joints, structure = structure_of(robot, compliant)
-    out = _solve_compiled(robot, T, errors, off, compliant, 0, loads, method)
-    count = len(out.outcome)
-    energies = Assemblies(
-        energy=out.energy,
-        bound=out.bound,
-        energy_without_clearance=out.without_clearance,
-        work=out.work,
-        platform_screw=out.platform_screw,
-        closure_residual=out.residual,
-        clearance_excess=excess_of(out.clearances, structure.starts),
-        clearances=out.clearances,
-        motions=out.motions,
-        multipliers=out.multipliers,
-        outcome=out.outcome,
-        method=np.where(out.outcome < COMPILED, "compiled", "reference").astype(object),
-        loaded=_any_load(loads, count),
-        status=np.full(count, "ok", dtype=object),
-        reason=np.full(count, "", dtype=object),
-        joints=joints,
-        one=one,
-    )
-    for i in np.flatnonzero(out.outcome >= COMPILED).tolist():
-        solve_again(energies, i)
-    residual = energies.closure_residual
-    residual = residual + closure_rounding(errors, joints, structure.size)
-    drop_zeros(
-        energies.energy, energies.bound, energies.multipliers, residual, energies.loaded
-    )
-    return energies
+    count = len(errors) if len(T) == 1 else len(T)
+    rows = _empty(joints, count)
+    given = structure, T, errors, mismatch
+    if method == "reference" or stiffness_spread(joints, structure.size) > SPREAD:
+        rows["outcome"][:] = _LEFT
+    elif loads is None:
+        _fill(given, rows, None)
+    else:  # points that no load acts on have the bits of those without
+        loaded = np.any(loads, axis=(1, 2, 3))
+        for some, acting in ((loaded, loads), (~loaded, None)):
+            if some.all():
+                _fill(given, rows, acting)
+            elif some.any():
+                _fill_some(some, given, rows, acting)
+    return rows
 
 
-def _posture_at(
-    robot: Robot, T: NDArray, errors: NDArray | None, mismatch: NDArray, i: int
-) -> Posture:
-    """Posture i, of the robot with errors i."""
-    own = robot.errors if errors is None else errors[i if len(errors) > 1 else 0]
-    # one robot for all where the errors are its own: its columns are cached
-    erring = robot if np.array_equal(own, robot.errors) else robot.with_errors(own)
-    where = i if len(T) > 1 else 0
-    unknown = np.full(len(robot.frames), np.nan)
-    return Posture(erring, unknown, T[where], float(mismatch[where]))
+def _empty(joints: VirtualJoints, count: int) -> _Rows:
+    """Rows of k points to fill, in the kernel's order."""
+    return {
+        "outcome": np.zeros(count, dtype=np.int64),
+        "energy": np.zeros(count),
+        "bound": np.zeros(count),
+        "tight": np.zeros(count),
+        "work": np.zeros(count),
+        "platform_screw": np.zeros((count, 6)),
+        "clearances": np.zeros((count, joints.cones.shape[1])),
+        "motions": np.zeros((count, joints.free.shape[1])),
+        "multipliers": np.zeros((count, 6 * len(joints.robot.closures))),
+        "residual": np.zeros(count),
+        "elastic": np.zeros((count, joints.elastic.shape[1])),
+    }
+
+
+def _unsaid(count: int) -> _Rows:
+    """What the kernel does not fill of k points: method, status, proof."""
+    texts = {"method": "compiled", "status": "ok", "reason": ""}
+    rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
+    return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
+
+
+def _certify(rows: _Rows, points: Assembly) -> None:
+    """The gap, the potential and its least possible value, of energies and bounds."""
+    energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
+    rows["gap"][:] = np.maximum(0.0, energy - bound)
+    on_errors = loads.body @ points.posture.robot.errors.ravel()
+    if points.errors is not None:
+        on_errors = np.vecdot(loads.body, points.errors.reshape(len(energy), -1))
+    rows["potential"][:] = energy - rows["work"] - on_errors
+    rows["least"][:] = bound - rows["work"] - on_errors
+
+
+def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
+    """Every point; zeros are the answer where nothing has to move."""
+    if loads is not None or np.count_nonzero(given[2]):
+        structure, T, errors, mismatch = given
+        assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
+
+
+def _fill_some(
+    some: NDArray, given: tuple[Any, ...], rows: _Rows, loads: NDArray | None
+) -> None:
+    """Fill the rows of some of the points."""
+    structure, *points = given
+    part = {name: values[some] for name, values in rows.items()}
+    own = (array[some] if len(array) > 1 else array for array in points)
+    _fill((structure, *own), part, None if loads is None else loads[some])
+    for name, solved in part.items():
+        rows[name][some] = solved
+
+
+def _of_rows(
+    posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
+    loads: FrameLoads, errors: NDArray | None,
+) -> Assembly:  # fmt: skip
+    """Many assemblies; they see what is written into the rows later."""
+    known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
+    known |= {"bound": "least"}
+    known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
+    return known_assembly(
+        {name: rows[key] for name, key in known.items()},
+        linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
+        elastic=rows["elastic"], clearances=rows["clearances"],
+        motions=rows["motions"], multipliers=rows["multipliers"],
+        energy_without_clearance=rows["tight"], method=rows["method"],
+        status=rows["status"], reason=rows["reason"], errors=errors,
+    )  # fmt: skip
+
+
+def _by_reference(where: Assembly, compliant: Compliant) -> Assembly | Exception:
+    """One point solved by the reference, or why there is no solution."""
+    try:
+        return least_energy(where.posture, where.load, where.frame_loads, compliant)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return error
+
+
+def _record(
+    rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
+    found: Assembly | Exception,
+) -> None:  # fmt: skip
+    """Row i of a point solved by itself; kept where its columns are others."""
+    rows["method"][i] = "reference"
+    if isinstance(found, Exception):
+        for name in (*_NUMBERS, "platform_screw", *_VECTORS):
+            rows[name][i] = np.nan
+        rows["status"][i], rows["reason"][i] = failure_status(found), str(found)
+        apart[i] = found
+        return
+    rows["energy"][i], rows["work"][i] = found.energy, found.work
+    rows["bound"][i] = found.energy - found.duality_gap()
+    rows["tight"][i] = found.energy_without_clearance
+    rows["residual"][i] = found.closure_residual()
+    rows["excess"][i] = found.clearance_excess()
+    rows["platform_screw"][i] = found.platform_screw
+    rows["multipliers"][i] = found.multipliers
+    names = ("clearances", "motions", "elastic")
+    parts = {name: getattr(found, name) for name in names}
+    own = all(rows[name][i].shape == part.shape for name, part in parts.items())
+    for name, part in parts.items():
+        rows[name][i] = part if own else np.nan
+    if not own:
+        apart[i] = found
+    open_ = unproved(found)
+    if open_:
+        rows["status"][i], rows["reason"][i] = "solver failed", open_
+
+
+def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray | bool) -> None:
+    """Set to zero, in place, energies, wrenches and springs that are only rounding."""
+    multipliers = rows["multipliers"]
+    drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
+    # without loads no wrenches mean no deformation but rounding
+    if loaded is not True and np.count_nonzero(multipliers) < multipliers.size:
+        rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
+
+
+def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
+    """(k,) [-] by how much the worst of clearances (k, nu) leaves its cone."""
+    if not clearances.shape[1]:
+        return np.zeros(len(clearances))
+    squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)
+    return np.maximum(0.0, np.sqrt(squares.max(axis=0)) - 1.0)

@@ -6,6 +6,7 @@ alone, in a batch or in another order has the same answer to the last bit.  What
 covered, or not proved, is left to the reference, and marked.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.kernels.choice import kernels
 from assembly.linear.robot_structure import Structure
-from assembly.linear.solutions import Bounds, Centres, ClearanceLoads, Solutions
+from assembly.linear.solutions import Bounds, Centres, ClearanceLoads
 
 _KEPT = 64  # robots that are known to C++
 _known: dict[int, tuple[Structure, Any]] = {}
@@ -21,22 +22,26 @@ _known: dict[int, tuple[Structure, Any]] = {}
 
 def assemble_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
-    out: Solutions, loads: NDArray | None = None,
+    loads: NDArray | None, out: Mapping[str, NDArray],
 ) -> None:  # fmt: skip
-    """Solve every point; see :class:`~assembly.linear.solutions.Solutions`.
+    """Solve every point.
 
     Args:
         structure: the robot.
         T: (k, n, 4, 4) frames; of these and what follows one row serves all.
         errors: (k, n, 6) [rad, m].
         mismatch: [rad, m] nominal closure errors of the frames, as many.
-        out: arrays to fill.
         loads: (k, 2, n, 6) [N m, N] on bodies and on joints in the frames' axes.
+        out: to fill, in this order: (k,) outcomes, energies [J], certified lower bounds
+            of them, energies without clearance, work of the loads on all but the
+            errors; (k, 6) [rad, m] platform screws, (k, nu) clearances, (k, nq) free
+            motions, (k, 6 closures) multipliers; (k,) closures' residuals; (k, ny)
+            [sqrt(2 J)] deformations of the springs.
 
     Raises:
         ValueError: an array has another shape, type or order of its numbers.
     """
-    kernels.assemble_all(_robot(structure), T, errors, mismatch, loads, *out)
+    kernels.assemble_all(_robot(structure), T, errors, mismatch, loads, *out.values())
 
 
 def margins_side_by_side(

@@ -48,7 +48,8 @@ class FrameLoads:
     distributed: NDArray = field(default_factory=lambda: np.zeros(()))
 
     def __bool__(self) -> bool:
-        return bool(np.any(self.body) or np.any(self.joint))
+        # counted, which takes a fifth of the time of any()
+        return bool(np.count_nonzero(self.body) or np.count_nonzero(self.joint))
 
     @property
     def at_tips(self) -> NDArray:
@@ -56,21 +57,14 @@ class FrameLoads:
         full = np.broadcast_to(self.distributed, self.body.shape)
         return full.reshape(*full.shape[:-1], -1, 6)
 
-    def rows(self, count: int) -> NDArray:
+    def rows(self) -> NDArray:
         """The loads as compiled functions read them.
 
-        Args:
-            count: k; one row serves all.
-
         Returns:
-            (k, 2, n, 6) [N m, N] on bodies and on joints.
+            (k, 2, n, 6) [N m, N] on bodies and on joints; one row where it serves all.
         """
         rows = np.stack([self.body, self.joint], axis=-2)
-        rows = rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
-        if len(rows) == count:
-            return rows
-        every = np.broadcast_to(rows, (count, *rows.shape[1:]))
-        return np.require(every, requirements=["C", "W"])
+        return rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
 
 
 @lru_cache(maxsize=32)
@@ -97,8 +91,8 @@ def loads_on_frames(
     """Loads on all small screws of a robot.
 
     Args:
-        posture: where it stands, of n frames; or many postures, its transforms (..., n,
-            4, 4), and then all shapes here have the same leading dimensions.
+        posture: where it stands, of n frames; or many postures.  Leading dimensions, of
+            its transforms (..., n, 4, 4) and of all shapes here, are broadcast.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
         carried: (n, 6) [N m, N] on what each frame's joint carries, likewise.
@@ -112,7 +106,11 @@ def loads_on_frames(
     for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
         _check(whose, given, _LARGEST_LOAD, "N m, N")
     robot, T = posture.robot, posture.transforms
-    lead, n = T.shape[:-3], len(robot.frames)
+    n = len(robot.frames)
+    lead = T.shape[:-3]
+    for wrenches, axes in ((load, 1), (bodies, 2), (carried, 2)):
+        if wrenches is not None:
+            lead = np.broadcast_shapes(lead, np.shape(wrenches)[:-axes])
     given = np.zeros((*lead, 2, n, 6))
     own, after = given[..., 0, :, :], given[..., 1, :, :]
     if bodies is not None:
@@ -168,8 +166,9 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     """
     _check("gravity", gravity, LARGEST_LENGTH, "m/s^2")
     robot, T = posture.robot, posture.transforms
-    g = np.broadcast_to(np.asarray(gravity, dtype=float), (*T.shape[:-3], 3))
-    bodies, carried = np.zeros((2, *T.shape[:-2], 6))
+    lead = np.broadcast_shapes(T.shape[:-3], np.shape(gravity)[:-1])
+    g = np.broadcast_to(np.asarray(gravity, dtype=float), (*lead, 3))
+    bodies, carried = np.zeros((2, *lead, len(robot.frames), 6))
     for i, (mass, *centre, beam_mass, x, y, z) in enumerate(_masses(robot).tolist()):
         R = T[..., i, :3, :3]
         if mass:
@@ -230,9 +229,8 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
     """
     table, R = _masses(posture.robot), posture.transforms[..., :3, :3]
     g = np.asarray(gravity, dtype=float)[..., None, :]
-    W = table[:, 4:5] * np.einsum("...nji,...nj->...ni", R, np.broadcast_to(
-        g, R.shape[:-1]
-    ))  # fmt: skip
+    lead = np.broadcast_shapes(R.shape[:-1], g.shape)
+    W = np.einsum("...nji,...nj->...ni", R, np.broadcast_to(g, lead)) * table[:, 4:5]
     return np.concatenate([-np.cross(table[:, 5:], W) / 12, W / 2], axis=-1)
 
 
@@ -315,7 +313,7 @@ def with_distributed(
         The same loads.
     """
     at_tips = weights_at_tips(posture, gravity)
-    return replace(loads, distributed=at_tips.reshape(loads.body.shape))
+    return replace(loads, distributed=at_tips.reshape(*at_tips.shape[:-2], -1))
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:

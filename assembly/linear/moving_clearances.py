@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.assemblies import Assemblies
-from assembly.linear.energy import minimise_energies
+from assembly.linear.assembled import Assembly
+from assembly.linear.energy import with_free_own_axes
 from assembly.linear.lanes import bounds_side_by_side
 from assembly.linear.reach import READINGS
 from assembly.linear.robot_structure import Structure, structure_of
@@ -52,7 +52,7 @@ class Asked:
 
 def compiled_bounds(
     robot: Robot, transforms: NDArray, off: NDArray, errors: ArrayLike | None,
-    energies: Assemblies, asked: Asked,
+    energies: Assembly, asked: Asked,
 ) -> Bounds:  # fmt: skip
     """Bounds of k points; NaN in the rows that are left to numpy.
 
@@ -87,7 +87,7 @@ def compiled_bounds(
     if asked.reading == "free":
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
-        solution = minimise_energies(robot, T, errors, off, "hinged")
+        solution = with_free_own_axes(energies)
         bounds.outcome[~np.isfinite(solution.clearances).all(axis=1)] = FALLBACK
     places = _places_of(robot, asked.reading)
     loads = ClearanceLoads(

@@ -32,10 +32,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
-from assembly.linear.assemblies import Assemblies, assemblies_of, failure_status
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import minimise_energies
+from assembly.linear.energy import failure_status, solve_assembly
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.reach import reachable_screws
 from assembly.linear.reference import CannotAssemble
@@ -187,7 +187,7 @@ def bound_pose_error(
     if assembly.joints is structure_of(posture.robot)[0] and not assembly.frame_loads:
         bounds = _pose_errors(
             posture.robot, posture.transforms[None], np.array([posture.mismatch]),
-            posture.robot.errors[None], assemblies_of(assembly), asked,
+            posture.robot.errors[None], assembly.as_many, asked,
         )  # fmt: skip
         if not bounds.one_by_one[0]:
             return replace(bounds[0], proof=partial(unproved, assembly))
@@ -245,7 +245,7 @@ def bound_pose_errors(
     reading: str = "frozen",
     errors: ArrayLike | None = None,
     mismatch: ArrayLike = 0.0,
-    energies: Assemblies | None = None,
+    energies: Assembly | None = None,
     energy_budget: float = 0.05,
     tolerance_rotation: float = 1e-6,
     tolerance_translation: float = 1e-6,
@@ -279,9 +279,11 @@ def bound_pose_errors(
         reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
         method,
     )  # fmt: skip
-    if energies is None:
-        energies = minimise_energies(robot, transforms, errors, mismatch, method=method)
     T = np.asarray(transforms, dtype=float)
+    if energies is None:
+        unknown = np.full((len(T), len(robot.frames)), np.nan)
+        where = Posture(robot, unknown, T, mismatch)
+        energies = solve_assembly(where, errors=errors, method=method)
     if len(energies) != len(T):
         raise ValueError(
             f"bound_pose_errors: energies of {len(energies)} points, expected "
@@ -307,7 +309,7 @@ def bound_pose_errors(
 
 def _pose_errors(
     robot: Robot, T: NDArray, off: NDArray, errors: ArrayLike | None,
-    energies: Assemblies, asked: Asked,
+    energies: Assembly, asked: Asked,
 ) -> PoseErrors:  # fmt: skip
     """The compiled bounds, with what is known of (22)."""
     bounds = compiled_bounds(robot, T, off, errors, energies, asked)

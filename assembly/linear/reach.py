@@ -24,7 +24,7 @@ from scipy.linalg import svd
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.reduction import complement
-from assembly.linear.reference import without_own_springs
+from assembly.linear.reference import least_energy
 from assembly.linear.thresholds import (
     RANK,
     ROWS_RANK,
@@ -242,7 +242,9 @@ def reachable_screws(
     if reading == "free":
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
-        loaded = without_own_springs(assembly)
+        loaded = least_energy(
+            assembly.posture, assembly.load, assembly.frame_loads, "hinged"
+        )
 
     def moving(joints: VirtualJoints) -> MovingCones:
         held = np.zeros(joints.cones.shape[1], dtype=bool)

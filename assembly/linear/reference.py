@@ -25,11 +25,11 @@ Cone programmes are :mod:`assembly.solvers.conic`'s.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import svd
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly, all_loads
+from assembly.linear.assembled import Assembly
 from assembly.linear.closure import (
     Linearisation,
     VirtualJoints,
@@ -60,18 +60,18 @@ class CannotAssemble(Exception):
 
 
 def least_energy(
-    posture: Posture,
-    load: ArrayLike | None = None,
-    bodies: ArrayLike | None = None,
-    gravity: ArrayLike | None = None,
-) -> Assembly:
+    posture: Posture, load: NDArray, frame_loads: FrameLoads,
+    compliant: Compliant = "elastic",
+) -> Assembly:  # fmt: skip
     """Close a manipulator at least energy, as ``solve_assembly`` does.
+
+    Bounds of passive joints' own motion count where they matter.
 
     Args:
         posture: where the robot stands.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
-        bodies: (n, 6) [N m, N] wrenches on the bodies of all frames, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        frame_loads: all loads, this one among them.
+        compliant: see :func:`assembly.linear.closure.virtual_joints`.
 
     Returns:
         The assembled manipulator.
@@ -81,16 +81,7 @@ def least_energy(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver gave up.
     """
-    wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
-    frame_loads = all_loads(posture, wrench, bodies, gravity)
-    return _solve_within(linearise(posture), "elastic", wrench, frame_loads)
-
-
-def _solve_within(
-    lin: Linearisation, compliant: Compliant, load: NDArray, frame_loads: FrameLoads
-) -> Assembly:
-    """Close a manipulator; bounds of passive joints' motion count where they matter."""
-    robot = lin.posture.robot
+    lin, robot = linearise(posture), posture.robot
     try:
         joints = virtual_joints(robot, compliant)
         assembly = solve_with(lin, joints, load, frame_loads)
@@ -147,13 +138,6 @@ def solve_with(
     # no energy is needed: springs and wrenches are rounding of zero
     return replace(
         assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
-    )
-
-
-def without_own_springs(assembly: Assembly) -> Assembly:
-    """The least energy when compliant joints turn freely about their own axis."""
-    return _solve_within(
-        assembly.linearisation, "hinged", assembly.load, assembly.frame_loads
     )
 
 

@@ -10,37 +10,6 @@ from assembly.linear.robot_structure import Structure
 SOLVED, FALLBACK = range(2)
 
 
-class Solutions(NamedTuple):
-    """Problem (22), as arrays that compiled functions fill.
-
-    Attributes:
-        outcome: (k,) NEWTON or INTERIOR, or why it is left to the reference.
-        energy: (k,) [J].
-        bound: (k,) [J] certified lower bound of it.
-        without_clearance: (k,) [J] energy if every clearance stayed at zero.
-        work: (k,) [J] of the loads on all but the errors.
-        platform_screw: (k, 6) [rad, m].
-        clearances: (k, nu) in units of their cones.
-        motions: (k, nq) [rad, m].
-        multipliers: (k, 6 closures) of the scaled closures.
-        residual: (k,) [rad, reference lengths] largest of the closures.
-        elastic: (k, ny) [sqrt(2 J)] scaled deformation of the springs; no rows where
-            nobody asks.
-    """
-
-    outcome: NDArray
-    energy: NDArray
-    bound: NDArray
-    without_clearance: NDArray
-    work: NDArray
-    platform_screw: NDArray
-    clearances: NDArray
-    motions: NDArray
-    multipliers: NDArray
-    residual: NDArray
-    elastic: NDArray
-
-
 class ClearanceLoads(NamedTuple):
     """Loads and slack of the clearances of k points, from the solution of (22).
 

@@ -141,8 +141,7 @@ class Conditions:
     @property
     def postures(self) -> Posture:
         """All nominal postures in one, its arrays with R rows."""
-        worst = float(np.max(self.mismatch, initial=0.0))
-        return Posture(self.robot, self.coordinates, self.transforms, worst)
+        return Posture(self.robot, self.coordinates, self.transforms, self.mismatch)
 
     def posture(self, row: int) -> Posture:
         """One row's posture, the robot with that row's errors."""

@@ -78,23 +78,24 @@ def has_bounded_motion(robot: Robot) -> bool:
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
-def clearance_excess(screws: NDArray, bounds: NDArray) -> float:
+def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     """By how much the worst clearance screw leaves its cone, eqs (2)-(5).
 
     Args:
-        screws: (n, 6) [rad, m].
+        screws: (..., n, 6) [rad, m].
         bounds: (n, 4) [rad, rad, m, m].
 
     Returns:
-        [-] largest of size / bound - 1 over the bounds that are positive and finite,
-        and of size / 1 rad or m where the bound is zero; at least 0.
+        (...) [-] largest of size / bound - 1 over the bounds that are positive and
+        finite, and of size / 1 rad or m where the bound is zero; at least 0.
     """
     sizes = np.stack(
-        [np.linalg.norm(screws[:, list(rows)], axis=1) for rows in CONES], axis=1
+        [np.linalg.norm(screws[..., list(rows)], axis=-1) for rows in CONES], axis=-1
     )
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
-    limited &= bounds > 0.0
+    limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
     with np.errstate(over="ignore"):  # of a bound next to nothing
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
-    return max(0.0, float(excess.max()), float(where_rigid.max()))
+    worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
+    return np.maximum(0.0, worst)

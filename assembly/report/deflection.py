@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.assemblies import failure_status
-from assembly.linear.energy import CannotAssemble
+from assembly.linear.energy import CannotAssemble, failure_status
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import (

@@ -14,8 +14,7 @@ from assembly.kinematics.verdict import (
     SINGULAR_WORDS,
     limits_passed,
 )
-from assembly.linear.assemblies import failure_status
-from assembly.linear.energy import Assembly, CannotAssemble
+from assembly.linear.energy import Assembly, CannotAssemble, failure_status
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import rounded, screw_text

@@ -7,8 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.assemblies import failure_status
-from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.linear.energy import (
+    Assembly,
+    CannotAssemble,
+    failure_status,
+    solve_assembly,
+)
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.reach import READINGS, reachable_screws
 from assembly.linear.reduction import FreeMotion

@@ -9,9 +9,13 @@ from numpy.typing import ArrayLike
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.verdict import posture_remarks
-from assembly.linear.assemblies import failure_status
 from assembly.linear.certificate import unproved, unproved_screw
-from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
+from assembly.linear.energy import (
+    Assembly,
+    CannotAssemble,
+    failure_status,
+    solve_assembly,
+)
 from assembly.linear.load import massless
 from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import bound_pose_error

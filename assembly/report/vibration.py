@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.assemblies import failure_status
-from assembly.linear.energy import CannotAssemble
+from assembly.linear.energy import CannotAssemble, failure_status
 from assembly.linear.reduction import FreeMotion
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed

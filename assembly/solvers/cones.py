@@ -9,9 +9,16 @@ def cone_starts(group: NDArray) -> NDArray:
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
+def cone_sums(values: NDArray, group: NDArray) -> NDArray:
+    """(..., cones) sums of vectors' (..., nu) components in each cone."""
+    if values.ndim == 1:
+        return np.bincount(group, weights=values)
+    return values @ (group[:, None] == np.arange(np.bincount(group).size))
+
+
 def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
-    """(cones,) Euclidean size of a vector's part in each cone."""
-    return np.sqrt(np.bincount(group, weights=values**2))
+    """(..., cones) Euclidean size of vectors' parts in each cone."""
+    return np.sqrt(cone_sums(values**2, group))
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:

@@ -11,17 +11,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.energy import Assembly
 from assembly.linear.reach import reachable_screws
 from assembly.linear.reduction import FreeMotion
 from assembly.linear.reference import CannotAssemble
 from assembly.linear.thresholds import UNBOUNDED, rank_tolerance
 from assembly.solvers.conic import SolverFailed
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 
 READING = "frozen"  # every spring as in the solution of (22)
 
 
-def draws_at_bounds(prepared: OnePosture, draws: Draws) -> NDArray:
+def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
     """Draws in which a passive joint may reach the bound of its own motion.
 
     Args:
@@ -49,7 +50,7 @@ def draws_at_bounds(prepared: OnePosture, draws: Draws) -> NDArray:
     return active | (solved & (reach > prepared.ranges[limited]).any(axis=1))
 
 
-def _moves_platform(prepared: OnePosture) -> NDArray:
+def _moves_platform(prepared: LinearResponse) -> NDArray:
     """(nq,) bool: free motions that the closures do not hold and the platform shows."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
@@ -60,14 +61,13 @@ def _moves_platform(prepared: OnePosture) -> NDArray:
 
 
 def bounded_position(
-    prepared: OnePosture, errors: NDArray, wrench: NDArray | None,
-    rng: np.random.Generator,
-) -> tuple[NDArray, bool]:  # fmt: skip
+    draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
+) -> tuple[NDArray, bool]:
     """Platform screw of one draw at contact, or uniform over its set.
 
     Args:
-        prepared: the posture.
-        errors: (n, 6) [rad, m] of the draw.
+        draws: of one posture.
+        i: which of them.
         wrench: (6,) [N m, N] that displaces the platform to contact; None for the
             uniform distribution.
         rng: of random numbers, for the uniform distribution.
@@ -79,8 +79,7 @@ def bounded_position(
     from assembly.statistics.uniform_clearance import sample_uniform_position
 
     try:
-        assembly = prepared.assembly(errors)
-        reachable = reachable_screws(assembly, READING)
+        reachable = reachable_screws(draws[i], READING)
         if wrench is not None:
             bounded = replace(reachable, free=np.zeros((6, 0)))
             return bounded.support(wrench).screw, True

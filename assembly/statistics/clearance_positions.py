@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
+from assembly.linear.energy import Assembly
 from assembly.model.robot import Robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.bounded_motion import bounded_position, draws_at_bounds
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 
 # the option --play and its explanation
 CLEARANCE_MODELS = {
@@ -39,8 +40,8 @@ CLEARANCE_STREAM = 1  # of random numbers; 0 is the errors'
 
 
 def position_clearances(
-    prepared: OnePosture,
-    draws: Draws,
+    prepared: LinearResponse,
+    draws: Assembly,
     clearance_model: str,
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
@@ -49,7 +50,7 @@ def position_clearances(
 
     Args:
         prepared: the posture.
-        draws: of :meth:`~assembly.statistics.one_posture.OnePosture.solve`, k draws.
+        draws: k of them, of its ``solve``.
         clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
         generators: of random numbers, one for each draw; none for "least".
         contact_length: [m] of the contact model, see :func:`contact_length_of`.
@@ -76,9 +77,7 @@ def position_clearances(
     at_bounds = draws_at_bounds(prepared, draws)
     for i in np.flatnonzero(at_bounds).tolist():
         wrench = None if wrenches is None else wrenches[i]
-        screws[i], mixed[i] = bounded_position(
-            prepared, draws.errors[i], wrench, generators[i]
-        )
+        screws[i], mixed[i] = bounded_position(draws, i, wrench, generators[i])
     left = np.isfinite(draws.energy) & ~at_bounds
     if prepared.starts[-1] and left.any():
         moved, mixed[left] = _moved_clearances(
@@ -89,7 +88,7 @@ def position_clearances(
 
 
 def _moved_clearances(
-    prepared: OnePosture, draws: Draws, left: NDArray, wrenches: NDArray | None,
+    prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Motions of the clearances in the draws ``left``, and whether the walks mixed."""
@@ -133,7 +132,7 @@ def _random_wrenches(
 
 
 def _at_random(
-    prepared: OnePosture, loaded: NDArray, clearances: NDArray,
+    prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """Clearances uniform over their set, and whether the walks mixed."""
@@ -154,7 +153,7 @@ def _at_random(
 
 
 def _at_contact(
-    prepared: OnePosture, loaded: NDArray, clearances: NDArray, wrenches: NDArray
+    prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
     """Clearances displaced along wrenches (k, 6) on the platform until in contact."""
     from assembly.statistics.contact_positions import move_to_contact
@@ -167,14 +166,14 @@ def _at_contact(
     return ends
 
 
-def free_starts(prepared: OnePosture, free: NDArray) -> NDArray:
+def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
     """(cones + 1,) first column of each cone that is free among those that are."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
 def _contact_fallback(
-    prepared: OnePosture,
+    prepared: LinearResponse,
     rows: NDArray,
     free: NDArray,
     clearances: NDArray,
@@ -196,7 +195,7 @@ def _contact_fallback(
     return end
 
 
-def loaded_clearances(prepared: OnePosture, draws: Draws) -> NDArray:
+def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
     """(k, nu) bool: clearances loaded at their bound, by strict complementarity."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
@@ -209,14 +208,14 @@ def loaded_clearances(prepared: OnePosture, draws: Draws) -> NDArray:
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
 
 
-def clearance_constraints(prepared: OnePosture, loaded: NDArray) -> NDArray:
+def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
     """(p, nu) orthonormal rows of the equations that the free clearances keep."""
     rows = np.vstack([prepared.G, prepared.H]) * ~loaded
     _, S, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])
 
 
-def _cone_columns(prepared: OnePosture) -> NDArray:
+def _cone_columns(prepared: LinearResponse) -> NDArray:
     """(m, nu) closure columns of the clearances."""
     return prepared.closures @ prepared.joints.cones
 

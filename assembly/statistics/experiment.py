@@ -19,7 +19,7 @@ from assembly.statistics.clearance_positions import (
     contact_length_of,
     position_clearances,
 )
-from assembly.statistics.one_posture import OnePosture, prepare_energies
+from assembly.statistics.linear_response import LinearResponse, linear_response
 from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
@@ -84,14 +84,14 @@ class Experiment:
         return self.contact_length or contact_length_of(self.posture.robot)
 
     @cached_property
-    def energies(self) -> OnePosture:
+    def energies(self) -> LinearResponse:
         """The posture prepared for (22).
 
         Raises:
             BadInput: the load drives a motion that nothing resists.
         """
         try:
-            return prepare_energies(self.posture, self.load, self.gravity)
+            return linear_response(self.posture, self.load, self.gravity)
         except FreeMotion as error:
             raise BadInput(f"{self.posture.robot.name}: {error}") from None
 
@@ -168,13 +168,11 @@ class Experiment:
         solved = self.energies.solve(errors)
         rows = np.zeros(len(values), dtype=self.record_type)
         rows["energy"] = solved.energy
-        rows["duality_gap"] = np.maximum(0.0, solved.energy - solved.bound)
+        rows["duality_gap"] = solved.duality_gap()
         rows["status"] = ~np.isfinite(solved.energy)
         screws = solved.platform_screw
         if self.clearance_model == "worst":
-            bounds, _ = bound_worst_errors(
-                self.energies, solved, errors, self.precision
-            )
+            bounds, _ = bound_worst_errors(solved, self.precision)
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
@@ -191,7 +189,7 @@ class Experiment:
             if self.clearance_model == "uniform":
                 rows["play_mixed"] = mixed
         rows["platform_screw"] = screws
-        wrenches = without_rounding(self.energies.wrenches(solved.multipliers))
+        wrenches = without_rounding(solved.wrenches)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
             through = wrenches[..., part] - self.energies.at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))

@@ -10,10 +10,11 @@ draws: where the answer is linear each draw has the same.
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.energy import Assembly
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance import SaltelliDesign
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.sensitivity import solution_slopes
 
 DRAWS = 32  # whose slopes are averaged
@@ -36,7 +37,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
     draws = experiment.energies.solve(sources.errors(values))
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     if known.any():
-        slopes = platform_slopes(experiment.energies, draws.taken(known))
+        slopes = platform_slopes(experiment.energies, draws[known])
         of_sources = slopes[:, :, sources.frame, sources.component]
         mean = (of_sources**2).mean(axis=1)
         squares = np.stack([mean[:3].sum(axis=0), mean[3:].sum(axis=0)])
@@ -49,7 +50,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
     return gains
 
 
-def platform_slopes(prepared: OnePosture, draws: Draws) -> NDArray:
+def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
     """Slopes of the platform's screw with every geometric error.
 
     Args:
@@ -60,7 +61,7 @@ def platform_slopes(prepared: OnePosture, draws: Draws) -> NDArray:
         (6, k, n, 6) [rad or m for each rad or m].
     """
     count, frames = draws.errors.shape[:2]
-    repeated = draws.taken(np.tile(np.arange(count), 6))
+    repeated = draws[np.tile(np.arange(count), 6)]
     by_screw = np.repeat(np.eye(6), count, axis=0)
     by_wrench = np.zeros((6 * count, frames, 6))
     slopes = solution_slopes(prepared, repeated, by_wrench, by_screw)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.model.clearance import BOUND_OF_COMPONENT
 from assembly.statistics.experiment import Experiment
-from assembly.statistics.one_posture import OnePosture
+from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import kind_of
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
@@ -66,12 +66,12 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
     return reached
 
 
-def _clearance_parts(prepared: OnePosture) -> dict[str, dict[str, float]]:
+def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
     """By pose error, the part of each kind of clearance in the largest."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
-    _, screws = bound_worst_errors(prepared, draws, draws.errors, _PRECISION)
+    _, screws = bound_worst_errors(draws, _PRECISION)
     names, heads = _clearance_kinds(prepared), prepared.starts[:-1]
     parts = {}
     for i, key in enumerate(POSE_ERRORS):
@@ -87,7 +87,7 @@ def _clearance_parts(prepared: OnePosture) -> dict[str, dict[str, float]]:
     return parts
 
 
-def _clearance_kinds(prepared: OnePosture) -> list[str]:
+def _clearance_kinds(prepared: LinearResponse) -> list[str]:
     """Kind of each cone, such as ``hinge.tilt``: of all legs together."""
     rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
         axis=0

@@ -17,7 +17,7 @@ from assembly.linear.thresholds import RANK
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import Compliant
 from assembly.solvers.cones import cone_starts
-from assembly.statistics.one_posture import checked_errors
+from assembly.statistics.linear_response import checked_errors
 
 _CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
 

@@ -3,13 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.linear.energy import Assembly
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import WEIGHTLESS, LinkStress, stressed_links
 from assembly.statistics.clearance_positions import (
     CLEARANCE_STREAM,
     position_clearances,
 )
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
@@ -21,7 +22,7 @@ _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
 def respond(
-    prepared: PostureMargins | OnePosture, sources: ErrorSources, values: NDArray,
+    prepared: PostureMargins | LinearResponse, sources: ErrorSources, values: NDArray,
     key: str = "energy", clearance_model: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
@@ -48,7 +49,7 @@ def respond(
         margins = prepared.solve(errors)
         return margins.margin, margins.slopes[:, sources.frame, sources.component]
     draws = prepared.solve(errors)
-    wrenches = prepared.wrenches(draws.multipliers)
+    wrenches = draws.wrenches
     if key == "energy":
         return draws.energy, -wrenches[:, sources.frame, sources.component]
     size = np.full(len(values), np.nan)
@@ -57,7 +58,7 @@ def respond(
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
-        some = draws.taken(solved)
+        some = draws[solved]
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
                 prepared, some, key, (clearance_model, contact_length), solved
@@ -73,14 +74,14 @@ def respond(
 
 
 def _pose_error(
-    prepared: OnePosture, draws: Draws, key: str, model: tuple[str, float | None],
-    numbers: NDArray,
+    prepared: LinearResponse, draws: Assembly, key: str,
+    model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
     """Size of a pose error, and its slopes with platform screw and clearances."""
     part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance_model == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
-        bounds, screws = bound_worst_errors(prepared, draws, draws.errors, precision)
+        bounds, screws = bound_worst_errors(draws, precision)
         which = POSE_ERRORS.index(key)
         by_screw, by_clearance = worst_error_slopes(
             prepared, draws, key, screws[:, which]
@@ -96,7 +97,7 @@ def _pose_error(
 
 
 def _wrench_quantity(
-    prepared: OnePosture, key: str, wrenches: NDArray
+    prepared: LinearResponse, key: str, wrenches: NDArray
 ) -> tuple[NDArray, NDArray]:
     """The largest moment, force or stress, and its slopes with the wrenches."""
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))

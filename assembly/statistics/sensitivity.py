@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 
 _ACTIVE = 1e-7  # of the largest force on any cone: less is none
 _RANK = 1e-10  # of the equations: directions left undetermined do not move
@@ -43,14 +43,14 @@ def energy_slopes(assembly: Assembly) -> NDArray:
 
 
 def solution_slopes(
-    prepared: OnePosture, draws: Draws, by_wrench: NDArray, by_screw: NDArray,
+    prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
     """Slopes of a function of wrenches and platform screw with every geometric error.
 
     Args:
         prepared: the posture.
-        draws: of :meth:`OnePosture.solve`, k draws.
+        draws: of :meth:`LinearResponse.solve`, k draws.
         by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
         by_screw: (k, 6) and with the platform's screw.
         by_clearance: (k, nu) and with the clearances, in units of their cones.
@@ -88,7 +88,7 @@ def solution_slopes(
 
 
 def _active_clearances(
-    prepared: OnePosture, draws: Draws, forces: NDArray
+    prepared: LinearResponse, draws: Assembly, forces: NDArray
 ) -> tuple[NDArray, NDArray]:
     """(k, nu, nu) projectors orthogonal to active clearances, and multipliers nu."""
     k, nu = forces.shape

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import ErrorSources
-from assembly.statistics.one_posture import OnePosture
+from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.posture_margins import PostureMargins
 from assembly.statistics.responses import respond
 
@@ -42,8 +42,9 @@ class Corner:
 
 
 def worst_corner(
-    prepared: PostureMargins | OnePosture, sources: ErrorSources, tolerances: NDArray,
-    corners: NDArray, key: str = "energy", clearance_model: str = "worst",
+    prepared: PostureMargins | LinearResponse, sources: ErrorSources,
+    tolerances: NDArray, corners: NDArray, key: str = "energy",
+    clearance_model: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
     """Local search from corner to corner; the worst of all searches.
@@ -61,7 +62,7 @@ def worst_corner(
         The worst corner.
     """
     signs = corners.copy()
-    if isinstance(prepared, OnePosture):
+    if isinstance(prepared, LinearResponse):
         # where clearances take up an error completely the energy has zero slope
         signs = np.vstack([
             signs,
@@ -84,8 +85,9 @@ def worst_corner(
 
 
 def _worst_without_clearance(
-    prepared: OnePosture, sources: ErrorSources, tolerances: NDArray, corners: NDArray
-) -> NDArray:
+    prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
+    corners: NDArray,
+) -> NDArray:  # fmt: skip
     """(k, m) worst corners of the robot without clearances: energy (h s)^2 / 2."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
@@ -125,7 +127,7 @@ def bound_margin(
 
 
 def bound_energy(
-    prepared: OnePosture, sources: ErrorSources, tolerances: NDArray
+    prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray
 ) -> float:
     """Upper bound of the largest energy over all errors within tolerances.
 

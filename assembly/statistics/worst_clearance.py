@@ -15,7 +15,7 @@ are free.
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.linear.energy import CannotAssemble
+from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
@@ -25,7 +25,7 @@ from assembly.statistics.clearance_positions import (
     free_starts,
     loaded_clearances,
 )
-from assembly.statistics.one_posture import Draws, OnePosture
+from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS
 
 READING = "frozen"
@@ -34,15 +34,12 @@ _SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slop
 
 
 def bound_worst_errors(
-    prepared: OnePosture, draws: Draws, errors: NDArray,
-    precision: tuple[float, float] = PRECISION,
-) -> tuple[NDArray, NDArray]:  # fmt: skip
+    draws: Assembly, precision: tuple[float, float] = PRECISION
+) -> tuple[NDArray, NDArray]:
     """Certified bounds of the largest pose errors over all clearance positions.
 
     Args:
-        prepared: the posture.
-        draws: its solutions for k draws.
-        errors: (k, n, 6) [rad, m] of these draws.
+        draws: k of them, at one posture.
         precision: [rad, m] asked of upper minus lower bounds; inf leaves a part out.
 
     Returns:
@@ -51,16 +48,14 @@ def bound_worst_errors(
         bounds inf where none is proved.  And (k, 2, 6) [rad, m] screws that attain the
         lower bounds, at least nearly.
     """
-    bounds = np.full((len(errors), 2, 2), np.nan)
+    bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
     solved = np.flatnonzero(np.isfinite(draws.energy))
-    if prepared.loads is None:
-        bounds[solved], screws[solved] = _without_load(
-            prepared, errors[solved], precision
-        )
+    if not draws.frame_loads:
+        bounds[solved], screws[solved] = _without_load(draws[solved], precision)
     else:
         for i in solved.tolist():
-            bounds[i], screws[i] = _under_load(prepared, errors[i], precision)
+            bounds[i], screws[i] = _under_load(draws, i, precision)
     # solutions of (22) may differ by the square root of their duality gaps
     least = np.stack([
         np.linalg.norm(draws.platform_screw[:, part], axis=1)
@@ -76,13 +71,13 @@ def bound_worst_errors(
 
 
 def _without_load(
-    prepared: OnePosture, errors: NDArray, precision: tuple[float, float]
+    draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
     """Bounds and screws of unloaded draws, compiled."""
-    posture = prepared.posture
-    T = np.repeat(posture.transforms[None], len(errors), axis=0)
+    posture = draws.posture
+    T = np.repeat(posture.transforms[None], len(draws), axis=0)
     error_bounds = bound_pose_errors(
-        posture.robot, T, READING, errors, posture.mismatch,
+        posture.robot, T, READING, draws.errors, posture.mismatch, draws,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
     )  # fmt: skip
     return (
@@ -92,12 +87,12 @@ def _without_load(
 
 
 def _under_load(
-    prepared: OnePosture, errors: NDArray, precision: tuple[float, float]
+    draws: Assembly, i: int, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
     """Bounds and screws of one loaded draw; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
-            prepared.assembly(errors), READING,
+            draws[i], READING,
             tolerance_rotation=precision[0], tolerance_translation=precision[1],
         )  # fmt: skip
     except (CannotAssemble, SolverFailed, FreeMotion):
@@ -107,7 +102,7 @@ def _under_load(
 
 
 def worst_error_slopes(
-    prepared: OnePosture, draws: Draws, key: str, screws: NDArray
+    prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
     """Slopes of the largest pose error with the platform's screw and the clearances.
 
@@ -143,7 +138,7 @@ def worst_error_slopes(
 
 
 def _pressing(
-    prepared: OnePosture, free: NDArray, along: NDArray, clearances: NDArray
+    prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
     """(k, ..) directions (k, ..) of free clearances, less what equations take."""
     rows = clearance_constraints(prepared, ~free)[:, free]

@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import apply_known
-from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.assembled import Assembly
-from assembly.linear.assemblies import Assemblies, solve_each
-from assembly.linear.energy import minimise_under_loads
-from assembly.linear.load import loads_with_weight
+from assembly.linear.energy import (
+    Assembly,
+    CannotAssemble,
+    solve_assembly,
+    together_at,
+)
+from assembly.linear.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot
+from assembly.solvers.conic import SolverFailed
 from assembly.sweeps.quantities import Question
-from stiffness.screws import screw_map
 
 
 def point_conditions(
@@ -64,7 +65,7 @@ def is_loaded(conditions: Conditions) -> bool:
     return bool(loaded or conditions.laws or conditions.yields)
 
 
-def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray, NDArray]:
+def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
     """Least energies of all rows under loads.
 
     Args:
@@ -76,45 +77,24 @@ def assemble_rows(conditions: Conditions) -> tuple[Assemblies, NDArray, NDArray]
         links' own weight.
     """
     c = conditions
-
-    def one(i: int) -> Assembly:
-        assembly = assemble_row(c, i)
-        assert isinstance(assembly, Assembly)
-        return assembly
-
-    if c.laws or c.yields:
-        wrenches, at_tips = np.full((2, len(c), len(c.robot.frames), 6), np.nan)
-
-        def noted(i: int) -> Assembly:
-            assembly = one(i)
-            wrenches[i] = assembly.wrenches
-            at_tips[i] = assembly.frame_loads.at_tips
-            return assembly
-
-        return solve_each(c.robot, len(c), noted), wrenches, at_tips
-    loads = loads_with_weight(c.postures, c.load_at_origin(), c.gravity)
-    energies = minimise_under_loads(
-        c.robot, c.transforms, loads, one, c.errors, c.mismatch
-    )
-    through = wrenches_of(c.robot, c.transforms, energies.multipliers)
-    at_tips = np.broadcast_to(loads.at_tips, through.shape)
-    return energies, through + loads.body.reshape(through.shape), at_tips
+    if not (c.laws or c.yields):
+        load, gravity = c.load_at_origin(), c.gravity
+        found = solve_assembly(c.postures, load, gravity=gravity, errors=c.errors)
+        at_tips = np.broadcast_to(found.frame_loads.at_tips, found.wrenches.shape)
+        return found, found.wrenches, at_tips
+    points = [_assembled(c, i) for i in range(len(c))]
+    wrenches, at_tips = np.full((2, len(c), len(c.robot.frames), 6), np.nan)
+    for i, point in enumerate(points):
+        if isinstance(point, Assembly):
+            wrenches[i], at_tips[i] = point.wrenches, point.frame_loads.at_tips
+    return together_at(c.postures, points), wrenches, at_tips
 
 
-def wrenches_of(robot: Robot, T: NDArray, multipliers: NDArray) -> NDArray:
-    """Wrenches through every frame that closures cause.
-
-    Args:
-        robot: of n frames.
-        T: (k, n, 4, 4) frames seen from the base.
-        multipliers: (k, 6 closures) of the scaled closure rows.
-
-    Returns:
-        (k, n, 6) [N m, N] at each frame's origin, in its axes.
-    """
-    size = size_of(robot)
-    closures = multipliers.reshape(len(T), -1, 6) / ([1] * 3 + [size] * 3)
-    at_platform = np.einsum("cf,kcs->kfs", closure_signs(robot), closures)
-    origin = T[:, None, robot.index(robot.platform), :3, 3]
-    paths = screw_map(T[..., :3, 3] - origin, T[..., :3, :3])
-    return np.einsum("kfji,kfj->kfi", paths, at_platform)
+def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
+    """A point by itself, or why there is no solution."""
+    try:
+        assembly = assemble_row(conditions, i)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        return error
+    assert isinstance(assembly, Assembly)
+    return assembly

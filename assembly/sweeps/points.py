@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
-from assembly.linear.energy import Assemblies, CannotAssemble, minimise_energies
+from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseErrors, bound_pose_errors
 from assembly.linear.zone import MARGIN_READINGS, zone_margin
 from assembly.measurement.conditions import Conditions
@@ -28,7 +28,6 @@ from assembly.sweeps.point_conditions import (
     assemble_rows,
     is_loaded,
     point_conditions,
-    wrenches_of,
 )
 from assembly.sweeps.point_kinematics import note_geometry
 from assembly.sweeps.point_stiffness import (
@@ -211,6 +210,7 @@ def _solve_reached(
     if robot.has_effects:
         robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
+    there = replace(conditions.postures, robot=robot)
     failed: dict[int, str] = {}
     at = Posture(robot, conditions.coordinates, T, mismatch)
     for key, compliant in MARGIN_READINGS.items():
@@ -221,20 +221,20 @@ def _solve_reached(
     if is_loaded(conditions):
         energies, wrenches, at_tips = assemble_rows(conditions)
     else:
-        energies = minimise_energies(robot, T, errors, mismatch)
+        energies = solve_assembly(there, errors=errors)
     ok = _solved_rows(energies, failed, solved, rows)
     rows_ok = rows[ok]
     for key, values in (
         ("energy", energies.energy), ("platform_screw", energies.platform_screw),
-        ("closure_residual", energies.closure_residual),
-        ("clearance_excess", energies.clearance_excess),
-        ("duality_gap", energies.gap),
+        ("closure_residual", energies.closure_residual()),
+        ("clearance_excess", energies.clearance_excess()),
+        ("duality_gap", energies.duality_gap()),
     ):  # fmt: skip
         out[key][rows_ok] = values[ok]
     if question.reads_otherwise and ok:
         out["reading"][rows_ok] = read(conditions.take(ok), energies.platform_screw[ok])
     if wrenches is None and (question.wrenches or question.strength is not None):
-        wrenches = wrenches_of(robot, T, energies.multipliers)
+        wrenches = energies.wrenches
     if wrenches is not None:
         own = np.zeros_like(wrenches) if at_tips is None else at_tips
         _record_wrenches(question, robot, wrenches[ok], own[ok], solved, rows_ok)
@@ -256,7 +256,7 @@ def _solve_reached(
 
 
 def _solved_rows(
-    energies: Assemblies, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
+    energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
     """Which points have a solution; of the others status and reason are kept."""
     ok = []

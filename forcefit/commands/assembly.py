@@ -224,8 +224,7 @@ def show(
     ] = None,
 ) -> None:
     """Plot the nominal and the forced robot, and its errors."""
-    from assembly.linear.assemblies import failure_status
-    from assembly.linear.energy import CannotAssemble, solve_assembly
+    from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
     from assembly.linear.error_body import PARTS
     from assembly.linear.reach import READINGS
     from assembly.linear.reduction import FreeMotion

@@ -406,7 +406,8 @@ def test_which_joints_may_have_friction_and_which_slip():
     assert moving_joints(robot) == ("soft", "rigid")
 
 
-def test_rows_close_as_well_as_the_worst_of_them():
+def test_rows_close_each_as_well_as_it_does():
     rows = here(arm()).take(np.zeros(3, dtype=int))
-    for mismatch, worst in (([0.0, 0.0, 0.0], 0.0), ([1e-9, 3e-7, 2e-8], 3e-7)):
-        assert replace(rows, mismatch=np.array(mismatch)).postures.mismatch == worst
+    own = np.array([1e-9, 3e-7, 2e-8])
+    postures = replace(rows, mismatch=own).postures
+    assert [postures[i].mismatch for i in range(3)] == own.tolist()

@@ -10,14 +10,14 @@ import numpy as np
 
 from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import home_posture, place_many, together
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_errors
 from assembly.linear.zone import zone_margin
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.clearance_positions import position_clearances
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 
 LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
@@ -57,13 +57,13 @@ def answers():
         at = together([*placed, *[home] * (k - len(placed))])
         T = at.transforms
         errors = 1e-4 * rng.normal(size=(k, len(robot.frames), 6))
-        yield f"{name} (22)", minimise_energies(robot, T, errors)
-        yield f"{name} (22) of one", minimise_energies(robot, T[:1], errors[:1])
+        yield f"{name} (22)", solve_assembly(at, errors=errors)
+        yield f"{name} (22) of one", solve_assembly(at[:1], errors=errors[:1])
         yield f"{name} loaded", solve_assembly([home] * k, LOAD, errors=errors)
         yield f"{name} (21)", zone_margin(at, "free", errors)
         yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
         yield f"{name} K_C", platform_stiffness(at)
-        one = prepare_energies(home)
+        one = linear_response(home)
         draws = one.solve(errors)
         yield f"{name} draws", draws
         yield f"{name} draws (21)", prepare_margins(home).solve(errors)

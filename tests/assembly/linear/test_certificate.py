@@ -6,25 +6,27 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from assembly.kinematics.posture import home_posture, place_many, place_robot
+from assembly.kinematics.posture import home_posture, place_many, place_robot, together
+from assembly.linear import energy
 from assembly.linear.as_printed import energy_as_printed
-from assembly.linear.assemblies import excess_of, solve_each
 from assembly.linear.certificate import (
     _AMPLIFIED,
     _springs_determined,
     unproved,
     unproved_screw,
 )
-from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
+from assembly.linear.energy import CannotAssemble, solve_assembly, together_at
 from assembly.linear.screw_bound import bound_screw
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import (
     NUMBERS,
+    assemble_at,
     coaxial_beams,
     irsbot2_with,
     random_robot,
+    row,
 )
 
 seeds = st.integers(0, 2**32 - 1)
@@ -83,7 +85,6 @@ def spoilt(solve):
 def test_what_no_solver_proves_is_not_certified(monkeypatch):
     """The edge of the zone with Newton's method taken away and the others spoilt."""
     from assembly.linear import energy
-    from assembly.linear.assemblies import solve_again
     from assembly.report.results import solution_of, solution_text
     from assembly.solvers import conic
 
@@ -91,11 +92,12 @@ def test_what_no_solver_proves_is_not_certified(monkeypatch):
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
     good = solve_assembly(posture)
     assert_proved(good)
-    energies = minimise_energies(robot, posture.transforms[None])
     worse = tuple(map(spoilt, conic._SOLVERS["reference"]))
     monkeypatch.setitem(conic._SOLVERS, "reference", worse)
     monkeypatch.setattr(conic, "refine", lambda *_: iter(()))
-    monkeypatch.setattr(energy, "_compiled_assembly", lambda *_: None)
+    monkeypatch.setattr(
+        energy, "assemble_side_by_side", lambda *given: given[5]["outcome"].fill(4)
+    )
     answer = solve_assembly(posture)
     # 1e-4 of some clearances more energy than the least: far above 1e-8
     assert answer.energy > good.energy * (1 + 1e-8)
@@ -106,7 +108,7 @@ def test_what_no_solver_proves_is_not_certified(monkeypatch):
     assert found["energy"] == answer.energy
     assert f"not proved: {unproved(answer)}" in solution_text(found)
     assert "certificate" in solution_text(found)
-    solve_again(energies, 0)
+    energies = assemble_at(robot, posture.transforms[None])
     assert (energies.status[0], energies.reason[0]) == (
         "solver failed", unproved(answer)
     )  # fmt: skip
@@ -187,7 +189,7 @@ def test_a_screw_that_rounding_spoils_is_never_certified(name, young):
     if young != 1e18:  # in between its bound is what is told
         assert bool(unproved(answer)) == (young >= 1e24)
         posture = answer.posture
-        batch = minimise_energies(posture.robot, posture.transforms[None])
+        batch = assemble_at(posture.robot, posture.transforms[None])
         assert (batch.status[0] == "ok") == (unproved(answer) == "")
 
 
@@ -231,8 +233,8 @@ def test_rounding_of_zero_is_zero():
     answer = solve_assembly(posture)
     assert answer.energy == 0.0
     assert not answer.wrenches.any()
-    assert minimise_energies(robot, posture.transforms[None]).energy[0] == 0.0
-    drawn = prepare_energies(posture).solve(robot.errors[None])
+    assert assemble_at(robot, posture.transforms[None]).energy[0] == 0.0
+    drawn = linear_response(posture).solve(robot.errors[None])
     assert drawn.energy[0] == 0.0
     # what is small and not rounding stays: k g^2 / 2 of one spring, by hand
     for gap in (1e-6, 1e-12, 1e-17):
@@ -240,12 +242,12 @@ def test_rounding_of_zero_is_zero():
         small = replace(robot, frames=(*frames[:2], Frame("f3", "f1", [0.2, 0, 0]),
                                        frames[-1]))  # fmt: skip
         here = home_posture(small)
-        for energy in (
+        for found in (
             solve_assembly(here).energy,
-            minimise_energies(small, here.transforms[None]).energy[0],
-            prepare_energies(here).solve(small.errors[None]).energy[0],
+            assemble_at(small, here.transforms[None]).energy[0],
+            linear_response(here).solve(small.errors[None]).energy[0],
         ):
-            assert energy == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
+            assert found == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
 
 
 def test_the_certificate_trusts_nothing_but_the_wrenches():
@@ -308,20 +310,20 @@ def test_points_solved_one_by_one_are_what_each_is():
     posture = home_posture(robot.with_errors(errors))
     loads = [np.zeros(6), np.array([0, 0, 0, 3.0, -2.0, 0])]
     both = [solve_assembly(posture, load) for load in loads]
-    found = solve_each(robot, 2, lambda i: both[i])
+    found = together_at(together([posture] * 2), both)
     for name, values in (
         ("energy", [a.energy for a in both]),
-        ("bound", [a.energy - a.duality_gap() for a in both]),
+        ("duality_gap", [a.energy - (a.energy - a.duality_gap()) for a in both]),
         ("platform_screw", [a.platform_screw for a in both]),
         ("multipliers", [a.multipliers for a in both]),
         ("clearances", [a.clearances for a in both]),
         ("closure_residual", [a.closure_residual() for a in both]),
     ):
-        assert np.array_equal(getattr(found, name), values), name
+        assert np.array_equal(row(found, name), values), name
     assert found.certified.all()
-    assert found.fallbacks() == {"one by one": 2}
+    assert found[1] is both[1]
     two = np.array([[0.6, 0.8, 0.1], [0.9, 1.2, 0.0]])
-    assert excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])
+    assert energy._excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])
 
 
 def test_each_half_of_the_screw_is_proved_to_its_own_size():

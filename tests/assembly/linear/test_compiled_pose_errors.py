@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
 from tests.assembly.linear.test_pose_error import hinged_frame
 from tests.robots_for_tests import (
+    assemble_at,
     coaxial_beams,
     irsbot2_over,
     random_robot,
@@ -64,7 +65,7 @@ def test_batch_brackets_what_one_at_a_time_brackets(grid, reading, kappa):
 def test_energies_at_hand_and_the_split_of_a_batch_change_no_bit(grid):
     robot, _, T, off = grid
     errors = 0.2 * robot.errors
-    energies = minimise_energies(robot, T, errors, off)
+    energies = assemble_at(robot, T, errors, off)
     whole = bound_pose_errors(robot, T, "free", errors, off, energies)
     for part in (slice(0, 1), slice(1, None)):
         some = bound_pose_errors(robot, T[part], "free", errors, off[part])
@@ -172,6 +173,6 @@ def test_bad_arguments_are_named(grid):
     robot, _, T, off = grid
     with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
         bound_pose_errors(robot, T, "loose")
-    energies = minimise_energies(robot, T[:2], mismatch=off[:2])
+    energies = assemble_at(robot, T[:2], mismatch=off[:2])
     with pytest.raises(ValueError, match="energies of 2 points, expected 15"):
         bound_pose_errors(robot, T, energies=energies)

@@ -11,7 +11,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import CannotAssemble, minimise_energies, solve_assembly
+from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reduction import FreeMotion
@@ -24,6 +24,7 @@ from assembly.solvers.conic import minimise_energy
 from assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
+    assemble_at,
     coaxial_beams,
     irsbot2_with,
     planar_four_bar,
@@ -275,7 +276,7 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
         zones = [zone_margin(p, "free").margin for p in (first, second)]
         if zones[0] is not None:
             assert zones[0] == pytest.approx(zones[1], rel=1e-7)
-        batch = minimise_energies(one, first.transforms[None])
+        batch = assemble_at(one, first.transforms[None])
         assert batch.energy[0] == pytest.approx(
             solve_assembly(second).energy, rel=1e-7, abs=scale
         )
@@ -312,7 +313,7 @@ def test_play_that_just_suffices_stores_nothing():
                         (1.0001e-4, 0.5e6 * 1e-8**2 / 2)):  # fmt: skip
         robot = coaxial_beams(gap * direction, clearance=Clearance(radial=1e-4))
         posture = home_posture(robot)
-        batch = minimise_energies(robot, posture.transforms[None])
+        batch = assemble_at(robot, posture.transforms[None])
         for found in (solve_assembly(posture).energy, batch.energy[0]):
             assert found == (pytest.approx(energy, rel=1e-3) if energy else 0.0)
 

@@ -5,8 +5,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import lanes, pose_error
-from assembly.linear.energy import minimise_under_loads, solve_assembly
-from assembly.linear.load import FrameLoads, loads_on_frames
+from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.linear.robot_structure import structure_of
@@ -30,14 +29,7 @@ def test_points_with_and_without_loads_have_their_own_errors(loaded):
     robot, sets = two_sets()
     at = home_posture(robot)
     forces = np.array(loaded)[:, None] * LOAD
-    each = [loads_on_frames(at, force) for force in forces]
-    loads = FrameLoads(*(np.array([getattr(one, part) for one in each])
-                         for part in ("body", "joint")))  # fmt: skip
-
-    def one(i):
-        return solve_assembly(home_posture(robot.with_errors(sets[i])), forces[i])
-
-    found = minimise_under_loads(robot, np.array([at.transforms] * 2), loads, one, sets)
+    found = solve_assembly([at] * 2, forces, errors=sets)
     expected = K * sets[:, 2, 3] ** 2 / 4 + forces[:, 3] ** 2 / (4 * K)
     assert found.energy == pytest.approx(expected, rel=1e-9)
     assert found.loaded.tolist() == [bool(one) for one in loaded]

@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, together
-from assembly.linear import zone
-from assembly.linear.assemblies import COMPILED
+from assembly.linear import energy, zone
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margin
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import random_robot, stack
-
-ROWS = (
-    "outcome", "energy", "bound", "energy_without_clearance", "platform_screw",
-    "closure_residual", "clearances", "motions", "multipliers",
-)  # fmt: skip
+from tests.robots_for_tests import (
+    ROWS,
+    assemble_at,
+    proved,
+    random_robot,
+    row,
+    stack,
+)
 
 
 def test_random_robots_springs_hold_their_energies_and_those_are_the_references():
@@ -32,46 +33,31 @@ def test_random_robots_springs_hold_their_energies_and_those_are_the_references(
         joints, structure = structure_of(robot)
         errors = np.array([robot.errors, 0.3 * robot.errors, -robot.errors])
         T = np.repeat(home.transforms[None], 3, axis=0)
-        lanes = rows_for(joints, robot, 3)
-        assemble_side_by_side(structure, T, errors, np.full(3, home.mismatch), lanes)
-        certified = np.flatnonzero(lanes.outcome < COMPILED).tolist()
+        lanes, off = energy._empty(joints, 3), np.full(3, home.mismatch)
+        assemble_side_by_side(structure, T, errors, off, None, lanes)
+        certified = np.flatnonzero(lanes["outcome"] < energy._LEFT).tolist()
         solved += len(certified)
         for i in certified:
             # the deformation of every spring holds the energy
-            stored = 0.5 * np.sum(lanes.elastic[i] ** 2)
-            assert stored == pytest.approx(lanes.energy[i], rel=1e-10, abs=1e-25)
+            stored = 0.5 * np.sum(lanes["elastic"][i] ** 2)
+            assert stored == pytest.approx(lanes["energy"][i], rel=1e-10, abs=1e-25)
             if seed % 4 == i:
                 own = replace(home, robot=robot.with_errors(errors[i]))
                 least = solve_assembly(own, method="reference").energy
-                allowed = 2e-8 * least + 2e-12 * lanes.without_clearance[i] + 1e-30
-                assert abs(lanes.energy[i] - least) <= allowed
+                allowed = 2e-8 * least + 2e-12 * lanes["tight"][i] + 1e-30
+                assert abs(lanes["energy"][i] - least) <= allowed
     assert solved > 150
-
-
-def rows_for(joints, robot, count):
-    """Arrays for answers of so many points, their springs' deformation included."""
-    from assembly.linear.solutions import Solutions
-
-    def zeros(*shape):
-        return np.zeros((count, *shape))
-
-    closures = 6 * len(robot.closures)
-    return Solutions(
-        np.zeros(count, dtype=np.int64), zeros(), zeros(), zeros(), zeros(), zeros(6),
-        zeros(joints.cones.shape[1]), zeros(joints.free.shape[1]), zeros(closures),
-        zeros(), zeros(len(joints.links)),
-    )  # fmt: skip
 
 
 def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
     """By the complementary energy in numpy, which shares nothing with the lanes."""
     robot, postures = grid
     T, mismatch = stack(postures)
-    lanes = minimise_energies(robot, T, mismatch=mismatch)
+    lanes = assemble_at(robot, T, mismatch=mismatch)
     for i in (0, 11, 20, 33):
         one = solve_assembly(postures[i], method="reference")
-        proved = replace(one, multipliers=lanes.multipliers[i]).bound
-        assert proved == pytest.approx(lanes.bound[i], rel=1e-9)
+        bound = replace(one, multipliers=lanes.multipliers[i]).bound
+        assert bound == pytest.approx(proved(lanes)[i], rel=1e-9)
 
 
 @pytest.mark.parametrize("kappa", [0.2, 1.0])
@@ -81,16 +67,16 @@ def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
     T, mismatch = stack(postures)
     errors = kappa * robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
     errors[::7] = 0.0  # some need nothing, others many iterations
-    whole = minimise_energies(robot, T, errors, mismatch)
+    whole = assemble_at(robot, T, errors, mismatch)
     for _ in range(4):
         order = rng.permutation(len(T))
-        other = minimise_energies(robot, T[order], errors[order], mismatch[order])
+        other = assemble_at(robot, T[order], errors[order], mismatch[order])
         for name in ROWS:
-            assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
+            assert np.array_equal(row(other, name), row(whole, name)[order])
     for i in range(0, len(T), 5):
-        alone = minimise_energies(robot, T[[i]], errors[[i]], mismatch[[i]])
+        alone = assemble_at(robot, T[[i]], errors[[i]], mismatch[[i]])
         for name in ROWS:
-            assert np.array_equal(getattr(alone, name)[0], getattr(whole, name)[i])
+            assert np.array_equal(row(alone, name)[0], row(whole, name)[i])
 
 
 def test_postures_of_different_rank_stand_side_by_side(rng):
@@ -105,13 +91,11 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
     ]
     assert ranks == [2, 3]
     errors = 1e-4 * rng.normal(size=(8, len(robot.frames), 6))
-    whole = minimise_energies(robot, T, errors)
+    whole = assemble_at(robot, T, errors)
     for i in range(8):
-        alone = minimise_energies(robot, T[[i]], errors[[i]])
+        alone = assemble_at(robot, T[[i]], errors[[i]])
         for name in ROWS:
-            assert np.array_equal(
-                getattr(alone, name)[0], getattr(whole, name)[i], equal_nan=True
-            )
+            np.testing.assert_array_equal(row(alone, name)[0], row(whole, name)[i])
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
@@ -170,13 +154,13 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa):
     robot, postures = grid
     T, mismatch = stack(postures)
     errors = kappa * robot.errors
-    many = minimise_energies(robot, T, errors, mismatch)
+    many = assemble_at(robot, T, errors, mismatch)
     margins = zone_margin(postures, "rigid", errors)
     for i in range(0, len(T), 3):
         some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
-        one = minimise_energies(*some)
-        for row in ROWS:
-            assert np.array_equal(getattr(one, row)[0], getattr(many, row)[i]), row
+        one = assemble_at(*some)
+        for name in ROWS:
+            assert np.array_equal(row(one, name)[0], row(many, name)[i]), name
         one = zone_margin(postures[i : i + 1], "rigid", errors)
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
@@ -194,9 +178,9 @@ def test_draws_at_one_posture_have_the_bits_of_points(grid, rng, kappa, load):
     points = solve_assembly([postures[3]] * 61, load, errors=errors)
     alone = [solve_assembly(postures[3], load, errors=errors[[i]]) for i in range(12)]
     for name in ROWS:
-        assert np.array_equal(getattr(draws, name), getattr(points, name)), name
+        assert np.array_equal(row(draws, name), row(points, name)), name
         for i, one in enumerate(alone):
-            assert np.array_equal(getattr(one, name)[0], getattr(draws, name)[i]), name
+            assert np.array_equal(row(one, name)[0], row(draws, name)[i]), name
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
@@ -244,16 +228,16 @@ def test_a_posture_that_stays_changes_no_bit(grid, rng, load):
     joints, structure = structure_of(robot)
 
     def solved(rows):
-        out, own = rows_for(joints, robot, len(rows)), loads[rows]
+        out, own = energy._empty(joints, len(rows)), loads[rows]
         assemble_side_by_side(
-            structure, T[rows], errors[rows], off[rows], out,
-            None if load == "none" else own,
+            structure, T[rows], errors[rows], off[rows],
+            None if load == "none" else own, out,
         )  # fmt: skip
         return out
 
     whole = solved(np.arange(count))
-    assert (whole.outcome < COMPILED).any()
+    assert (whole["outcome"] < energy._LEFT).any()
     orders = [rng.permutation(count), *([i] for i in (0, 9, 11, 16, 20, 27, 30, 50))]
     for order in orders:
-        for rows, expected in zip(solved(np.array(order)), whole, strict=True):
-            assert np.array_equal(rows, expected[order], equal_nan=True)
+        for name, rows in solved(np.array(order)).items():
+            assert np.array_equal(rows, whole[name][order], equal_nan=True)

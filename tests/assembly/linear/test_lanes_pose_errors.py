@@ -5,14 +5,14 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear import moving_clearances
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.lanes import bounds_side_by_side
 from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.solutions import FALLBACK, SOLVED, Bounds, Centres, ClearanceLoads
 from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import coaxial_beams, random_robot, stack
+from tests.robots_for_tests import assemble_at, coaxial_beams, random_robot, stack
 
 HALVES = ("rotation", "translation")
 READINGS = ("frozen", "free")
@@ -50,7 +50,7 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
         errors = own * np.array([0.0, 0.1, 0.5, -1.0])[:, None, None]
         robot, T = home.robot, np.repeat(home.transforms[None], 4, axis=0)
         off = np.full(4, home.mismatch)
-        energies = minimise_energies(robot, T, errors, off)
+        energies = assemble_at(robot, T, errors, off)
         many = bound_pose_errors(robot, T, reading, errors, off, energies, offset=at)
         solved = np.flatnonzero((many.status == "ok") & ~many.one_by_one)
         compiled += len(solved)
@@ -85,7 +85,7 @@ def test_what_is_not_bounded_side_by_side_the_reference_bounds(grid, monkeypatch
     """And only that."""
     robot, postures = grid
     T, off = stack(postures[:4])
-    energies = minimise_energies(robot, T, mismatch=off)
+    energies = assemble_at(robot, T, mismatch=off)
 
     def every_other(structure, T, mismatch, centres, loads, asked, out):
         for name in HALVES:

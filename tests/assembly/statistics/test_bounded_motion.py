@@ -11,7 +11,7 @@ from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from tests.robots_for_tests import random_robot
 
 SPIN, RADIAL, ARM = 1e-4, 1e-6, 1.0
@@ -28,7 +28,7 @@ def hinge(joint="revolute", **clearance):
 
 def positions(robot, clearance_model, errors, count=200, **options):
     """Platform screws of draws that all have the same errors."""
-    prepared = prepare_energies(home_posture(robot), **options)
+    prepared = linear_response(home_posture(robot), **options)
     draws = prepared.solve(np.repeat(np.asarray(errors, dtype=float)[None], count, 0))
     rngs = [draw_generator(3, i, 9) for i in range(count)]
     screws, mixed = position_clearances(prepared, draws, clearance_model, rngs)

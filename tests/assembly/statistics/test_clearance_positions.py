@@ -17,7 +17,7 @@ from assembly.statistics.clearance_positions import (
     loaded_clearances,
     position_clearances,
 )
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.uniform_clearance import (
     _ellipsoid,
@@ -160,7 +160,7 @@ def test_two_clearances_of_two_sizes_leave_the_platform_what_both_let_it():
         ),
     )
     robot = Robot("two pins", "one", frames, (("one", "two"),))
-    prepared = prepare_energies(home_posture(robot))
+    prepared = linear_response(home_posture(robot))
     draws = prepared.solve(np.repeat(robot.errors[None], 300, axis=0))
     assert draws.energy.max() == 0.0
     screws, mixed = position_clearances(prepared, draws, "uniform", generators(300))
@@ -178,7 +178,7 @@ def test_pushed_from_anywhere_a_pin_rests_anywhere_on_the_narrower_rim(kind, fir
         Frame("two", link=steel, clearance=Clearance(**{kind: 1e-3})),
     )
     robot = Robot("two pins", "one", frames, (("one", "two"),))
-    prepared = prepare_energies(home_posture(robot))
+    prepared = linear_response(home_posture(robot))
     draws = prepared.solve(np.zeros((300, 2, 6)))
     screws, mixed = position_clearances(prepared, draws, "contact", generators(300))
     assert mixed.all()
@@ -200,7 +200,7 @@ def near_the_edge(margin):
     errors = rng.normal(size=(len(robot.frames), 6)) * ([5e-3] * 3 + [2e-4] * 3)
     errors *= touched[:, None]
     errors *= margin / prepare_margins(posture, "rigid").solve(errors[None]).margin[0]
-    return prepare_energies(posture), errors
+    return linear_response(posture), errors
 
 
 @pytest.mark.parametrize("margin", [0.9, pytest.param(0.99, marks=pytest.mark.slow)])
@@ -235,7 +235,7 @@ DRAWN = 200
 def drawn():
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
-    one = prepare_energies(place_robot(robot))
+    one = linear_response(place_robot(robot))
     errors = sources.errors(sources.draw(0, DRAWN, seed=2))
     return one, one.solve(errors)
 
@@ -327,7 +327,7 @@ def test_contact_play_knows_no_unit_of_length():
     frames = (replace(f, link=None, joint_stiffness=None) for f in robot.frames)
     robot, screws = replace(robot, frames=tuple(frames)), []
     for one in (robot, in_millimetres(robot)):
-        prepared = prepare_energies(home_posture(one))
+        prepared = linear_response(home_posture(one))
         found = prepared.solve(np.zeros((5, len(one.frames), 6)))
         moved, _ = position_clearances(prepared, found, "contact", generators(5))
         screws.append(moved)

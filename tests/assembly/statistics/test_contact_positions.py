@@ -8,7 +8,7 @@ from assembly.model.error_distributions import draw_generator
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.contact_positions import move_to_contact
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 
 
 def moved(directions, starts, rows=(), free=None, positions=None):
@@ -73,7 +73,7 @@ def test_the_contact_length_weighs_moments_against_forces(length):
         Frame("pin", joint="revolute", actuated=True, clearance=Clearance(tilt=tilt)),
         Frame("tip", "pin", [arm, 0, 0]),
     )
-    prepared = prepare_energies(home_posture(Robot("arm", "tip", frames)))
+    prepared = linear_response(home_posture(Robot("arm", "tip", frames)))
     draws = prepared.solve(np.zeros((4000, 2, 6)))
     rngs = [draw_generator(3, i, 9) for i in range(4000)]
     screws, _ = position_clearances(prepared, draws, "contact", rngs, length)

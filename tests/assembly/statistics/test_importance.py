@@ -19,8 +19,8 @@ from assembly.statistics.importance import (
     source_groups,
 )
 from assembly.statistics.importance_table import ImportanceOptions
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.one_posture import prepare_energies
 from assembly.statistics.summary import summarise, summary_text
 
 
@@ -98,7 +98,7 @@ def test_without_play_the_closed_form_holds():
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
     )
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
-    one = prepare_energies(place_robot(robot))
+    one = linear_response(place_robot(robot))
     groups = source_groups(sources, "kind")
     columns = 6 * sources.frame + sources.component
     expected = linear_importance(one.screws[:, columns], sources, groups)

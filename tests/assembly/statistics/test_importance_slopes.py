@@ -10,7 +10,7 @@ from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_slopes import platform_gains, platform_slopes
 from assembly.statistics.importance_table import ImportanceOptions, importance_design
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -55,7 +55,7 @@ def test_slopes_are_those_of_the_solution_under_loads_too(name, load, rng):
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
-    prepared = prepare_energies(posture, load)
+    prepared = linear_response(posture, load)
     touched = np.array([f.link is not None for f in robot.frames])[:, None]
     size = np.array([5e-3] * 3 + [2e-4] * 3) * touched
     errors = rng.normal(size=(4, *size.shape)) * size

@@ -11,7 +11,7 @@ from assembly.model.link_stress import stressed_links
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import _stress_slopes, respond
 
@@ -26,7 +26,7 @@ def stiff():
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=frames)
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
-    prepared = prepare_energies(place_robot(robot, {"tx": 0.1, "tz": -0.5}))
+    prepared = linear_response(place_robot(robot, {"tx": 0.1, "tz": -0.5}))
     return prepared, sources, sources.draw(0, 5, seed=3)
 
 
@@ -88,7 +88,7 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
     posture, sources = arm()
     values = sources.draw(0, 20, seed=1)
     size, slopes = respond(
-        prepare_energies(posture), sources, values, "translation", "worst"
+        linear_response(posture), sources, values, "translation", "worst"
     )
     x, y, z = values[:, 3:].T
     across = np.hypot(x, y)
@@ -100,7 +100,7 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
     np.testing.assert_allclose(slopes[:, :3], 0.0, atol=1e-9)
     turn = values[:, :3]
     size, slopes = respond(
-        prepare_energies(posture), sources, values, "rotation", "worst"
+        linear_response(posture), sources, values, "rotation", "worst"
     )
     angle = np.linalg.norm(turn, axis=1)
     np.testing.assert_allclose(size, angle, rtol=1e-9)
@@ -117,7 +117,7 @@ def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
     rows = Experiment(
         posture, sources, seed=1, clearance_model=play, margins=False
     ).evaluate(values, range(12))
-    size, slopes = respond(prepare_energies(posture), sources, values, key, play)
+    size, slopes = respond(linear_response(posture), sources, values, key, play)
     np.testing.assert_allclose(size, rows[key], rtol=1e-9)
     expected = rows["platform_screw"] / size[:, None]
     kept = slice(0, 3) if key == "rotation" else slice(3, 6)
@@ -137,7 +137,7 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
     posture = home_posture(robot)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("one", "two", "tip"))
     values = np.array([[1e-4, 2e-4, 1e-4], [1e-4, 1e-4, 2e-4], [1e-4, 2e-4, 0.0]])
-    prepared = prepare_energies(posture)
+    prepared = linear_response(posture)
     for key in ("force", "translation"):
         for play in ("least", "worst"):
             size, slopes = respond(prepared, sources, values, key, play)
@@ -162,7 +162,7 @@ def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(compone
     widths[component] = PLAY
     sources = tolerance_sources(robot, widths, ("one", "two"))
     values = np.array([[0.3, 0.6], [-0.2, -0.5]]) * PLAY
-    prepared = prepare_energies(home_posture(robot))
+    prepared = linear_response(home_posture(robot))
     size, slopes = respond(prepared, sources, values, "translation", "least")
     np.testing.assert_allclose(size, np.abs(values[:, 1]), rtol=1e-6)
     np.testing.assert_allclose(slopes, [[0, 1], [0, -1]], atol=1e-6)

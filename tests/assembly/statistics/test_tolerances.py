@@ -15,7 +15,7 @@ from assembly.model.link_stress import peak_stresses
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.replay import journalled
 from assembly.statistics.requirement import Plan, Requirement
@@ -166,7 +166,7 @@ def test_the_worst_corner_is_found_and_bounded(paper, kind):
     """Brute force over all 256 corners; the worst of a convex function is at one."""
     posture, sources, t = paper
     energy = kind == "energy"
-    ready = prepare_energies(posture) if energy else prepare_margins(posture, kind)
+    ready = linear_response(posture) if energy else prepare_margins(posture, kind)
     every = np.array(list(product([-1.0, 1.0], repeat=8)))
     truth = respond(ready, sources, every * t)[0].max()
     found = worst_corner(ready, sources, t, random_corners(24, 8))

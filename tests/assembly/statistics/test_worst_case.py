@@ -9,7 +9,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics import worst_case
-from assembly.statistics.one_posture import prepare_energies
+from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import (
@@ -38,7 +38,7 @@ def test_springs_without_play_are_worst_where_all_errors_add_up(rng):
     The bound adds up sizes: k (t1 + t2 + t3 + t4)^2 / 4.
     """
     posture, sources = bars()
-    prepared, t = prepare_energies(posture), rng.uniform(1e-4, 3e-4, 4)
+    prepared, t = linear_response(posture), rng.uniform(1e-4, 3e-4, 4)
     truth = K * ((t[0] + t[1]) ** 2 + (t[2] + t[3]) ** 2) / 4
     corner = worst_corner(prepared, sources, t, np.ones((1, 4)))
     assert corner.value == pytest.approx(truth, rel=1e-6)
@@ -53,7 +53,7 @@ def test_springs_without_play_are_worst_where_all_errors_add_up(rng):
 def test_play_along_all_errors_is_taken_from_their_sum(directions):
     """In one direction k (t1 + t2 - p)^2 / 4; play as affine functions do no better."""
     posture, sources = bars(Clearance(radial=PLAY))
-    prepared = prepare_energies(posture)
+    prepared = linear_response(posture)
     t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
     if directions == 2:
         t[2:] = [1.0, 4.0] * np.array(PLAY)
@@ -114,7 +114,7 @@ def test_an_error_that_nothing_takes_up_has_no_bound():
     for along_z, finite in ((0.0, True), (1e-14, True), (1e-9, False)):
         t = np.array([2 * PLAY, along_z])
         assert np.isfinite(bound_margin(zone, sources, t)) == finite
-    assert bound_energy(prepare_energies(posture), sources, t) == np.inf
+    assert bound_energy(linear_response(posture), sources, t) == np.inf
 
 
 def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
@@ -126,7 +126,7 @@ def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
         Frame("two", "base", [0.5, 0, 0]),
     )
     robot = Robot("spring", "one", frames, (("one", "two"),))
-    prepared = prepare_energies(home_posture(robot))
+    prepared = linear_response(home_posture(robot))
     for component in (4, 5):
         places = [("two", 3), ("two", component)]
         sources = plan_for(robot, places, [1, 1], {}).sources
@@ -154,7 +154,7 @@ def test_play_of_one_pair_is_not_spent_on_another():
         ]
         closures.append((f"joint{i}", f"two{i}"))
     robot = Robot("pairs", "joint0", tuple(frames), tuple(closures))
-    prepared = prepare_energies(home_posture(robot))
+    prepared = linear_response(home_posture(robot))
     sources = plan_for(robot, [("one0", 3), ("one1", 3)], [1, 1], {}).sources
     found = bound_energy(prepared, sources, np.array([1.5, 10.0]) * PLAY)
     assert found == pytest.approx(K * (9.5 * PLAY) ** 2 / 4, rel=1e-4)
@@ -169,14 +169,14 @@ def test_a_chain_that_always_closes_has_no_margin_to_bound():
     posture = home_posture(robot)
     sources = plan_for(robot, [("tip", 3)], [1], {}).sources
     assert bound_margin(prepare_margins(posture, "rigid"), sources, np.ones(1)) == 0.0
-    assert bound_energy(prepare_energies(posture), sources, np.ones(1)) == 0.0
+    assert bound_energy(linear_response(posture), sources, np.ones(1)) == 0.0
 
 
 @pytest.mark.parametrize("key", ["force", "moment", "energy"])
 def test_one_start_finds_the_worst_of_all_corners(key):
     """Of 16 corners each solved by itself; the same corner from any start."""
     posture, sources = bars(Clearance(radial=PLAY))
-    prepared, t = prepare_energies(posture), np.array([3.0, 2, 1, 4]) * PLAY
+    prepared, t = linear_response(posture), np.array([3.0, 2, 1, 4]) * PLAY
     every = np.array(list(product([-1.0, 1.0], repeat=4)))
     values, slopes = respond(prepared, sources, every * t, key)
     for start in (every[:1], every[5:7]):

@@ -176,17 +176,17 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
     """The third of five postures raises in the middle of its block."""
     from assembly.sweeps import points
 
-    solve, axes = points.minimise_energies, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
+    solve, axes = points.solve_assembly, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)
     bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
 
-    def breaks(robot, T, errors, off):
-        at = T[:, robot.index(robot.platform), :3, 3]
+    def breaks(postures, errors):
+        at = postures.platform[:, :3, 3]
         if np.any(np.linalg.norm(at - bad, axis=1) < 1e-6):
             raise np.linalg.LinAlgError("SVD did not converge")
-        return solve(robot, T, errors, off)
+        return solve(postures, errors=errors)
 
-    monkeypatch.setattr(points, "minimise_energies", breaks)
+    monkeypatch.setattr(points, "solve_assembly", breaks)
     data = sweep_poses(robot, axes).squeeze()
     assert data.status.values.tolist() == ["ok", "ok", "solver failed", "ok", "ok"]
     assert data.reason.values[2] == "SVD did not converge"

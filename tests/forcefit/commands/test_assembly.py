@@ -9,7 +9,7 @@ import pytest
 from assembly.exact.exact import solve_exact
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.energy import minimise_energies, solve_assembly
+from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reach import reachable_screws
 from assembly.robots import load_robot
@@ -182,7 +182,7 @@ def test_the_same_from_python():
     with pytest.raises(BadInput, match=r"geometric_error: found 1e\+300"):
         solve_assembly(replace(posture, robot=robot))
     with pytest.raises(ValueError, match="an error is larger than"):
-        minimise_energies(robot, posture.transforms[None])
+        solve_assembly([replace(posture, robot=robot)], errors=errors[None])
     assert solve_assembly(posture, [0, 0, 0, 1e40, 0, 0]).energy > 1e60
 
 

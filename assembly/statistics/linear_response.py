@@ -1,23 +1,22 @@
-"""Problem (22) at one posture for many draws of the errors, and how it follows them.
+"""What clearances and errors do at one posture to springs, closures and platform.
 
-Draws are solved by :func:`assembly.linear.energy.solve_assembly`.  What clearances and
-errors do to springs, closures and platform is linear, and the same for all of them.
+It is linear, and the same for all draws of the errors, which
+:func:`assembly.linear.energy.solve_assembly` solves.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.assemblies import COMPILED
 from assembly.linear.closure import (
     VirtualJoints,
     closure_signs,
     linearise,
     virtual_joints,
 )
-from assembly.linear.energy import Assemblies, Assembly, solve_assembly
+from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.load import FrameLoads, loads_with_weight
 from assembly.linear.reduction import (
     FreeMotion,
@@ -36,43 +35,8 @@ from assembly.solvers.cones import cone_starts
 
 
 @dataclass(frozen=True, eq=False)
-class Draws:
-    """Least energies of k draws at one posture, each with its certificate.
-
-    Attributes:
-        errors: (k, n, 6) [rad, m] delta l of every draw.
-        energy: (k,) [J]; NaN where there is no solution.
-        bound: (k,) [J] certified lower bound.
-        clearances: (k, nu) in units of the cones; NaN where the bound of a passive
-            joint's own motion is active that is no cone here.
-        multipliers: (k, 6 closures) of the scaled closure rows.
-        platform_screw: (k, 6) [rad, m] at the platform's origin, base axes.
-        fallback: (k,) bool, solved one by one.
-    """
-
-    errors: NDArray
-    energy: NDArray
-    bound: NDArray
-    clearances: NDArray
-    multipliers: NDArray
-    platform_screw: NDArray
-    fallback: NDArray
-
-    def taken(self, rows: NDArray) -> "Draws":
-        """Some of the draws.
-
-        Args:
-            rows: indices of them, or which they are.
-
-        Returns:
-            These, in that order.
-        """
-        return Draws(*(getattr(self, one.name)[rows] for one in fields(self)))
-
-
-@dataclass(frozen=True, eq=False)
-class OnePosture:
-    """A posture prepared for any errors, by :func:`prepare_energies`.
+class LinearResponse:
+    """How a posture follows clearances and errors, by :func:`linear_response`.
 
     With n frames, nu clearances, r springs left after elimination, m = 6 closures;
     ``screws`` and ``motions`` take the columns [clearances | errors].
@@ -121,16 +85,15 @@ class OnePosture:
     loads: FrameLoads | None
     load_motions: NDArray
 
-    def solve(self, errors: ArrayLike) -> Draws:
+    def solve(self, errors: ArrayLike) -> Assembly:
         """Least energies of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
 
         Returns:
-            Energies, screws, multipliers and certificates.  Under loads ``energy`` is
-            what is stored, and ``bound`` is it less the certified gap of energy minus
-            work.
+            The assemblies under the loads, clearances in the columns of
+            :attr:`joints`.
 
         Raises:
             ValueError: the shape does not fit the robot, or a value is not finite.
@@ -139,45 +102,9 @@ class OnePosture:
         found = solve_assembly(
             self.posture, self.load, gravity=self.gravity, errors=errors
         )
-        clearances = found.clearances
-        if clearances.shape[1] < self.starts[-1]:  # bounds of motions are cones here
-            clearances = self._with_bounds(found)
-        return Draws(
-            errors, found.energy, found.bound, clearances, found.multipliers,
-            found.platform_screw, found.outcome >= COMPILED,
-        )  # fmt: skip
-
-    def _with_bounds(self, found: Assemblies) -> NDArray:
-        """(k, nu) clearances and bounded motions, NaN without a solution."""
-        clearances = np.full((len(found), self.starts[-1]), np.nan)
-        for i in np.flatnonzero(np.isfinite(found.energy)).tolist():
-            own = found[i].clearances
-            if len(own) == self.starts[-1]:
-                clearances[i] = own
-        return clearances
-
-    def wrenches(self, multipliers: NDArray) -> NDArray:
-        """(k, n, 6) [N m, N] of every link's spring, at its frame in its axes."""
-        wrenches = np.tensordot(multipliers, self.wrench, axes=(1, 2))
-        if self.loads is not None:
-            wrenches += self.loads.body.reshape(-1, 6)
-        return wrenches
-
-    def assembly(self, errors: NDArray) -> Assembly:
-        """The assembled manipulator of one draw.
-
-        Args:
-            errors: (n, 6) [rad, m] delta l.
-
-        Returns:
-            The solution of (22), within all bounds of passive joints' own motion.
-
-        Raises:
-            CannotAssemble: a closure is open that no clearance and no spring closes.
-            SolverFailed: the cone solver gave up.
-        """
-        posture = replace(self.posture, robot=self.posture.robot.with_errors(errors))
-        return solve_assembly(posture, self.load, gravity=self.gravity)
+        if found.joints.cones.shape[1] < self.starts[-1]:
+            return found.in_columns(self.joints)  # bounds of motions are cones here
+        return found
 
     @property
     def at_tips(self) -> NDArray:
@@ -208,10 +135,10 @@ def checked_errors(errors: ArrayLike, n: int) -> NDArray:
     return errors
 
 
-def prepare_energies(
+def linear_response(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
-) -> OnePosture:
-    """Eliminate free motions and springs at a posture, for any errors.
+) -> LinearResponse:
+    """Eliminate free motions and springs at a posture.
 
     Args:
         posture: where the robot stands.
@@ -219,8 +146,8 @@ def prepare_energies(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        What :meth:`OnePosture.solve` needs.  Bounds of passive joints' own motion are
-        left out, unless a load drives a joint up to its bound.
+        How it follows them.  Bounds of passive joints' own motion are left out, unless
+        a load drives a joint up to its bound.
 
     Raises:
         FreeMotion: a load drives a motion that nothing resists.
@@ -252,7 +179,7 @@ def prepare_energies(
     bounds = component_bounds(clearance_bounds(robot)).ravel()
     size = np.tile(np.repeat([1.0, lin.size], 3), len(robot.closures))
     wrenches = np.einsum("nji,kn->nikj", posture.paths, closure_signs(robot))
-    return OnePosture(
+    return LinearResponse(
         posture=posture,
         joints=joints,
         starts=cone_starts(joints.group),
