@@ -63,7 +63,7 @@ def of_any_kind(seed: int, nudge: float) -> Any:
             found["alone"]["solved"], reading, energy_budget=0.1, **CLOSE
         )
         found[reading] = {
-            "sizes": [some.rotation_error, some.translation_error],
+            "sizes": [[*some.rotation_error], [*some.translation_error]],
         }
     for reading in ("rigid", "free"):
         zone = zone_margin(posture, reading)

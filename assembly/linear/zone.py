@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import checked_size
-from assembly.linear.lanes import margins_side_by_side
+from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
 from assembly.linear.reference import least_margin
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
 from assembly.model.point_results import Numbers, PointResults
@@ -161,9 +160,9 @@ def _compiled(
     count = len(own) if len(T) == 1 and own.ndim == 3 else len(T)
     forces = np.zeros((count, joints.cones.shape[1]))
     margin, bound = np.full((2, count), np.nan)
-    outcome = np.full(count, FALLBACK)
+    outcome = np.full(count, REFERENCE)
     if method == "reference":
-        return margin, bound, forces, outcome > SOLVED
+        return margin, bound, forces, outcome != COMPILED
     if not own.any():  # no clearance is needed
         return *np.zeros((2, count)), forces, np.zeros(count, dtype=bool)
     if joints.scaled.all():
@@ -174,4 +173,4 @@ def _compiled(
             np.full(len(T), posture.mismatch, dtype=float),
         )
         margins_side_by_side(structure, *points, (margin, bound, forces, outcome))
-    return margin, bound, forces, outcome > SOLVED
+    return margin, bound, forces, outcome != COMPILED

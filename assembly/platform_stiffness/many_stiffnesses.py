@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.lanes import compliances_side_by_side
+from assembly.linear.lanes import COMPILED, compliances_side_by_side
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import SOLVED
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from assembly.solvers.method import Method
@@ -202,7 +201,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
     if method == "compiled":
         off = np.full(len(T), posture.mismatch, dtype=float)
         compliances_side_by_side(structure, T, off, inner, status)
-    left = (status != SOLVED) | (method == "reference")
+    left = (status != COMPILED) | (method == "reference")
     size = size_of(posture.robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths
