@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_matrix, diags_array, hstack, vstack
 
 from assembly.kinematics.posture import Posture
-from assembly.linear import as_printed
 from assembly.linear.assembled import all_loads
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.reduction import reduce_problem
+from assembly.linear.reference import as_printed
+from assembly.linear.reference.reduction import reduce_problem
 from assembly.model.robot import Robot
 from assembly.solvers import conic
 

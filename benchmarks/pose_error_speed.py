@@ -39,7 +39,7 @@ from scipy.sparse import csc_matrix, vstack
 from assembly.kinematics.posture import Posture, place_many, together
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import ReachableSet, reachable_screws
+from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Robot
 from assembly.solvers import conic

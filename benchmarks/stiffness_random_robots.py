@@ -36,7 +36,7 @@ from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_many_joints
 from assembly.kinematics.se3 import turn_jacobian
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Frame, Robot
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance

@@ -10,7 +10,8 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames, weights
-from assembly.linear.reference import margin_with, solve_with
+from assembly.linear.reference.energy import solve_with
+from assembly.linear.reference.zone import margin_with
 from assembly.model.clearance import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints

@@ -78,7 +78,7 @@ _OWNERS = {
     "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
     "assembly.kinematics.singular_posture": ("is_singular",),
     "assembly.linear.energy": ("Assembly", "CannotAssemble", "solve_assembly"),
-    "assembly.linear.mobility": ("mobility",),
+    "assembly.kinematics.mobility": ("mobility",),
     "assembly.linear.pose_error": ("PoseError", "bound_pose_error"),
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),

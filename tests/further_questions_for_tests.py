@@ -15,16 +15,16 @@ from assembly.effects.places import drives
 from assembly.effects.units import units_of
 from assembly.kinematics.posture import Posture, place_many_joints, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.error_body import error_body
 from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
-from assembly.linear.without_clearance import flexibility
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.predict import predict, with_finite_motions
 from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.measurement.without_clearance import flexibility
 from assembly.model.robot import Robot
+from assembly.report.error_body import error_body
 from assembly.robots import load_robot
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.uniform_clearance import diagnose as diagnose_chains

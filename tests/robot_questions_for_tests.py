@@ -21,11 +21,11 @@ from assembly.kinematics.se3 import (
     second_form,
     turn_jacobian,
 )
+from assembly.kinematics.singularity import find_singularities
+from assembly.linear.certificate import bound_screw
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import READINGS
-from assembly.linear.screw_bound import bound_screw
-from assembly.linear.singularity import find_singularities
+from assembly.linear.reference.pose_error import READINGS
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot

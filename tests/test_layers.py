@@ -35,7 +35,7 @@ OWNERS = {
     "gmsh": ("stiffness/surface/step_file.py",),
     "clarabel": ("assembly/solvers/conic.py",),
     "cvxpy": (
-        "assembly/linear/as_printed.py",
+        "assembly/linear/reference/as_printed.py",
         "assembly/statistics/cutting_planes.py",
         "assembly/statistics/worst_case.py",
     ),

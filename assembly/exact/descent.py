@@ -42,7 +42,7 @@ from assembly.exact.dead_load import (
     work_of,
 )
 from assembly.exact.placement import Placement, place
-from assembly.linear.thresholds import ROWS_RANK, rank_tolerance
+from assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers

@@ -2,6 +2,5 @@
 
 Begin at ``closure.py``, then ``energy.py`` (22), ``zone.py`` (21), ``pose_error.py``
 (27).  Those three call the compiled methods, ``lanes.py``, and hand what these do not
-cover to numpy: ``reference.py``, whose head names the other files.  ``as_printed.py``
-has (21) and (22) once more, as the paper prints them, in cvxpy.
+cover to numpy: the folder ``reference``.
 """

@@ -34,7 +34,7 @@ from assembly.linear.load import (
     with_distributed,
     wrenches_at_starts,
 )
-from assembly.linear.reduction import reduce_problem
+from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
 from assembly.model.point_results import Numbers, PointResults

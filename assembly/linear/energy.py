@@ -23,8 +23,8 @@ from assembly.linear.closure import (
 )
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads, no_loads
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import CannotAssemble, least_energy
+from assembly.linear.reference.energy import CannotAssemble, least_energy
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.rounding import (
     SPREAD,

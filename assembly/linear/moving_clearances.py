@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.linear.assembled import Assembly
 from assembly.linear.energy import with_free_own_axes
 from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
-from assembly.linear.reach import READINGS
+from assembly.linear.reference.pose_error import READINGS
 from assembly.linear.robot_structure import Structure, structure_of
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot

@@ -1,8 +1,9 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
-Springs and loaded clearances are the same in all of them (:mod:`assembly.linear.reach`,
-reading ``frozen``); unloaded clearances may be anywhere in their cones as long as the
-closures hold.  The nearest pose is a second-order cone programme again,
+Springs and loaded clearances are the same in all of them
+(:mod:`assembly.linear.reference.pose_error`, reading ``frozen``); unloaded clearances
+may be anywhere in their cones as long as the closures hold.  The nearest pose is a
+second-order cone programme again,
 
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1,
 
@@ -19,19 +20,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.certificate import LARGEST_EXCESS, unproved
-from assembly.linear.closure import virtual_joints
-from assembly.linear.reach import loaded_cones
-from assembly.linear.reduction import complement
-from assembly.linear.reference import solve_with
-from assembly.linear.thresholds import (
+from assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     noise_of,
     rank_of,
     rank_tolerance,
 )
+from assembly.linear.assembled import Assembly
+from assembly.linear.certificate import LARGEST_EXCESS, unproved
+from assembly.linear.closure import virtual_joints
+from assembly.linear.reference.energy import solve_with
+from assembly.linear.reference.pose_error import loaded_cones
+from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import has_bounded_motion
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import minimise_energy

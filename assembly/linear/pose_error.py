@@ -14,8 +14,8 @@ Passive joints keep within the bounds of their own motion.  Rotation and transla
 bounded each by itself: a tool on a bearing turns freely, and its point still has a
 largest error.
 
-The set of platform screws (:mod:`assembly.linear.reach`) is convex.  By the method
-``"compiled"`` its farthest one is bracketed by
+The set of platform screws (:mod:`assembly.linear.reference.pose_error`) is convex.  By
+the method ``"compiled"`` its farthest one is bracketed by
 :func:`assembly.solvers.one_problem.farthest`, which asks Clarabel for single supports
 in doubt; by ``"reference"`` by :func:`assembly.solvers.outer_cuts.farthest`, in numpy,
 and Clarabel for every support.  The first two readings are compiled whole
@@ -36,9 +36,9 @@ from assembly.linear.assembled import Assembly
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import failure_status
 from assembly.linear.moving_clearances import Asked, compiled_bounds
-from assembly.linear.reach import reachable_screws
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import CannotAssemble
+from assembly.linear.reference.energy import CannotAssemble
+from assembly.linear.reference.pose_error import reachable_screws
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import Numbers, PointResults
 from assembly.solvers.conic import SolverFailed

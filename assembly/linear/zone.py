@@ -18,15 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import checked_size
 from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
-from assembly.linear.reference import least_margin
+from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.thresholds import MARGIN_GAP
 from assembly.model.clearance import Compliant
 from assembly.model.point_results import Numbers, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
-_GAP_ABSOLUTE = 1e-12  # accepted beside MARGIN_GAP
+MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
+_GAP_ABSOLUTE = 1e-12  # .. plus this
 # readings of compliant joints, by the names of their margins
 MARGIN_READINGS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside

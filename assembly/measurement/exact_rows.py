@@ -3,9 +3,9 @@ r"""The exact equilibrium of a robot without clearances, for many rows at once.
 The equations are those of :mod:`assembly.exact.exact`: closures hold on SE(3), every
 body and spring deforms by its compliance times its wrench, free motions carry no load.
 All rows are iterated together with the inverse of the linear model at the nominal
-posture (:mod:`assembly.linear.without_clearance`).  The first iterate is the linear
-solution; each further one reduces the error by a factor of the size of the motions (a
-chord method).  Rows that do not converge are left to
+posture (:mod:`assembly.measurement.without_clearance`).  The first iterate is the
+linear solution; each further one reduces the error by a factor of the size of the
+motions (a chord method).  Rows that do not converge are left to
 :func:`assembly.exact.exact.solve_exact`.
 
 The rows and their iterate are in :mod:`assembly.measurement.row_state`.
@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.pieces import cut_beams
-from assembly.linear.without_clearance import (
-    flexibility,
-)
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.row_state import Rows, RowState
+from assembly.measurement.without_clearance import (
+    flexibility,
+)
 
 _MOST_ITERATIONS = 60  # at most; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end

@@ -1,8 +1,9 @@
 """Predicted readings: the platform's deviation under each row of the conditions.
 
-Robots without clearances are solved together (:mod:`assembly.linear.without_clearance`,
-with finite motions :mod:`assembly.measurement.exact_rows`).  Rows with clearances, or
-whose closures have a numerically ambiguous rank, are solved one by one by
+Robots without clearances are solved together
+(:mod:`assembly.measurement.without_clearance`, with finite motions
+:mod:`assembly.measurement.exact_rows`).  Rows with clearances, or whose closures have a
+numerically ambiguous rank, are solved one by one by
 :mod:`assembly.linear.energy` and :mod:`assembly.exact.exact`.
 
 Sources:
@@ -20,8 +21,7 @@ from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.without_clearance import at_postures, flexibility, responses_to
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.contacts import (
     CONVERGED,
@@ -38,6 +38,11 @@ from assembly.measurement.settled_clearance import (
     with_clearances_at_rest,
     with_clearances_taken_up,
     without_joint_clearances,
+)
+from assembly.measurement.without_clearance import (
+    at_postures,
+    flexibility,
+    responses_to,
 )
 from assembly.measurement.yields import Yields, settle_yields, with_springs
 from assembly.solvers.conic import SolverFailed

@@ -28,12 +28,12 @@ from assembly.kinematics.se3 import (
     logarithm,
     turn_jacobian,
 )
-from assembly.linear.without_clearance import (
+from assembly.measurement.conditions import Conditions
+from assembly.measurement.without_clearance import (
     Flexibility,
     at_postures,
     pseudo_inverse,
 )
-from assembly.measurement.conditions import Conditions
 from stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _LINEAR_BELOW = 1e-9  # [rad or m] deflections of a contact below which it is linear

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
+from assembly.measurement.without_clearance import flexibility
 from assembly.model.clearance import (
     CONES,
     clearance_bounds,

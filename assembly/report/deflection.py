@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import (
     DeflectionCurve,

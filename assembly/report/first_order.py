@@ -15,7 +15,7 @@ from assembly.kinematics.verdict import (
     limits_passed,
 )
 from assembly.linear.energy import Assembly, CannotAssemble, failure_status
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import rounded, screw_text
 

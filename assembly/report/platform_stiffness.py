@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.linear.error_body import PARTS, ErrorBody, error_body
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
+from assembly.report.error_body import PARTS, ErrorBody, error_body
 from forcefit.inputs.table import BadInput
 from stiffness.screws import rotation_matrix, screw_map
 

@@ -14,8 +14,8 @@ from assembly.linear.energy import (
     solve_assembly,
 )
 from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.reach import READINGS, reachable_screws
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.pose_error import READINGS, reachable_screws
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.report.first_order import singular_status
 from assembly.report.results import proof_status, status_line
 from assembly.solvers.conic import SolverFailed

@@ -7,9 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.exact.exact import ExactAssembly, solve_exact
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.verdict import posture_remarks
-from assembly.linear.certificate import unproved, unproved_screw
+from assembly.linear.certificate import (
+    ScrewBound,
+    bound_screw,
+    unproved,
+    unproved_screw,
+)
 from assembly.linear.energy import (
     Assembly,
     CannotAssemble,
@@ -17,10 +23,8 @@ from assembly.linear.energy import (
     solve_assembly,
 )
 from assembly.linear.load import massless
-from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.screw_bound import ScrewBound, bound_screw
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear

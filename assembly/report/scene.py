@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly
-from assembly.linear.error_body import ErrorBody
+from assembly.report.error_body import ErrorBody
 from assembly.report.plot import DisplacedBodies, displaced_bodies, readable_factor
 from forcefit.page.charts import scene
 from forcefit.page.units import shown_in

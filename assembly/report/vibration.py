@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers

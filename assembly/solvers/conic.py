@@ -56,7 +56,7 @@ class SolverFailed(RuntimeError):
 
 
 @dataclass(frozen=True, eq=False)
-class LeastEnergy:
+class ConicSolution:
     """Solution of :func:`minimise_energy`.
 
     Attributes:
@@ -95,7 +95,7 @@ class ConeProgramme(NamedTuple):
 def minimise_energy(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
     method: Method = "compiled",
-) -> LeastEnergy:  # fmt: skip
+) -> ConicSolution:  # fmt: skip
     """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and every cone's |u_k| <= 1.
 
     Args:
@@ -115,10 +115,10 @@ def minimise_energy(
     """
     if not (h.any() or d.any() or k.any()):  # nothing to close, nothing to gain
         zeros = np.zeros(len(h)), np.zeros(len(k))
-        return LeastEnergy(np.zeros(len(d)), *zeros, 0.0, 0.0)
+        return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
         energy = float(h @ h) / 2
-        return LeastEnergy(np.zeros(0), h, np.zeros(len(k)), energy, energy)
+        return ConicSolution(np.zeros(0), h, np.zeros(len(k)), energy, energy)
     size = max(np.linalg.norm(h), np.linalg.norm(G, axis=0).max(), 1e-150)
     size = max(size, float(np.sqrt(np.abs(d).max())))
     rows = np.linalg.norm(H, axis=1)
@@ -129,7 +129,7 @@ def minimise_energy(
     for solve in _SOLVERS[method]:
         u, rigid, status = solve(*scaled)
         if status == "PrimalInfeasible":
-            return LeastEnergy(
+            return ConicSolution(
                 clearances=np.zeros_like(d),
                 springs=np.zeros_like(h),
                 rigid_multipliers=np.zeros_like(k),
@@ -149,7 +149,7 @@ def minimise_energy(
     if best is None:
         raise SolverFailed("least energy", status)
     joule = size**2
-    return LeastEnergy(
+    return ConicSolution(
         clearances=best.clearances,
         springs=best.springs * size,
         rigid_multipliers=best.rigid_multipliers / rows * joule,
@@ -158,7 +158,7 @@ def minimise_energy(
     )
 
 
-def _proved(least: LeastEnergy, h: NDArray) -> bool:
+def _proved(least: ConicSolution, h: NDArray) -> bool:
     """Whether the certified gap of a scaled problem is small enough."""
     allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
@@ -208,7 +208,7 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
-) -> Iterator[LeastEnergy]:
+) -> Iterator[ConicSolution]:
     """A solution with the bound of its own springs, and the same refined by Newton."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
     if method == "reference":  # Clarabel's own is rarely the better one
@@ -228,7 +228,7 @@ def _certified(
 
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
-) -> Iterator[LeastEnergy]:
+) -> Iterator[ConicSolution]:
     """What Newton's method ended at, if it is a solution."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
@@ -238,7 +238,7 @@ def _checked(
 
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
-) -> LeastEnergy:
+) -> ConicSolution:
     """A solution with its value and the bound that its multipliers prove."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
@@ -250,7 +250,7 @@ def _certify(
         better = _energy_bound(problem, factor * springs, factor * rigid)
         if better > bound:
             bound, springs, rigid = better, factor * springs, factor * rigid
-    return LeastEnergy(u, springs, rigid, value, bound)
+    return ConicSolution(u, springs, rigid, value, bound)
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:

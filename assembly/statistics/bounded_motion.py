@@ -3,7 +3,7 @@
 Those bounds are left out of the prepared posture: most are ranges that no clearance
 comes near.  Draws in which one may be reached are positioned one by one, in the set of
 platform screws of problem (27), reading ``frozen``, which has every bound that counts
-as a cone (:mod:`assembly.linear.reach`).
+as a cone (:mod:`assembly.linear.reference.pose_error`).
 """
 
 from dataclasses import replace
@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.kinematics.ranks import UNBOUNDED, rank_tolerance
 from assembly.linear.energy import Assembly
-from assembly.linear.reach import reachable_screws
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import CannotAssemble
-from assembly.linear.thresholds import UNBOUNDED, rank_tolerance
+from assembly.linear.reference.energy import CannotAssemble
+from assembly.linear.reference.pose_error import reachable_screws
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.linear_response import LinearResponse
 

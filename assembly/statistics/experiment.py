@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import MARGIN_READINGS
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links

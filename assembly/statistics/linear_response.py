@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import (
     VirtualJoints,
     closure_signs,
@@ -18,14 +19,13 @@ from assembly.linear.closure import (
 )
 from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.load import FrameLoads, loads_with_weight
-from assembly.linear.reduction import (
+from assembly.linear.reference.reduction import (
     FreeMotion,
     Reduction,
     complement,
     reduce_problem,
     spring_deformations,
 )
-from assembly.linear.thresholds import RANK
 from assembly.model.clearance import (
     clearance_bounds,
     component_bounds,

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import linearise, virtual_joints
-from assembly.linear.reduction import complement, reduce_problem
-from assembly.linear.thresholds import RANK
+from assembly.linear.reference.reduction import complement, reduce_problem
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import Compliant
 from assembly.solvers.cones import cone_starts

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly, CannotAssemble
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.one_problem import farthest_points
 from assembly.statistics.clearance_positions import (

@@ -18,7 +18,7 @@ from assembly.linear.energy import (
     solve_assembly,
     together_at,
 )
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions, as_declared
 from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import Target, mobile
 from assembly.kinematics.posture import Posture
+from assembly.kinematics.singularity import KINDS, find_singularities
 from assembly.kinematics.verdict import verdicts
-from assembly.linear.singularity import KINDS, find_singularities
 from assembly.model.robot import Robot
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.targets import of_joints

@@ -16,7 +16,7 @@ from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly.kinematics.singularity import KINDS
 from assembly.kinematics.verdict import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
-from assembly.linear.singularity import KINDS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design

@@ -13,7 +13,7 @@ from assembly.effects.robot_effects import check_covariates
 from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.reach import READINGS
+from assembly.linear.reference.pose_error import READINGS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import check_masses

@@ -159,7 +159,7 @@ def error(
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.linear.reach import READINGS
+    from assembly.linear.reference.pose_error import READINGS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.report.pose_errors import pose_error_of, pose_error_text
 
@@ -225,9 +225,9 @@ def show(
 ) -> None:
     """Plot the nominal and the forced robot, and its errors."""
     from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-    from assembly.linear.error_body import PARTS
-    from assembly.linear.reach import READINGS
-    from assembly.linear.reduction import FreeMotion
+    from assembly.report.error_body import PARTS
+    from assembly.linear.reference.pose_error import READINGS
+    from assembly.linear.reference.reduction import FreeMotion
     from assembly.report.plot import plot_assembly
     from assembly.report.results import remark_lines
     from assembly.solvers.conic import SolverFailed

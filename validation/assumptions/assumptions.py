@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink
 from assembly.solvers.conic import SolverFailed
 from stiffness.mesh.fit_to_patches import MeshFailed

@@ -21,7 +21,7 @@ from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
 from assembly.linear.closure import VirtualJoints, linearise, virtual_joints
 from assembly.linear.load import loads_on_frames
-from assembly.linear.reference import solve_with
+from assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness

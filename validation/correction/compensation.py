@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import place_many_joints
-from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.measurement.without_clearance import flexibility
 from assembly.model.links import own_screw
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.closure import linearise
-from assembly.linear.reduction import reduce_problem
+from assembly.linear.reference.reduction import reduce_problem
 from assembly.model.links import link_compliance
 from assembly.model.robot import Robot
 from assembly.solvers.cones import into_cones

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric

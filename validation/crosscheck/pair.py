@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.solvers.conic import SolverFailed
 from validation.multibody.exudyn_model import HOLDING_STIFFNESS, IDLE_STIFFNESS

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, MeshLink
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import SCREW

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance as classical
 from assembly.platform_stiffness.matrices import PlatformStiffness

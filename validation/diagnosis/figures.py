@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly, CannotAssemble
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.predict import assemble_row
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed

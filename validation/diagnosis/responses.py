@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import flexibility
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import read
 from assembly.measurement.settled_clearance import (
@@ -29,6 +28,7 @@ from assembly.measurement.settled_clearance import (
     with_clearances_taken_up,
     without_joint_clearances,
 )
+from assembly.measurement.without_clearance import flexibility
 
 _STEP = 1e-5  # [rad, m] for a derivative: central, exact to 1e-10
 _ROUNDING = 1e-9  # of the largest moment or force: in struts between ball joints

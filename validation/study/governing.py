@@ -8,7 +8,7 @@ import numpy as np
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.clearance import own_cone
 from assembly.model.robot import Frame, Robot
 from assembly.solvers.conic import SolverFailed

@@ -28,7 +28,10 @@ def compare_printed(
         the verdict on each; ``verdict`` and ``passed``.  Where cvxpy has no solution,
         only the ``reason``.
     """
-    from assembly.linear.as_printed import energy_as_printed, margin_as_printed
+    from assembly.linear.reference.as_printed import (
+        energy_as_printed,
+        margin_as_printed,
+    )
 
     try:
         energy, screw = energy_as_printed(posture)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.assembled import without_rounding
-from assembly.linear.error_body import ErrorBody, error_body
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
+from assembly.report.error_body import ErrorBody, error_body
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import GREY, Axis, chart, matrix

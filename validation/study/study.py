@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly.files.solved_links import solved_link
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.reach import READINGS
+from assembly.linear.reference.pose_error import READINGS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot

@@ -12,7 +12,7 @@ namespace LANE_SPACE {
 
 // assembly/solvers/conic.py
 constexpr double GAP = 1e-8, GAP_WITHOUT_CLEARANCE = 1e-12;
-// assembly/linear/thresholds.py
+// assembly/kinematics/ranks.py
 constexpr double OPEN = 1e-11;
 // assembly/linear/assemblies.py
 enum Outcome { NEWTON, INTERIOR, RIGID, AMBIGUOUS, UNCERTIFIED, BOUNDED, DRIVEN };

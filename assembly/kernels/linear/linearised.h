@@ -17,7 +17,7 @@
 
 namespace LANE_SPACE {
 
-// assembly/linear/thresholds.py
+// assembly/kinematics/ranks.py
 constexpr double RANK = 1e-10, MISMATCH_FACTOR = 30.0, NOISE = 1e-12;
 
 // A closure that a frame enters, and the sign.

@@ -7,7 +7,7 @@
 
 namespace LANE_SPACE {
 
-// assembly/linear/thresholds.py
+// assembly/kinematics/ranks.py
 constexpr double INFEASIBLE = 1e-13;
 // assembly/linear/lanes.py: COMPILED, REFERENCE
 enum { SOLVED, FALLBACK };

@@ -11,7 +11,7 @@
 
 namespace LANE_SPACE {
 
-constexpr double UNBOUNDED = 1e-8;  // assembly/linear/thresholds.py
+constexpr double UNBOUNDED = 1e-8;  // assembly/kinematics/ranks.py
 constexpr double APART = 100.0;     // by which load and slack of a cone must differ
 
 // Columns are filled up to a multiple of this many cones, so that bodies share lanes.

@@ -1,5 +1,5 @@
 // Free motions and springs eliminated at several postures side by side, what is left for
-// the solvers, and the way back: assembly/linear/reduction.py in another order.
+// the solvers, and the way back: assembly/linear/reference/reduction.py in another order.
 //
 // Vectors are stored as rows, one Householder triangulation with pivoting serves the free
 // motions, the springs and the least motions, and springs that enter the same closures are

@@ -10,7 +10,7 @@
 
 namespace LANE_SPACE {
 
-constexpr double ROWS_RANK = 1e-9;  // assembly/linear/thresholds.py
+constexpr double ROWS_RANK = 1e-9;  // assembly/kinematics/ranks.py
 
 // Robots without springs.
 class Rows : public Reduction {

@@ -9,7 +9,7 @@
 
 namespace LANE_SPACE {
 
-constexpr double MARGIN_GAP = 1e-8;  // assembly/linear/thresholds.py
+constexpr double MARGIN_GAP = 1e-8;  // assembly/kinematics/ranks.py
 constexpr double MARGIN_STOP = 1e-9;
 
 // B, the programme's first rows, turned so that the first is along w, the others across; w

@@ -12,10 +12,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
-from assembly.linear.mobility import mobility
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import (
     BeamLink,
     Clearance,

@@ -10,8 +10,8 @@ from assembly.kinematics.crossing import beyond_singularity
 from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import home_posture, place_many, place_robot
 from assembly.kinematics.singular_posture import is_singular
+from assembly.kinematics.singularity import find_singularities
 from assembly.kinematics.verdict import limits_passed, posture_remarks
-from assembly.linear.singularity import find_singularities
 from assembly.robots import BUILT_IN, load_robot
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import slider_crank

@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 
 from assembly.kinematics.posture import home_posture, place_many, place_robot, together
 from assembly.linear import energy
-from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.certificate import (
     _AMPLIFIED,
     _springs_determined,
+    bound_screw,
     unproved,
     unproved_screw,
 )
 from assembly.linear.energy import CannotAssemble, solve_assembly, together_at
-from assembly.linear.screw_bound import bound_screw
+from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.linear_response import linear_response

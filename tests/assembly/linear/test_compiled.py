@@ -9,7 +9,7 @@ from assembly.kinematics.posture import Posture, home_posture
 from assembly.linear import energy
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import solve_assembly
-from assembly.linear.reference import CannotAssemble
+from assembly.linear.reference.energy import CannotAssemble
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN

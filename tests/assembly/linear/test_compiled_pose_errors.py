@@ -8,7 +8,7 @@ import pytest
 from assembly.kinematics.posture import home_posture, together
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
 from tests.assembly.linear.test_pose_error import hinged_frame

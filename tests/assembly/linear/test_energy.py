@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture, home_posture, place_robot
-from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.without_clearance import flexibility
+from assembly.linear.reference.as_printed import energy_as_printed
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
 from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.measurement.without_clearance import flexibility
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy

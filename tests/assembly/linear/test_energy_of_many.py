@@ -7,7 +7,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear import lanes, pose_error
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.robot_structure import structure_of
 from assembly.model.robot import Clearance
 from tests.robots_for_tests import coaxial_beams, planar_four_bar

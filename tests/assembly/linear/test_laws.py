@@ -9,7 +9,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2

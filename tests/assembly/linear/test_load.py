@@ -7,7 +7,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot

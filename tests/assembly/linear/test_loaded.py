@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.assembled import Assembly
 from assembly.linear.energy import (
     CannotAssemble,
     solve_assembly,
     with_free_own_axes,
 )
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.as_printed import energy_as_printed
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN, load_robot

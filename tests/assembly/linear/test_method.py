@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear import energy, reach, zone
+from assembly.linear import energy, zone
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.reference import pose_error as reach
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.energy import solve_assembly
 from assembly.linear.nearest_pose import (
     _FreeClearances,
@@ -17,6 +16,7 @@ from assembly.linear.nearest_pose import (
     _moves,
     nearest_pose,
 )
+from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, with_rest_positions
 from assembly.model.clearance import CONES, clearance_bounds

@@ -9,7 +9,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import linearise
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
@@ -153,7 +153,7 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
     """Put back into the closures by cvxpy, which also finds the supports; its 1e-6."""
     import cvxpy as cp
 
-    from assembly.linear.as_printed import OPTIMAL, _solve
+    from assembly.linear.reference.as_printed import OPTIMAL, _solve
 
     posture = home_posture(hinged_frame(spin))
     answer = solve_assembly(posture)

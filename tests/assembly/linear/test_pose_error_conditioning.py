@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import ReachableSet, reachable_screws
+from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
 from assembly.robots.irsbot2 import irsbot2
 from assembly.solvers.cones import cone_sizes
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.certificate import unproved
+from assembly.linear.certificate import _extents, _room, bound_screw, unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import ReachableSet
-from assembly.linear.screw_bound import _extents, _room, bound_screw
+from assembly.linear.reference.pose_error import ReachableSet
 from assembly.model.robot import Clearance, Frame, MatrixLink
 from assembly.robots import load_robot
 from assembly.solvers.cones import cone_sizes

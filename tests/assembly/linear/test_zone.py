@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.as_printed import margin_as_printed
+from assembly.linear.reference.as_printed import margin_as_printed
 from assembly.linear.zone import Zone, zone_margin
 from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import (

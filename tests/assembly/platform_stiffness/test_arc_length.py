@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Frame, Robot
 from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness

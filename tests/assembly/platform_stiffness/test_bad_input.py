@@ -5,7 +5,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot

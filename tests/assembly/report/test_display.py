@@ -9,10 +9,10 @@ import pytest
 
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import place_robot
+from assembly.kinematics.singularity import find_singularities
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
-from assembly.linear.singularity import find_singularities
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.zone import zone_margin
 from assembly.report.results import solution_of, solution_text
 from forcefit.inputs.display import brief, html_table, short_repr

@@ -5,8 +5,8 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.energy import solve_assembly
-from assembly.linear.error_body import ErrorBody
 from assembly.model.robot import BeamLink, Frame, Robot
+from assembly.report.error_body import ErrorBody
 from assembly.report.scene import robot_scene
 from tests.pages_for_tests import parse
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly
-from assembly.linear.mobility import mobility
-from assembly.linear.reduction import reduce_problem
+from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.zone import zone_margin
 from assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
 from assembly.robots.irsbot2 import (

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import read_robot, write_robot
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.as_printed import energy_as_printed
 from assembly.linear.energy import solve_assembly
-from assembly.linear.mobility import mobility
+from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.linear.zone import zone_margin
 from assembly.model.clearance import clearance_bounds
 from assembly.model.links import joint_compliances, link_compliances

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import POSE, home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import bound_pose_error
 from assembly.robots import BUILT_IN
 from assembly.robots.delta import DeltaParameters, drive_angle

@@ -12,7 +12,7 @@ from assembly.solvers.conic import (
     GAP,
     GAP_WITHOUT_CLEARANCE,
     ConeProgramme,
-    LeastEnergy,
+    ConicSolution,
     _certified,
     _certify,
     _compiled,
@@ -124,8 +124,8 @@ def test_a_proof_is_a_tenth_of_the_gap_that_counts():
         most = (GAP * abs(value) + GAP_WITHOUT_CLEARANCE * 12.5) / 10
         for share, proved in ((0.9, True), (1.1, False)):
             none = np.zeros(0)
-            least = LeastEnergy(none, none, none, share * most, 0.0)
-            least = LeastEnergy(none, none, none, value, value - least.value)
+            least = ConicSolution(none, none, none, share * most, 0.0)
+            least = ConicSolution(none, none, none, value, value - least.value)
             # what value itself cannot resolve
             if value == 0.0 or most > 1e-9:
                 assert _proved(least, h) is proved

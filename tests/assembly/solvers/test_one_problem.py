@@ -6,7 +6,7 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from assembly.linear.reach import ReachableSet
+from assembly.linear.reference.pose_error import ReachableSet
 from assembly.solvers import conic, one_problem
 from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import ConeProgramme

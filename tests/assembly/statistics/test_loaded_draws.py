@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot

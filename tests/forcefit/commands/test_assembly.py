@@ -11,7 +11,7 @@ from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from tests.three_upu_for_tests import three_upu

@@ -7,7 +7,7 @@ import pytest
 
 from assembly.files.robot_file import write_robot
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.reduction import FreeMotion
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, Robot
 from assembly.robots import load_robot

@@ -255,12 +255,12 @@ def test_a_map_without_a_point_in_reach_does_not_pass(tmp_path):
 
 
 def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
-    import assembly.linear.as_printed
+    import assembly.linear.reference.as_printed
 
     def lost(*_):
         raise RuntimeError("cvxpy: the problem is unbounded")
 
-    monkeypatch.setattr(assembly.linear.as_printed, "energy_as_printed", lost)
+    monkeypatch.setattr(assembly.linear.reference.as_printed, "energy_as_printed", lost)
     text = SMALL + QUIET + "crosscheck = false\nmaps = false\n"
     results = run_study(read_study(study_file(tmp_path, text), tmp_path / "out"))
     write_study(results)

@@ -13,7 +13,7 @@ from assembly.kinematics.posture import (
     place_many_joints,
     place_robot,
 )
-from assembly.linear.singularity import find_singularities
+from assembly.kinematics.singularity import find_singularities
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 

@@ -7,10 +7,10 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.error_body import ErrorBody, error_body, even_directions
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reach import reachable_screws
+from assembly.linear.reference.pose_error import reachable_screws
 from assembly.model.robot import Clearance, Frame, Robot
+from assembly.report.error_body import ErrorBody, error_body, even_directions
 from assembly.report.plot import plot_assembly
 from assembly.robots.irsbot2 import irsbot2
 

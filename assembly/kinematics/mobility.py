@@ -7,7 +7,7 @@ import numpy as np
 from assembly.kinematics.closure_rates import closure_signs
 from assembly.kinematics.nominal import mobile, motion_screws, size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.thresholds import rank_of
+from assembly.kinematics.ranks import rank_of
 
 
 @dataclass(frozen=True)

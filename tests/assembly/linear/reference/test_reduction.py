@@ -8,7 +8,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.load import loads_on_frames
-from assembly.linear.reduction import FreeMotion, reduce_problem
+from assembly.linear.reference.reduction import FreeMotion, reduce_problem
 from assembly.model.robot import Frame, Robot
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assembly.linear.thresholds import noise_of, rank_of, rank_tolerance
+from assembly.kinematics.ranks import noise_of, rank_of, rank_tolerance
 
 
 @pytest.mark.parametrize(("tolerance", "noise", "rank"), [

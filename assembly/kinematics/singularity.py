@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.closure_rates import SINGULAR, closure_matrices
 from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.thresholds import rank_of
+from assembly.kinematics.ranks import rank_of
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, largest_row, short_repr
 from stiffness.screws import SCREW

@@ -28,13 +28,13 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Content, Posture, Unchanged, content_of
+from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import (
     closure_signs,
     in_reference_lengths,
     virtual_joints,
 )
 from assembly.linear.load import FrameLoads
-from assembly.linear.thresholds import RANK
 from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.links import joint_compliances, link_compliances
 

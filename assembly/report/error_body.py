@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from assembly.linear.reach import ReachableSet
+from assembly.linear.reference.pose_error import ReachableSet
 from forcefit.inputs.display import html_table, short_repr
 
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
@@ -51,7 +51,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
     """The set of errors, from its support functions.
 
     Args:
-        reachable: of :func:`assembly.linear.reach.reachable_screws`.
+        reachable: of :func:`assembly.linear.reference.pose_error.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
         count: number of directions, evenly spread.
 

@@ -8,8 +8,8 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly
-from assembly.linear.reduction import FreeMotion
-from assembly.linear.reference import margin_with
+from assembly.linear.reference.reduction import FreeMotion
+from assembly.linear.reference.zone import margin_with
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from tests.robots_for_tests import random_robot

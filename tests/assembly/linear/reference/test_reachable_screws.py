@@ -7,7 +7,11 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.reach import ReachableSet, loaded_cones, reachable_screws
+from assembly.linear.reference.pose_error import (
+    ReachableSet,
+    loaded_cones,
+    reachable_screws,
+)
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.solvers.cones import cone_sizes
 from assembly.solvers.conic import SolverFailed

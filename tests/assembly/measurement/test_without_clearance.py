@@ -11,15 +11,15 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
-from assembly.linear.without_clearance import (
+from assembly.measurement.conditions import as_declared
+from assembly.measurement.predict import predict
+from assembly.measurement.settled_clearance import without_joint_clearances
+from assembly.measurement.without_clearance import (
     _each,
     at_postures,
     flexibility,
     pseudo_inverse,
 )
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict
-from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.mobility import mobility
 from assembly.model.robot import Frame, Robot
 from tests.linkages_for_tests import five_bar, four_bar
 

@@ -1,4 +1,7 @@
-"""Thresholds that the equations and their compiled counterparts share."""
+"""Ranks: which singular values of closures count as zero.
+
+The compiled methods have the same thresholds.
+"""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,11 +13,6 @@ MISMATCH_FACTOR = 30.0
 # what a projection leaves of columns that it removes whole is rounding of their size
 NOISE = 1e-12
 UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion nothing resists
-OPEN = 1e-11  # [rad, reference lengths] most that a compiled solution leaves open
-INFEASIBLE = (
-    1e-13  # [rad, reference lengths] of the errors, where nothing can close them
-)
-MARGIN_GAP = 1e-8  # of a zone margin, accepted above its bound
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:

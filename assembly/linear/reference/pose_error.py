@@ -21,11 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import svd
 
-from assembly.linear.assembled import Assembly
-from assembly.linear.closure import VirtualJoints, virtual_joints
-from assembly.linear.reduction import complement
-from assembly.linear.reference import least_energy
-from assembly.linear.thresholds import (
+from assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     UNBOUNDED,
@@ -33,6 +29,10 @@ from assembly.linear.thresholds import (
     rank_of,
     rank_tolerance,
 )
+from assembly.linear.assembled import Assembly
+from assembly.linear.closure import VirtualJoints, virtual_joints
+from assembly.linear.reference.energy import least_energy
+from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import (
     Compliant,
     clearance_bounds,

@@ -26,19 +26,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr, svd
 
-from assembly.linear.closure import (
-    Linearisation,
-    VirtualJoints,
-    in_reference_lengths,
-)
-from assembly.linear.load import FrameLoads, loads_on_frames
-from assembly.linear.thresholds import (
+from assembly.kinematics.ranks import (
     RANK,
     ROWS_RANK,
     noise_of,
     rank_of,
     rank_tolerance,
 )
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    in_reference_lengths,
+)
+from assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.inputs.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW
 

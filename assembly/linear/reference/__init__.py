@@ -1,0 +1,25 @@
+"""The reference, in numpy and Clarabel: problems (21), (22) and (27) at one posture.
+
+Slow, and for everything: loads, rigid closures, ranks in doubt, bounds of passive
+joints that are active.  The method ``"reference"`` is this, and so is the answer where
+the compiled method does not cover a problem or falls short of its proof.
+
+=========  ==========================================  ===============================
+paper      what                                        where
+=========  ==========================================  ===============================
+(16)-(20)  A (dl + dc + de + db) = 0, dx_p from them   ``closure.linearise``
+(1)-(7)    dc = cones u + free q, de and db = springs  ``closure.virtual_joints``
+           y, so that E = |y|^2 / 2
+--         q and y eliminated: E = |G u + h|^2 / 2,    ``reduction.reduce_problem``
+           H u = k where no spring acts
+(21)       the least t with every |u_c| <= t           ``zone.least_margin``
+(22)       the least E - work, every |u_c| <= 1        ``energy.least_energy``
+(23)-(26)  wrenches, from multipliers of the closures  ``assembled.Assembly``
+(27)       the set of dx_p that (22) leaves; its       ``pose_error.reachable_screws``,
+           farthest                                    ``ReachableSet.farthest``
+=========  ==========================================  ===============================
+
+``closure.py`` and ``assembled.py`` stand in the folder above: the compiled methods
+have them in common.  Cone programmes are :mod:`assembly.solvers.conic`'s.
+``as_printed.py`` has (21) and (22) once more, as the paper prints them, in cvxpy.
+"""

@@ -1,0 +1,141 @@
+"""Problem (22) by the reference: the least energy less work, every |u_c| <= 1."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.assembled import Assembly
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    linearise,
+    virtual_joints,
+)
+from assembly.linear.load import FrameLoads
+from assembly.linear.reference.reduction import (
+    FreeMotion,
+    Reduction,
+    reduce_problem,
+)
+from assembly.linear.rounding import differs_from_zero, stiffness_spread
+from assembly.model.clearance import Compliant, has_bounded_motion
+from assembly.solvers.conic import ConicSolution, minimise_energy
+
+_RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
+
+
+class CannotAssemble(Exception):
+    """No clearance and no elasticity of the model lets the closures hold.
+
+    A result, not a mistake of the caller: some closure is rigid in every direction.
+    """
+
+
+def least_energy(
+    posture: Posture, load: NDArray, frame_loads: FrameLoads,
+    compliant: Compliant = "elastic",
+) -> Assembly:  # fmt: skip
+    """Close a manipulator at least energy, as ``solve_assembly`` does.
+
+    Bounds of passive joints' own motion count where they matter.
+
+    Args:
+        posture: where the robot stands.
+        load: (6,) [N m, N] wrench on the platform at its origin, base axes.
+        frame_loads: all loads, this one among them.
+        compliant: see :func:`assembly.linear.closure.virtual_joints`.
+
+    Returns:
+        The assembled manipulator.
+
+    Raises:
+        CannotAssemble: a closure is open that no clearance and no spring can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
+    lin, robot = linearise(posture), posture.robot
+    try:
+        joints = virtual_joints(robot, compliant)
+        assembly = solve_with(lin, joints, load, frame_loads)
+    except FreeMotion:
+        if not has_bounded_motion(robot):
+            raise
+    else:
+        if assembly.clearance_excess(compliant) <= 1e-9:
+            return assembly
+    # the bound of a passive joint's own motion was left out, but it is active
+    joints = virtual_joints(robot, compliant, bounded_motion=True)
+    return solve_with(lin, joints, load, frame_loads)
+
+
+def solve_with(
+    lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
+) -> Assembly:
+    """Close a manipulator at least energy with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        frame_loads: all loads, this one among them.
+
+    Returns:
+        The assembled manipulator.
+
+    Raises:
+        CannotAssemble: a closure is open that nothing can close.
+        FreeMotion: a load drives a motion that nothing resists.
+        SolverFailed: the cone solver gave up.
+    """
+    reduced = reduce_problem(lin, joints, frame_loads)
+    least = _minimise(reduced)
+    u = least.clearances
+    y = reduced.springs(u)
+    multipliers = reduced.multipliers(least.springs, least.rigid_multipliers)
+    assembly = Assembly(
+        linearisation=lin,
+        joints=joints,
+        load=load,
+        frame_loads=frame_loads,
+        elastic=y,
+        clearances=u,
+        motions=reduced.motions(u, y),
+        multipliers=multipliers,
+        energy_without_clearance=reduced.energy_without_clearance,
+        method="reference",
+    )
+    residual = assembly.closure_residual() + assembly.rounding
+    if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
+        return assembly
+    # no energy is needed: springs and wrenches are rounding of zero
+    return replace(
+        assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
+    )
+
+
+def _minimise(reduced: Reduction) -> ConicSolution:
+    """Least energy of a reduced problem; infeasible ones are named."""
+    joints = reduced.joints
+    spread = stiffness_spread(joints, reduced.linearisation.size)
+    beyond = ""
+    if spread > _RIGID_BESIDE:
+        beyond = (
+            f"; stiffnesses differ {spread:.0e} times, more than a double carries: the "
+            "stiffest count as rigid"
+        )
+    if reduced.inconsistent:
+        raise CannotAssemble(
+            f"a rigid part stays open by {reduced.inconsistent:.3g} (rad, or m per "
+            f"reference length): no clearance or spring acts there{beyond}"
+        )
+    least = minimise_energy(
+        reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group,
+        "reference",
+    )  # fmt: skip
+    if not least.feasible:
+        raise CannotAssemble(
+            f"no clearance within its bounds closes what no spring can{beyond}"
+        )
+    return least

@@ -1,0 +1,98 @@
+"""Problem (21) by the reference: the least t with every |u_c| <= t."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import svd
+
+from assembly.kinematics.posture import Posture
+from assembly.linear.closure import (
+    Linearisation,
+    VirtualJoints,
+    linearise,
+    virtual_joints,
+)
+from assembly.linear.reference.reduction import Reduction, reduce_problem
+from assembly.model.clearance import (
+    Compliant,
+    clearance_bounds,
+    clearance_excess,
+    scales_with_margin,
+)
+from assembly.solvers.cones import cone_sizes, cone_starts
+from assembly.solvers.conic import least_factor
+
+
+def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
+    """Factor on all clearances at which a rigid manipulator just assembles, (21).
+
+    Args:
+        posture: where the robot stands.
+        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+
+    Returns:
+        The margin and its certified lower bound; inf for both if no factor does.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
+    lin = linearise(posture)
+    margin, bound, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
+    bounds = clearance_bounds(posture.robot, compliant)
+    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
+    if clearance_excess(screws, ranges) > 1e-9:
+        # the range of a passive joint's motion was left out, but it is active
+        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
+        margin, bound, _ = margin_with(lin, joints)
+    return margin, bound
+
+
+def margin_with(
+    lin: Linearisation, joints: VirtualJoints
+) -> tuple[float, float, NDArray]:
+    """Margin with a given choice of what may move.
+
+    Args:
+        lin: the assembly constraints.
+        joints: what may move, without springs.
+
+    Returns:
+        The margin and its certified lower bound, inf if no factor does; the (n, 6)
+        [rad, m] clearance screws that attain it.
+
+    Raises:
+        SolverFailed: the cone solver gave up.
+    """
+    reduced = reduce_problem(lin, joints)
+    margin, bound, u = _margin_of(reduced)
+    if margin == np.inf:
+        return np.inf, np.inf, np.zeros((len(joints.robot.frames), 6))
+    motions = reduced.motions(u, np.zeros(joints.elastic.shape[1]))
+    screws = joints.cones @ u + joints.free @ motions
+    return margin, bound, screws.reshape(-1, 6)
+
+
+def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
+    """Margin of a reduced problem, its bound, and the clearances that attain it."""
+    joints = reduced.joints
+    u = np.zeros(joints.cones.shape[1])
+    if reduced.inconsistent:
+        return np.inf, np.inf, u
+    if not np.any(reduced.k):
+        return 0.0, 0.0, u
+    # orthonormal rows, whatever the units of the closures
+    U, S, B = svd(reduced.H, full_matrices=False)
+    right = U.T @ reduced.k / S
+    t, u, y = least_factor(B, right, joints.group, joints.scaled)
+    if t is None:
+        return np.inf, np.inf, u
+    return t, _margin_bound(B, right, joints, y), u
+
+
+def _margin_bound(
+    B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
+) -> float:
+    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    sizes = cone_sizes(B.T @ y, joints.group)
+    scaled = joints.scaled[cone_starts(joints.group)[:-1]]
+    work = float(y @ right) - float(sizes[~scaled].sum())
+    return max(0.0, work / max(float(sizes[scaled].sum()), 1e-300))
