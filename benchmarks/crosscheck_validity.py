@@ -164,8 +164,8 @@ def print_margins(name: str) -> None:
         factors = []
         for at in postures(name, play=True):
             disc = zone_margin(at, compliant).margin
-            bushes = bush_margin(at, compliant).margin
-            if disc and bushes:
+            bushes = bush_margin(at, compliant)
+            if disc and np.isfinite(bushes):
                 factors.append(bushes / disc)
         if factors:
             costs = np.percentile(factors, [0, 50, 100])

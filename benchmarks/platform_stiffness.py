@@ -7,13 +7,14 @@ several runs in turn, and how far K_C is from that of one posture at a time.
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.posture import place_many, together
+from assembly.kinematics.posture import Posture, place_many, together
 from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 
 _RUNS = 9
@@ -42,7 +43,8 @@ def main() -> None:
     poses = np.full((len(grid), 6), np.nan)
     poses[:, [0, 2]] = grid
     postures = [p for p in place_many(robot, poses)[0] if p is not None]
-    T = np.array([p.transforms for p in postures])
+    at = together(postures)
+    T = at.transforms
     rng = np.random.default_rng(1)
     drawn = [f.name.rpartition(".")[2] in _DRAWN for f in robot.frames]
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * np.repeat([1e-2, 1e-4], 3)
@@ -50,17 +52,16 @@ def main() -> None:
     forced = robot.with_errors(errors)
     count = len(T)
     print(f"{count} postures of {robot.name}, one thread")
-    at = together(postures)
     solve_assembly(postures[:2])
-    platform_stiffnesses(robot, T[:2])
+    platform_stiffness(postures[:2])
     for name, function in (
         ("(22) without errors", lambda: solve_assembly(at)),
         ("(22) with errors", lambda: solve_assembly(replace(at, robot=forced))),
-        ("K_C", lambda: platform_stiffnesses(robot, T)),
-        ("K_C, eigen-screws, shares", lambda: everything(robot, T)),
+        ("K_C", lambda: platform_stiffness(at)),
+        ("K_C, eigen-screws, shares", lambda: everything(at)),
     ):
         print(f"{name:28s}{least(function, count):8.1f} us")
-    batched = platform_stiffnesses(robot, T).compliance
+    batched = platform_stiffness(at).compliance
     worst = 0.0
     for i in range(0, count, 40):
         C = without_clearance(postures[i]).compliance
@@ -69,9 +70,9 @@ def main() -> None:
     print(f"largest difference from one posture at a time: {worst:.1e}")
 
 
-def everything(robot, transforms) -> None:  # type: ignore[no-untyped-def]
+def everything(postures: Posture) -> None:
     """All that a sweep keeps of a stiffness."""
-    found = platform_stiffnesses(robot, transforms)
+    found: Any = platform_stiffness(postures)
     _ = found.eigen_stiffnesses, found.eigen_screws
     for axis in np.eye(6):
         found.shares(axis)

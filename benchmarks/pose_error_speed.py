@@ -10,8 +10,9 @@ rotation and the translation each,
 
 milliseconds of processor time a point to bounds 1e-6 rad or 1e-6 m apart by SCIP, by
 Gurobi, by a plain branch and bound written here (secants above the squares, Clarabel at
-every node), by ``bound_pose_error`` and by ``bound_pose_errors``; and the ratios to the
-last.  Then the whole study: four quantities, both readings, 1113 points, in seconds.
+every node), by ``bound_pose_error`` one at a time, and of all points at once; and the
+ratios to the last.  Then the whole study: four quantities, both readings, 1113 points,
+in seconds.
 
 The other solvers are given the problem as our reduction leaves it, unit cones and poses
 in mrad or mm, so their times hold no modelling but their own objects.  Ours hold all
@@ -35,11 +36,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-from assembly.kinematics.posture import Posture, place_many
+from assembly.kinematics.posture import Posture, place_many, together
 from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.pose_error import ReachableSet, reachable_screws
-from assembly.linear.zone import zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Robot
 from assembly.solvers import conic
 from assembly.solvers.cones import cone_sizes
@@ -221,8 +222,7 @@ def sampled(
 def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) -> None:
     """The table of one case."""
     own = [replace(p, robot=robot) for p in postures]
-    T = np.array([p.transforms for p in own])
-    off = np.array([p.mismatch for p in own])
+    at = together(own)
     few = np.arange(0, len(own), len(own) // SAMPLE)[:SAMPLE]
     reaches = [reachable_screws(solve_assembly(own[i]), reading) for i in few]
     for half, (name, part) in enumerate(PARTS.items()):
@@ -230,10 +230,10 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
             ("tolerance_rotation", "tolerance_translation"),
             np.where(np.arange(2) == half, TOLERANCE, np.inf), strict=True,
         ))  # fmt: skip
-        bound_pose_errors(robot, T[:2], reading, mismatch=off[:2], **tolerance)
+        bound_pose_error(solve_assembly(at[:2]), reading, **tolerance)
         begin = time.process_time()
-        batch = bound_pose_errors(robot, T, reading, mismatch=off, **tolerance)
-        batched = (time.process_time() - begin) / len(T) * 1e3
+        batch = bound_pose_error(solve_assembly(at), reading, **tolerance)
+        batched = (time.process_time() - begin) / len(own) * 1e3
         bound_pose_error(solve_assembly(own[few[0]]), reading, **tolerance)
         begin = time.process_time()
         for i in few:
@@ -264,16 +264,12 @@ def print_study(robot: Robot, poses: NDArray) -> None:
     """The whole study: margin, energy, two pose errors; compliant rigid and free."""
     begin = time.process_time()
     postures = [p for p in place_many(robot, poses)[0] if p is not None]
-    T = np.array([p.transforms for p in postures])
-    off = np.array([p.mismatch for p in postures])
+    at = together(postures)
     placed = time.process_time()
-    energies = solve_assembly(postures)
-    zones = [zone_margins(robot, T, name, off) for name in ("rigid", "free")]
+    energies = solve_assembly(at)
+    zones = [zone_margin(at, name) for name in ("rigid", "free")]
     solved = time.process_time()
-    errors = [
-        bound_pose_errors(robot, T, name, mismatch=off, energies=energies)
-        for name in ("frozen", "free")
-    ]
+    errors = [bound_pose_error(energies, name) for name in ("frozen", "free")]
     done = time.process_time()
     widest = max(
         float(np.diff(getattr(one, f"{part}_error")).max())
@@ -282,7 +278,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
     slow = sum(int(one.one_by_one.sum()) for one in errors)
     slow += sum(int(np.sum(one.method == "reference")) for one in zones)
     print(
-        f"\nthe study, {len(T)} points: {done - begin:.2f} s (placing "
+        f"\nthe study, {len(at.transforms)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "
         f"{done - solved:.2f}); widest bracket {widest:.1e}, "
         f"{energies.certified.mean():.0%} of energies certified, {slow} by fallbacks"
@@ -296,8 +292,7 @@ def main() -> None:
     perfect = robot.with_errors(0 * robot.errors)
     print(f"{robot.name}, {len(postures)} points, one core")
     print_case("clearances only", perfect, postures, "frozen")
-    T = np.array([p.transforms for p in postures])
-    inside = zone_margins(robot, T, "free").margin <= 1.0
+    inside = zone_margin(postures, "free").margin <= 1.0
     zone = [p for p, assembles in zip(postures, inside, strict=True) if assembles]
     print_case(f"first draw, free, {len(zone)} points of the zone", robot, zone, "free")
     print_case("first draw, free, all points", robot, postures, "free")

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from validation.assumptions.platform_cost import solid_compliance
@@ -32,7 +31,7 @@ def methods(posture: Posture) -> dict[str, NDArray]:
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(0 * robot.errors)
     tight_posture = replace(posture, robot=tight)
-    many = platform_stiffnesses(robot, posture.transforms[None], posture.mismatch)
+    many = platform_stiffness([posture])
     moved = [solve_assembly(tight_posture, w).platform_screw for w in np.eye(6)]
     return {
         "virtual joints": without_clearance(posture).compliance,

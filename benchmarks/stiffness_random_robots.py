@@ -40,7 +40,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import Frame, Robot
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import BUILT_IN, load_robot
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_vector
@@ -286,8 +286,7 @@ def compare(robots: Iterable[tuple[str, list[Posture], NDArray]]) -> None:
     for name, postures, load in robots:
         for k, posture in enumerate(postures):
             case = f"{name}/{k}"
-            T = posture.transforms[None]
-            many = platform_stiffnesses(posture.robot, T, posture.mismatch)
+            many = platform_stiffness([posture])
             one = without_clearance(posture)
             rows = {"classical, (22)": by_least_energy(posture)}
             if not one.free.size:

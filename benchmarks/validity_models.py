@@ -12,7 +12,6 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.load import loads_on_frames, weights
 from assembly.linear.reference.energy import solve_with
 from assembly.linear.reference.zone import margin_with
-from assembly.linear.zone import Zone
 from assembly.model.clearance import Compliant
 from assembly.model.robot import BeamLink, Robot, beam_axis
 from validation.assumptions.bushes import bush_joints
@@ -42,7 +41,7 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
     return robot.with_links({**links})
 
 
-def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
+def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
     """Factor on all clearances at which a rigid manipulator on bushes just assembles.
 
     Args:
@@ -51,13 +50,13 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> Zone:
             ``assembly.linear.zone.zone_margin``.
 
     Returns:
-        The margin with a certified lower bound.
+        The margin; inf if no factor does.
 
     Raises:
         SolverFailed: the cone solver gave up.
     """
     joints = bush_joints(virtual_joints(posture.robot, compliant))
-    return Zone(*margin_with(linearise(posture), joints)[:2], "reference")
+    return margin_with(linearise(posture), joints)[0]
 
 
 def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:

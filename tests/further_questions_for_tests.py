@@ -146,7 +146,7 @@ def left_free(name: str, nudge: float) -> Any:
         solved = solve_assembly(posture, load)
         found[key] = nearest_pose(solved, (0.01, -0.02, 0.03))
         bound = bound_pose_error(solved, "free", offset=(0.0, 0.03, 0.0))
-        found[f"error {key}"] = [bound.rotation_error, bound.translation_error]
+        found[f"error {key}"] = [[*bound.rotation_error], [*bound.translation_error]]
     reachable = reachable_screws(solve_assembly(posture), "frozen")
     for part in ("rotation", "translation"):
         if not reachable.unbounded(0 if part == "rotation" else 3):

@@ -63,9 +63,14 @@ def of_any_kind(seed: int, nudge: float) -> Any:
             found["alone"]["solved"], reading, energy_budget=0.1, **CLOSE
         )
         found[reading] = {
-            "sizes": [some.rotation_error, some.translation_error],
+            "sizes": [[*some.rotation_error], [*some.translation_error]],
         }
-    return found | {r: zone_margin(posture, r) for r in ("rigid", "free")}
+    for reading in ("rigid", "free"):
+        zone = zone_margin(posture, reading)
+        found[reading] = {
+            "margin": zone.margin, "bound": zone.bound, "method": zone.method
+        }  # fmt: skip
+    return found
 
 
 def at_once(name: str, nudge: float) -> Any:

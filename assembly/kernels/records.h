@@ -29,8 +29,8 @@ struct Points {
     int64_t own_posture, own_errors, own_loads;
 };
 
-// assembly/linear/solutions.py's Solutions, one row a point; no `elastic` where nobody
-// asks.
+// Problem (22), one row a point: `out` of assembly/linear/lanes.py; no `elastic` where
+// nobody asks.
 struct Solutions {
     int64_t *outcome;
     double *energy, *bound, *without_clearance, *work, *platform_screw, *clearances,
@@ -51,12 +51,12 @@ struct Compliances {
     int64_t *status;
 };
 
-// Where the solution of (22) leaves the points, one row each: solutions.py's Centres.
+// Where the solution of (22) leaves the points, one row each; see lanes.py.
 struct Centres {
     const double *screws, *clearances, *motions;
 };
 
-// Loads and slack of the clearances, one row a point: solutions.py's ClearanceLoads.
+// Loads and slack of the clearances, one row a point; see lanes.py.
 struct ClearanceLoads {
     const Robot *robot;
     const double *multipliers, *clearances, *energy, *without_clearance;
@@ -69,7 +69,7 @@ struct Asked {
     const double *offset, *tolerance;  // (3,), (2,)
 };
 
-// solutions.py's Bounds, one row a point: those of rotation, then translation.
+// Bounds of (27), one row a point: those of rotation, then translation.
 struct Bounds {
     double *bounds[2], *screw[2];
     int64_t *supports, *outcome;

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from assembly.kernels.choice import kernels
 from assembly.linear.robot_structure import Structure
-from assembly.linear.solutions import Bounds, Centres, ClearanceLoads
 
+# outcomes of (21), (27) and K_C: proved, or left to the reference
+COMPILED, REFERENCE = range(2)
 _KEPT = 64  # robots that are known to C++
 _known: dict[int, tuple[Structure, Any]] = {}
 
@@ -56,8 +57,7 @@ def margins_side_by_side(
         errors: (k, n, 6) [rad, m].
         mismatch: [rad, m] nominal closure errors of the frames, as many.
         out: to fill: (k,) margins, their bounds, (k, nu) forces on the clearances that
-            prove these, sizes on all cones adding up to 1, and (k,) outcomes, SOLVED or
-            FALLBACK.
+            prove these, sizes on all cones adding up to 1, and (k,) outcomes.
 
     Raises:
         ValueError: as above.
@@ -66,28 +66,39 @@ def margins_side_by_side(
 
 
 def bounds_side_by_side(
-    structure: Structure, T: NDArray, mismatch: NDArray, centres: Centres,
-    loads: ClearanceLoads, asked: tuple[NDArray, NDArray], out: Bounds,
+    structure: Structure, T: NDArray, mismatch: NDArray, centres: tuple[NDArray, ...],
+    held: Structure, loads: tuple[NDArray, ...], asked: tuple[NDArray, NDArray],
+    out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Bounds of the largest pose errors of the points whose outcome is SOLVED.
+    """Bounds of the largest pose errors of the points whose outcome is COMPILED.
 
     Args:
         structure: the robot, without springs.
         T: (k, n, 4, 4) frames.
         mismatch: (k,) [rad, m] nominal closure error of the frames.
-        centres: the solution of (22).
-        loads: which of its clearances are held.
+        centres: the solution of (22): (k, 6) [rad, m] screws of the platform at its
+            origin, (k, nu) clearances in the cones of ``structure``, and (k, nq)
+            [rad, m] motions where they have a bound, else anything.
+        held: the robot of the solution of (22) that says which clearances are held.
+        loads: that solution: (k, 6 closures) multipliers of the scaled closures,
+            (k, nu) clearances in the cones of ``held``, (k,) [J] energies, and those
+            with every clearance at zero; and (cones,) the cone of ``held`` of each of
+            ``structure``.
         asked: (3,) [m] from the platform's origin to the point whose error is meant;
             (2,) [rad, m] asked of upper minus lower bounds.
-        out: arrays to fill; rows that are not solved become FALLBACK.
+        out: to fill: (k, 2) [rad] lower and upper bounds of the rotation and [m] of the
+            translation, (k, 6) [rad, m] screws that attain the lower of each, (k,)
+            support functions computed, and (k,) outcomes, where what is not solved
+            becomes REFERENCE.
 
     Raises:
         ValueError: as above.
     """
-    none, held = np.zeros((1, T.shape[1], 6)), _robot(loads.structure)
+    none = np.zeros((1, T.shape[1], 6))
     kernels.bound_all(
-        _robot(structure), T, none, mismatch, *centres, held, *loads[1:], *asked, *out
-    )
+        _robot(structure), T, none, mismatch, *centres, _robot(held), *loads, *asked,
+        *out,
+    )  # fmt: skip
 
 
 def compliances_side_by_side(
@@ -102,7 +113,7 @@ def compliances_side_by_side(
         mismatch: (k,) [rad, m] nominal closure error of the frames.
         springs: (k, 6, ny) [sqrt(2 J) per N m and N] to fill, translations and forces
             scaled by the reference length.
-        status: (k,) to fill: SOLVED, or why there is none.
+        status: (k,) to fill: COMPILED, or why there is none.
 
     Raises:
         ValueError: as above.

@@ -2,23 +2,16 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.linear.assembled import Assembly
 from assembly.linear.energy import with_free_own_axes
-from assembly.linear.lanes import bounds_side_by_side
+from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
 from assembly.linear.reference.pose_error import READINGS
 from assembly.linear.robot_structure import Structure, structure_of
-from assembly.linear.solutions import (
-    FALLBACK,
-    SOLVED,
-    Bounds,
-    Centres,
-    ClearanceLoads,
-)
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 from assembly.solvers.method import Method, check_method
@@ -50,68 +43,65 @@ class Asked:
         check_method(self.method)
 
 
-def compiled_bounds(
-    robot: Robot, transforms: NDArray, off: NDArray, errors: ArrayLike | None,
-    energies: Assembly, asked: Asked,
-) -> Bounds:  # fmt: skip
-    """Bounds of k points; NaN in the rows that are left to numpy.
+def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], NDArray]:
+    """Bounds of k points by the compiled search.
 
     Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base.
-        off: (k,) [rad, m] nominal closure error of the frames.
-        errors: (n, 6) or (k, n, 6) [rad, m]; the robot's if absent.
-        energies: of the same points.
+        assembly: of k points.
         asked: reading, widths and point.
 
     Returns:
-        The bounds and where they come from.
+        ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2) [m], lower and
+        upper; ``rotation_screw`` and ``translation_screw`` (k, 6) [rad, m] that attain
+        the lower; ``supports`` (k,) computed.  And (k,) bool, rows that are left to
+        numpy, or have no solution of (22); NaN there.
     """
-    T = np.require(transforms, dtype=float, requirements=["C", "W"])
-    count = len(T)
-    bounds = Bounds(
-        rotation=np.full((count, 2), np.nan),
-        translation=np.full((count, 2), np.nan),
-        rotation_screw=np.full((count, 6), np.nan),
-        translation_screw=np.full((count, 6), np.nan),
-        supports=np.zeros(count, np.int64),
-        outcome=np.full(count, SOLVED, np.int64),
-    )
-    left = (energies.status != "ok") | energies.loaded
-    left |= ~np.isfinite(energies.clearances).all(axis=1)
-    bounds.outcome[left] = FALLBACK
+    count, robot = len(assembly), assembly.posture.robot
+    rows = {
+        "rotation_error": np.full((count, 2), np.nan),
+        "translation_error": np.full((count, 2), np.nan),
+        "rotation_screw": np.full((count, 6), np.nan),
+        "translation_screw": np.full((count, 6), np.nan),
+        "supports": np.zeros(count, np.int64),
+    }
+    outcome = np.full(count, COMPILED, np.int64)
+    left = (assembly.status != "ok") | assembly.loaded
+    left[list(assembly.apart)] = True
+    left |= ~np.isfinite(assembly.clearances).all(axis=1)
+    outcome[left] = REFERENCE
     if asked.reading == "budget" or asked.method == "reference" or left.all():
-        bounds.outcome[:] = FALLBACK
-        return bounds
-    solution = energies
+        return rows, np.ones(count, dtype=bool)
+    solution = assembly
     if asked.reading == "free":
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
-        solution = with_free_own_axes(energies)
-        bounds.outcome[~np.isfinite(solution.clearances).all(axis=1)] = FALLBACK
+        solution = with_free_own_axes(assembly)
+        outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.reading)
-    loads = ClearanceLoads(
-        structure=places.loaded,
-        multipliers=np.require(solution.multipliers, requirements=["C", "W"]),
-        clearances=np.require(solution.clearances, requirements=["C", "W"]),
-        energy=solution.energy,
-        without_clearance=solution.energy_without_clearance,
-        cone_of=places.cone_of,
-    )
     motions = np.zeros((count, len(places.moving.free_bound)))
-    motions[:, places.bounded] = energies.motions[:, places.motions]
-    centres = Centres(
-        screws=energies.platform_screw.copy(),
-        clearances=np.ascontiguousarray(energies.clearances[:, places.columns]),
-        motions=motions,
+    motions[:, places.bounded] = assembly.motions[:, places.motions]
+    centres = (
+        assembly.platform_screw.copy(),
+        np.ascontiguousarray(assembly.clearances[:, places.columns]),
+        motions,
     )
-    tolerance = [asked.tolerance_rotation, asked.tolerance_translation]
-    given = (
-        places.moving, T, off, centres, loads,
-        (np.array(asked.offset, float), np.array(tolerance, float)),
+    loads = tuple(
+        np.require(array, requirements=["C", "W"])
+        for array in (
+            solution.multipliers, solution.clearances, solution.energy,
+            solution.energy_without_clearance, places.cone_of,
+        )
     )  # fmt: skip
-    bounds_side_by_side(*given, bounds)
-    return bounds
+    T = assembly.posture.transforms
+    T = T.copy() if T.ndim > 3 else np.repeat(T[None], count, axis=0)
+    tolerance = [asked.tolerance_rotation, asked.tolerance_translation]
+    bounds_side_by_side(
+        places.moving, T, np.full(count, assembly.posture.mismatch, dtype=float),
+        centres, places.loaded, loads,
+        (np.array(asked.offset, float), np.array(tolerance, float)),
+        (*rows.values(), outcome),
+    )  # fmt: skip
+    return rows, outcome != COMPILED
 
 
 class _Places(NamedTuple):

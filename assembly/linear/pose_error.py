@@ -25,93 +25,46 @@ one.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from functools import cached_property, partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import Assembly
 from assembly.linear.certificate import unproved
-from assembly.linear.energy import failure_status, solve_assembly
+from assembly.linear.energy import failure_status
 from assembly.linear.moving_clearances import Asked, compiled_bounds
 from assembly.linear.reference.energy import CannotAssemble
 from assembly.linear.reference.pose_error import reachable_screws
+from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
-from assembly.model.point_results import PointResults
-from assembly.model.robot import Robot
+from assembly.model.point_results import Numbers, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
-from forcefit.inputs.display import (
-    Figures,
-    bracket,
-    html_table,
-    short_repr,
-)
-
-
-@dataclass(frozen=True, eq=False)
-class PoseError:
-    """Certified bounds of the largest pose error, and screws that attain the lower.
-
-    Attributes:
-        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
-        rotation_error: [rad] (lower, upper) bounds.
-        translation_error: [m] (lower, upper) bounds.
-        rotation_screw: (6,) [rad, m] attains the lower bound of the rotation.
-        translation_screw: (6,) [rad, m] attains that of the translation.
-        cuts: support functions computed.
-        method: which searched: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
-        proof: says what of it is not proved.
-    """
-
-    reading: str
-    rotation_error: tuple[float, float]
-    translation_error: tuple[float, float]
-    rotation_screw: NDArray
-    translation_screw: NDArray
-    cuts: int
-    method: Method
-    proof: Callable[[], str] = str
-
-    __repr__, _repr_html_, summary = short_repr, html_table, short_repr
-
-    @cached_property
-    def unproved(self) -> str:
-        """What of the solution of (22), or of the width asked, is not proved.
-
-        Empty if nothing; only found out when asked, it takes longer than the bounds.
-        """
-        return self.proof()
-
-    def _figures(self) -> Figures:
-        """What ``forcefit assembly error`` prints of it."""
-        figures = {
-            "reading": self.reading,
-            "rotation": bracket(self.rotation_error, "mrad"),
-            "translation": bracket(self.translation_error, "mm"),
-        }
-        return figures | ({"not proved": self.unproved} if self.unproved else {})
+from forcefit.inputs.display import Figures, bracket, short_repr
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseErrors(PointResults):
-    """Certified bounds of the largest pose errors of k points; ``[i]`` is one of them.
+class PoseError(PointResults):
+    """Certified bounds of the largest pose error; of many points, with a leading axis.
 
     Attributes:
         reading: ``"frozen"``, ``"free"`` or ``"budget"``.
-        rotation_error: (k, 2) [rad] lower and upper; NaN without a solution of (22).
-        translation_error: (k, 2) [m] likewise.
-        rotation_screw: (k, 6) [rad, m] attains the lower bound of the rotation.
-        translation_screw: (k, 6) [rad, m] attains that of the translation.
-        supports: (k,) support functions computed.
-        method: (k,) which searched: ``"compiled"`` or ``"reference"``.
-        one_by_one: (k,) bool, whose set of screws was set up in numpy.
-        status: (k,) ``"ok"``, ``"cannot assemble"``, or ``"solver failed"`` where
-            there is no solution or its certificate falls short.
-        reason: (k,) message where the status is not ok.
+        rotation_error: (..., 2) [rad] lower and upper bound; of many NaN without a
+            solution of (22).
+        translation_error: (..., 2) [m] likewise.
+        rotation_screw: (..., 6) [rad, m] attains the lower bound of the rotation.
+        translation_screw: (..., 6) [rad, m] attains that of the translation.
+        supports: (...) support functions computed.
+        method: (...) which searched: ``"compiled"``, or ``"reference"``, numpy and
+            Clarabel.
+        one_by_one: (...) bool, whose set of screws was set up in numpy.
+        status: (...) ``"ok"``; of many also ``"cannot assemble"``, or ``"solver
+            failed"`` where there is no solution or its certificate falls short.
+        reason: (...) message where the status is not ok.
+        proof: says what of one point is not proved.
     """
 
     reading: str
@@ -119,11 +72,12 @@ class PoseErrors(PointResults):
     translation_error: NDArray
     rotation_screw: NDArray
     translation_screw: NDArray
-    supports: NDArray
-    method: NDArray
-    one_by_one: NDArray
-    status: NDArray
-    reason: NDArray
+    supports: Numbers
+    method: Any
+    one_by_one: Any
+    status: Any = "ok"
+    reason: Any = ""
+    proof: Callable[[], str] = str
 
     VARIABLES: ClassVar = {
         "rotation_error": "rotation_error",
@@ -135,18 +89,45 @@ class PoseErrors(PointResults):
         "reason": "reason",
     }
 
-    def __getitem__(self, i: int) -> PoseError:
-        """Point i; NaN, and why, where there is no solution."""
-        return PoseError(
-            reading=self.reading,
-            rotation_error=tuple(self.rotation_error[i].tolist()),
-            translation_error=tuple(self.translation_error[i].tolist()),
-            rotation_screw=self.rotation_screw[i],
-            translation_screw=self.translation_screw[i],
-            cuts=int(self.supports[i]),
-            method=self.method[i],
-            proof=partial(str, self.reason[i]),
-        )
+    summary = short_repr
+
+    @property
+    def _first(self) -> Numbers:
+        return self.supports
+
+    def __getitem__(self, rows: Any) -> "PoseError":
+        """One point, NaN, and why, where there is no solution; or some of them."""
+        own = [field.name for field in fields(self)][1:-1]
+        values = {name: getattr(self, name)[rows] for name in own}
+        if np.ndim(values["supports"]) == 0:
+            values["supports"] = int(values["supports"])
+            values["one_by_one"] = bool(values["one_by_one"])
+        return PoseError(self.reading, **values)
+
+    @cached_property
+    def unproved(self) -> Any:
+        """(...) what of the solution of (22), or of the width asked, is not proved.
+
+        Empty if nothing; of one point only found out when asked, it takes longer than
+        the bounds.
+        """
+        return self.reason if self.of_many else self.reason or self.proof()
+
+    def _figures(self) -> Figures:
+        """What ``forcefit assembly error`` prints of it."""
+        figures = {"reading": self.reading}
+        rotation, translation = self.rotation_error, self.translation_error
+        if self.of_many:
+            known = self.status == "ok"
+            figures["points"] = f"{len(self)}, {np.count_nonzero(known)} bounded"
+            rotation, translation = (
+                one[known].max(axis=0, initial=0.0) for one in (rotation, translation)
+            )
+        figures["rotation"] = bracket(rotation, "mrad")
+        figures["translation"] = bracket(translation, "mm")
+        if not self.of_many and self.unproved:
+            figures["not proved"] = self.unproved
+        return figures
 
 
 def bound_pose_error(
@@ -161,37 +142,64 @@ def bound_pose_error(
     """Bracket the largest rotation and translation error of the platform.
 
     Args:
-        assembly: of least energy, without a load in reading ``budget``.
+        assembly: of least energy, one or many, without a load in reading ``budget``.
         reading: see the head of this module.
         energy_budget: eta of reading ``budget``.
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        offset: (3,) [m] from the platform's origin to the point whose error is meant,
+            base axes.
         method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone: tenths of
             a second.
 
     Returns:
         Bounds; wider than asked only if 400 supports did not suffice, which
         ``unproved`` then says; infinite where the platform can turn, or its point
-        move, without bound.
+        move, without bound.  Of many assemblies all of them, where a point without
+        bounds says so and raises nothing.
 
     Raises:
         ValueError: reading or method is unknown, or ``budget`` is asked under a load.
+        FreeMotion: a load drives a motion that nothing resists in this reading.
         SolverFailed: the cone solver gave up.
     """
     asked = Asked(
         reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
         method,
     )  # fmt: skip
-    posture = assembly.posture
-    if assembly.joints is structure_of(posture.robot)[0] and not assembly.frame_loads:
-        bounds = _pose_errors(
-            posture.robot, posture.transforms[None], np.array([posture.mismatch]),
-            posture.robot.errors[None], assembly.as_many, asked,
-        )  # fmt: skip
-        if not bounds.one_by_one[0]:
-            return replace(bounds[0], proof=partial(unproved, assembly))
+    if assembly.of_many:
+        return _bounds_of_many(assembly, asked)
+    joints, _ = structure_of(assembly.posture.robot)
+    if assembly.joints is joints and not assembly.frame_loads:
+        rows, left = compiled_bounds(assembly.as_many, asked)
+        if not left[0]:
+            own = {name: values[0] for name, values in rows.items()}
+            own["supports"] = int(own["supports"])
+            return PoseError(
+                reading, **own, method=method, one_by_one=False,
+                proof=partial(unproved, assembly),
+            )  # fmt: skip
     return _bounds_of_one(assembly, asked)
+
+
+def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
+    """Compiled bounds; one by one what that leaves of what has a solution."""
+    rows, left = compiled_bounds(assembly, asked)
+    status, reason = assembly.status.copy(), assembly.reason.copy()
+    left &= status == "ok"
+    for i in np.flatnonzero(left).tolist():
+        try:
+            one = _bounds_of_one(assembly[i], asked)
+        except (CannotAssemble, FreeMotion, SolverFailed) as error:
+            status[i], reason[i] = failure_status(error), str(error)
+            continue
+        for name, values in rows.items():
+            values[i] = getattr(one, name)
+        if one.unproved:
+            status[i], reason[i] = "solver failed", one.unproved
+    method = np.full(len(assembly), asked.method, dtype=object)
+    return PoseError(asked.reading, **rows, method=method, one_by_one=left,
+                     status=status, reason=reason)  # fmt: skip
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
@@ -215,12 +223,13 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
 
     return PoseError(
         reading=asked.reading,
-        rotation_error=rotation,
-        translation_error=translation,
+        rotation_error=np.array(rotation),
+        translation_error=np.array(translation),
         rotation_screw=rotation_screw,
         translation_screw=translation_screw,
-        cuts=supports + more,
+        supports=supports + more,
         method=asked.method,
+        one_by_one=True,
         proof=proof,
     )
 
@@ -236,92 +245,4 @@ def _too_wide(
     return (
         f"the bounds of the {part} are {high - low:.1e} {unit} apart, "
         f"expected {tolerance:.1e}"
-    )
-
-
-def bound_pose_errors(
-    robot: Robot,
-    transforms: ArrayLike,
-    reading: str = "frozen",
-    errors: ArrayLike | None = None,
-    mismatch: ArrayLike = 0.0,
-    energies: Assembly | None = None,
-    energy_budget: float = 0.05,
-    tolerance_rotation: float = 1e-6,
-    tolerance_translation: float = 1e-6,
-    offset: ArrayLike = (0.0, 0.0, 0.0),
-    method: Method = "compiled",
-) -> PoseErrors:
-    """Bracket the largest rotation and translation errors at many points.
-
-    Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base.
-        reading: ``"frozen"``, ``"free"`` or ``"budget"``, see
-            :mod:`assembly.linear.pose_error`.
-        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
-        energies: of :func:`assembly.linear.energy.minimise_energies` for the same
-            arguments, if known.
-        energy_budget: eta of reading ``budget``.
-        tolerance_rotation: [rad] asked of upper minus lower bound.
-        tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant.
-        method: as of :func:`bound_pose_error`.
-
-    Returns:
-        The bounds, in the order given.
-
-    Raises:
-        ValueError: reading or method is unknown, or a shape does not fit the robot.
-    """
-    asked = Asked(
-        reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
-        method,
-    )  # fmt: skip
-    T = np.asarray(transforms, dtype=float)
-    if energies is None:
-        unknown = np.full((len(T), len(robot.frames)), np.nan)
-        where = Posture(robot, unknown, T, mismatch)
-        energies = solve_assembly(where, errors=errors, method=method)
-    if len(energies) != len(T):
-        raise ValueError(
-            f"bound_pose_errors: energies of {len(energies)} points, expected "
-            f"{len(T)}, one for each of the transforms"
-        )
-    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    bounds = _pose_errors(robot, T, off, errors, energies, asked)
-    for i in np.flatnonzero(bounds.one_by_one).tolist():
-        try:
-            one = _bounds_of_one(energies[i], asked)
-        except (CannotAssemble, SolverFailed) as error:
-            bounds.status[i], bounds.reason[i] = failure_status(error), str(error)
-            continue
-        bounds.rotation_error[i] = one.rotation_error
-        bounds.translation_error[i] = one.translation_error
-        bounds.rotation_screw[i] = one.rotation_screw
-        bounds.translation_screw[i] = one.translation_screw
-        bounds.supports[i] = one.cuts
-        if one.unproved:
-            bounds.status[i], bounds.reason[i] = "solver failed", one.unproved
-    return bounds
-
-
-def _pose_errors(
-    robot: Robot, T: NDArray, off: NDArray, errors: ArrayLike | None,
-    energies: Assembly, asked: Asked,
-) -> PoseErrors:  # fmt: skip
-    """The compiled bounds, with what is known of (22)."""
-    bounds = compiled_bounds(robot, T, off, errors, energies, asked)
-    return PoseErrors(
-        reading=asked.reading,
-        rotation_error=bounds.rotation,
-        translation_error=bounds.translation,
-        rotation_screw=bounds.rotation_screw,
-        translation_screw=bounds.translation_screw,
-        supports=bounds.supports,
-        method=np.full(len(T), asked.method, dtype=object),
-        one_by_one=(bounds.outcome > 0) & (energies.status == "ok"),
-        status=energies.status.copy(),
-        reason=energies.reason.copy(),
     )

@@ -9,21 +9,19 @@ literal reading); ``"free"`` lets them turn about their own axis, as a hinge doe
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar, overload
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.kinematics.posture import Posture
+from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import checked_size
-from assembly.linear.lanes import margins_side_by_side
+from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
 from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import FALLBACK, SOLVED
 from assembly.model.clearance import Compliant
-from assembly.model.point_results import PointResults
-from assembly.model.robot import Robot
+from assembly.model.point_results import Numbers, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
@@ -34,110 +32,76 @@ MARGIN_READINGS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
 
-@dataclass(frozen=True)
-class Zone:
-    """Solution of problem (21) at one posture.
-
-    Attributes:
-        margin: factor on the clearances at which it just assembles; None if no factor
-            does.
-        bound: certified lower bound of the margin; None if it is None.
-        method: which gave it: ``"compiled"``, or ``"reference"``, numpy and Clarabel.
-    """
-
-    margin: float | None
-    bound: float | None
-    method: Method
-
-    @property
-    def assemblable(self) -> bool:
-        """Whether it assembles rigidly."""
-        return self.margin is not None and self.margin <= ASSEMBLABLE
-
-    @property
-    def unproved(self) -> str:
-        """What the certificate leaves unproved, empty if nothing."""
-        if self.margin is None or self.bound is None:
-            return ""
-        allowed = MARGIN_GAP * self.margin + _GAP_ABSOLUTE
-        # written so that NaN is not proved
-        if self.margin - self.bound <= allowed:
-            return ""
-        return f"the margin {self.margin:.9g} is proved down to {self.bound:.9g} only"
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Margins(PointResults):
-    """Zone margins of k points, each with its certificate; ``[i]`` is one of them.
+class Zone(PointResults):
+    """Solution of problem (21) at one posture; or at many, with a leading axis.
 
     Attributes:
-        margin: (k,) factor on all clearances at which it just assembles; inf where
-            none does, NaN where the solver failed.
-        bound: (k,) certified lower bound, within 1e-8 of the margin where the compiled
-            method solved.
-        method: (k,) which gave it: ``"compiled"`` or ``"reference"``.
-        forces: (k, nu) on the clearances, in units that each cone's size works: what
+        margin: (...) factor on the clearances at which it just assembles; inf where no
+            factor does, NaN where the solver failed, which of one posture is raised.
+        bound: (...) certified lower bound of it, within 1e-8 of the margin where the
+            compiled method solved.
+        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
+            Clarabel.
+        forces: (..., nu) on the clearances, in units that each cone's size works: what
             proves the bound, sizes of all cones adding up to 1; zero where no clearance
             is needed, NaN where the reference solved.
-        reason: (k,) message where the solver failed, or what of the margin is not
-            proved; else empty.
+        reason: (...) message where the solver failed; else empty.
     """
 
-    margin: NDArray
-    bound: NDArray
-    method: NDArray
+    margin: Numbers
+    bound: Numbers
+    method: Any
     forces: NDArray
-    reason: NDArray
+    reason: Any
 
     VARIABLES: ClassVar = {
         "margin": "margin",
         "margin_bound": "bound",
         "method": "method",
-        "reason": "reason",
+        "reason": "unproved",
     }
 
-    def __getitem__(self, i: int) -> Zone:
-        """Point i; raises where the solver failed."""
-        margin, bound = float(self.margin[i]), float(self.bound[i])
-        if np.isnan(margin):
-            raise SolverFailed("least factor on the clearances", self.reason[i])
-        method = self.method[i]
-        none = np.isinf(margin)
-        return Zone(None, None, method) if none else Zone(margin, bound, method)
+    def __getitem__(self, rows: Any) -> "Zone":
+        """One point, which raises where the solver failed; or some of them."""
+        margin, bound = self.margin[rows], self.bound[rows]
+        if np.ndim(margin) == 0:
+            if np.isnan(margin):
+                raise SolverFailed("least factor on the clearances", self.reason[rows])
+            margin, bound = float(margin), float(bound)
+        forces, reason = self.forces[rows], self.reason[rows]
+        return Zone(margin, bound, self.method[rows], forces, reason)
 
+    @property
+    def assemblable(self) -> Any:
+        """(...) whether it assembles rigidly."""
+        return self.margin <= ASSEMBLABLE
 
-@overload
-def zone_margin(
-    posture: Posture, compliant: Compliant = "rigid", errors: None = None,
-    method: Method = "compiled",
-) -> Zone: ...  # fmt: skip
-
-
-@overload
-def zone_margin(
-    posture: Sequence[Posture], compliant: Compliant = "rigid",
-    errors: ArrayLike | None = None, method: Method = "compiled",
-) -> Margins: ...  # fmt: skip
-
-
-@overload
-def zone_margin(
-    posture: Posture, compliant: Compliant = "rigid", *, errors: ArrayLike,
-    method: Method = "compiled",
-) -> Margins: ...  # fmt: skip
+    @property
+    def unproved(self) -> Any:
+        """(...) why there is no margin, or what of it is not proved; else empty."""
+        margin, bound = np.atleast_1d(self.margin, self.bound)
+        with np.errstate(invalid="ignore"):
+            # written so that NaN is not proved
+            proved = margin - bound <= MARGIN_GAP * margin + _GAP_ABSOLUTE
+        text = np.array(self.reason, dtype=object, ndmin=1)
+        for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):
+            least = f"{bound[i]:.9g}"
+            text[i] = f"the margin {margin[i]:.9g} is proved down to {least} only"
+        return text if self.of_many else text[0]
 
 
 def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
     errors: ArrayLike | None = None, method: Method = "compiled",
-) -> Zone | Margins:  # fmt: skip
+) -> Zone:  # fmt: skip
     """Factor on all clearances at which a rigid manipulator just assembles.
 
     Args:
         posture: where the robot stands; or many postures of one robot.
         compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness, see above.
-        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's, a set for
-            each of k postures, or k sets at one.
+        errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
+            a set for each of k postures, or k sets at one.
         method: ``"compiled"``, and the reference where that does not prove its answer;
             or ``"reference"``, numpy and Clarabel alone.  The answer's ``method`` says
             which gave it.
@@ -147,90 +111,58 @@ def zone_margin(
 
     Raises:
         ValueError: ``compliant`` or ``method`` is something else.
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver gave up at the only point.
     """
     check_method(method)
-    if isinstance(posture, Posture) and errors is None:
+    if not isinstance(posture, Posture):
+        posture = together(posture)
+    if errors is None:
         checked_size(posture.robot)
-        T, off = posture.transforms[None], np.array([posture.mismatch])
-        margin, bound, _, left = _compiled(
-            posture.robot, T, compliant, off, None, method
-        )
-        if left[0]:
-            return Zone(*least_margin(posture, compliant), "reference")
-        return Zone(float(margin[0]), float(bound[0]), "compiled")
-    postures = [posture] if isinstance(posture, Posture) else list(posture)
-    sets = None if errors is None else np.asarray(errors, dtype=float)
-    return zone_margins(
-        postures[0].robot, np.array([p.transforms for p in postures]), compliant,
-        np.array([p.mismatch for p in postures]), sets, method,
-    )  # fmt: skip
-
-
-def zone_margins(
-    robot: Robot, transforms: ArrayLike, compliant: Compliant = "rigid",
-    mismatch: ArrayLike = 0.0, errors: ArrayLike | None = None,
-    method: Method = "compiled",
-) -> Margins:  # fmt: skip
-    """Margins of problem (21) at many postures, or for many errors.
-
-    Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base; one row serves k sets of
-            errors.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
-        mismatch: one number or one for each row of ``transforms`` [rad, m], nominal
-            closure error of the frames.
-        errors: (n, 6) or (k, n, 6) [rad, m] geometric errors; the robot's if absent.
-        method: as of :func:`zone_margin`.
-
-    Returns:
-        The margins, in the order given.
-
-    Raises:
-        ValueError: ``compliant`` or ``method`` is something else.
-    """
-    check_method(method)
-    T = np.asarray(transforms, dtype=float)
-    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    own = None if errors is None else np.asarray(errors, dtype=float)
-    margin, bound, forces, left = _compiled(robot, T, compliant, off, own, method)
+        own = posture.robot.errors
+    else:
+        own = np.asarray(errors, dtype=float)
+    margin, bound, forces, left = _compiled(posture, compliant, own, method)
+    if posture.transforms.ndim == 3 and own.ndim == 2:
+        if not left[0]:
+            return Zone(float(margin[0]), float(bound[0]), "compiled", forces[0], "")
+        found = least_margin(_erring(posture, own, 0), compliant)
+        return Zone(*found, "reference", np.full(len(forces[0]), np.nan), "")
     forces[left] = np.nan
     reason = np.full(len(margin), "", dtype=object)
     for i in np.flatnonzero(left).tolist():
-        erring = robot
-        if own is not None:
-            erring = robot.with_errors(own if own.ndim == 2 else own[i])
-        unknown, where = np.full(len(robot.frames), np.nan), i if len(T) > 1 else 0
-        posture = Posture(erring, unknown, T[where], float(off[where]))
         margin[i] = bound[i] = np.nan
         try:
-            zone = Zone(*least_margin(posture, compliant), "reference")
+            margin[i], bound[i] = least_margin(_erring(posture, own, i), compliant)
         except SolverFailed as error:
             reason[i] = str(error)
-            continue
-        reason[i] = zone.unproved
-        margin[i] = np.inf if zone.margin is None else zone.margin
-        bound[i] = np.inf if zone.bound is None else zone.bound
     gave = np.where(left, "reference", "compiled").astype(object)
-    return Margins(margin, bound, gave, forces, reason)
+    return Zone(margin, bound, gave, forces, reason)
+
+
+def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
+    """Point i, with its own errors."""
+    if posture.transforms.ndim > 3:
+        posture = posture[i if len(posture.transforms) > 1 else 0]
+    own = errors if errors.ndim == 2 else errors[i]
+    if own is posture.robot.errors:
+        return posture
+    return replace(posture, robot=posture.robot.with_errors(own))
 
 
 def _compiled(
-    robot: Robot, T: NDArray, compliant: Compliant, mismatch: NDArray,
-    errors: NDArray | None, method: Method,
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:  # fmt: skip
+    posture: Posture, compliant: Compliant, own: NDArray, method: Method
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Margins, their bounds and forces, and whether each is left to the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
-    own = robot.errors if errors is None else errors
-    joints, structure = structure_of(robot, compliant)
+    joints, structure = structure_of(posture.robot, compliant)
+    T = posture.transforms if posture.transforms.ndim > 3 else posture.transforms[None]
     count = len(own) if len(T) == 1 and own.ndim == 3 else len(T)
     forces = np.zeros((count, joints.cones.shape[1]))
     margin, bound = np.full((2, count), np.nan)
-    outcome = np.full(count, FALLBACK)
+    outcome = np.full(count, REFERENCE)
     if method == "reference":
-        return margin, bound, forces, outcome > SOLVED
+        return margin, bound, forces, outcome != COMPILED
     if not own.any():  # no clearance is needed
         return *np.zeros((2, count)), forces, np.zeros(count, dtype=bool)
     if joints.scaled.all():
@@ -238,7 +170,7 @@ def _compiled(
         points = (
             np.require(T, requirements=["C", "W"]),
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),
-            mismatch,
+            np.full(len(T), posture.mismatch, dtype=float),
         )
         margins_side_by_side(structure, *points, (margin, bound, forces, outcome))
-    return margin, bound, forces, outcome > SOLVED
+    return margin, bound, forces, outcome != COMPILED

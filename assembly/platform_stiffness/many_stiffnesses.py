@@ -1,6 +1,7 @@
-"""The classical stiffness of the platform at many postures at once, with its shares."""
+"""The stiffness of the platform at many postures at once, with its shares."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,47 +9,90 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
-from assembly.linear.lanes import compliances_side_by_side
+from assembly.linear.lanes import COMPILED, compliances_side_by_side
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import SOLVED
-from assembly.model.robot import Robot
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
-from assembly.solvers.method import Method, check_method
+from assembly.solvers.method import Method
 from forcefit.inputs.display import html_table, short_repr
+from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size of a compliance's root that counts as rigid
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffnesses:
-    """The platform's stiffness at k postures, clearances held at zero.
+    """How stiff the platform is at k postures; ``[i]`` is one of them.
+
+    A class of its own, because postures differ in the numbers of modes, free motions
+    and rigid directions that :class:`PlatformStiffness` consists of.  Its arrays are
+    what has the same shape everywhere: compliances, eigen-stiffnesses, shares.
 
     Attributes:
-        robot: of n frames.
+        posture: where the robot stands nominally, k postures.
+        state: as of :class:`PlatformStiffness`.
+        point: (k, 3) [m] where screws and wrenches are read, base axes.
         length: [m] characteristic length.
         springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
-            unit wrenches at the platform's origin, base axes; NaN where a motion of
-            the platform is free.
+            unit wrenches at that point, base axes; NaN at those apart.
         parts: (ny,) whose springs they are.
-        method: (k,) which gave it: ``"compiled"``, or ``"reference"``, numpy.
-        singular: those where a motion of the platform is free, by their row.
+        method: (k,) which gave it, or the equilibrium it belongs to: ``"compiled"`` or
+            ``"reference"``.
+        apart: by their row those whose own modes are kept: where a motion of the
+            platform is free, and all in other states than ``"without clearance"``.
     """
 
-    robot: Robot
+    posture: Posture
+    state: str
+    point: NDArray
     length: float
     springs: NDArray
     parts: tuple[Part, ...]
     method: NDArray
-    singular: dict[int, PlatformStiffness]
+    apart: dict[int, PlatformStiffness]
 
     __repr__, _repr_html_ = short_repr, html_table
+
+    def __len__(self) -> int:
+        return len(self.springs)
+
+    def __getitem__(self, i: int) -> PlatformStiffness:
+        """Posture i; its modes are combinations of the springs, six at most."""
+        i = range(len(self))[i]
+        if i in self.apart:
+            return self.apart[i]
+        modes, root = np.linalg.qr(self.springs[i])
+        return PlatformStiffness(
+            posture=self.posture[i],
+            state=self.state,
+            point=self.point[i],
+            length=self.length,
+            root=root.T,
+            signs=np.ones(len(root)),
+            springs=modes,
+            parts=self.parts,
+            free=np.zeros((6, 0)),
+            method=self.method[i],
+        )
+
+    def at(self, points: NDArray) -> "Stiffnesses":
+        """The same platforms read at others of their points.
+
+        Args:
+            points: (k, 3) [m] base axes.
+
+        Returns:
+            Their stiffnesses there.
+        """
+        move = np.swapaxes(screw_map(self.point - points), 1, 2)
+        apart = {i: one.at(points[i]) for i, one in self.apart.items()}
+        return replace(self, point=points, springs=self.springs @ move, apart=apart)
 
     @cached_property
     def compliance(self) -> NDArray:
         """(k, 6, 6) [rad/(N m) .. m/N]; NaN in what a free motion touches."""
         compliance = np.swapaxes(self.springs, 1, 2) @ self.springs
-        for row, one in self.singular.items():
+        for row, one in self.apart.items():
             compliance[row] = one.compliance
         return compliance
 
@@ -78,7 +122,7 @@ class Stiffnesses:
         rigid = values <= _RANK * values[:, :1]
         stiffness = np.full(values.shape, np.inf)
         np.divide(1.0, values**2, out=stiffness, where=~rigid)
-        for row, one in self.singular.items():
+        for row, one in self.apart.items():
             stiffness[row] = one.eigen.values
         return stiffness
 
@@ -86,7 +130,7 @@ class Stiffnesses:
     def eigen_screws(self) -> NDArray:
         """(k, 6, 6) [rad, m] their screws in columns."""
         screws = self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
-        for row, one in self.singular.items():
+        for row, one in self.apart.items():
             screws[row] = one.eigen.screws
         return screws
 
@@ -112,7 +156,7 @@ class Stiffnesses:
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
-        for row, one in self.singular.items():
+        for row, one in self.apart.items():
             K[row] = one.along(direction)[0]
         return K
 
@@ -123,7 +167,8 @@ class Stiffnesses:
             direction: (6,) of a wrench.
 
         Returns:
-            By part; together they are 1, or NaN at postures with a free motion.
+            By part; together they are 1, or NaN at postures with a free motion.  Of
+            clearances and forces as of :meth:`PlatformStiffness.shares`.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
         with np.errstate(invalid="ignore"):
@@ -131,48 +176,72 @@ class Stiffnesses:
         shares: dict[Part, NDArray] = {}
         for k, part in enumerate(self.parts):
             shares[part] = shares.get(part, 0.0) + energies[:, k]
+        for row, one in self.apart.items():
+            for part, share in one.shares(direction).items():
+                own = shares.setdefault(part, np.zeros(len(self)))
+                own[row] = np.nan if one.free.size else share
         return shares
 
 
-def platform_stiffnesses(
-    robot: Robot, transforms: ArrayLike, mismatch: ArrayLike = 0.0,
-    method: Method = "compiled",
-) -> Stiffnesses:  # fmt: skip
-    """The classical K_C at many postures.
+def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
+    """The classical virtual-joint model, every clearance held at zero.
 
     Args:
-        robot: of n frames.
-        transforms: (k, n, 4, 4) frames seen from the base.
-        mismatch: (k,) or one number [rad, m], nominal closure error of the frames.
+        posture: k postures.
         method: ``"compiled"``, and the reference where that does not cover a posture;
             or ``"reference"``, numpy, one by one.
 
     Returns:
-        Compliances and shares in the order given.
-
-    Raises:
-        ValueError: no such method.
+        The stiffnesses at the platform's origin.
     """
-    check_method(method)
-    T = np.require(transforms, dtype=float, requirements=["C", "W"])
-    off = np.broadcast_to(np.asarray(mismatch, dtype=float), (len(T),)).copy()
-    joints, structure = structure_of(robot)
+    T = np.require(posture.transforms, requirements=["C", "W"])
+    joints, structure = structure_of(posture.robot)
     inner = np.zeros((len(T), 6, len(structure.springs)))
     status = np.zeros(len(T), dtype=np.int64)
     if method == "compiled":
+        off = np.full(len(T), posture.mismatch, dtype=float)
         compliances_side_by_side(structure, T, off, inner, status)
-    left = (status != SOLVED) | (method == "reference")
-    size = size_of(robot)
+    left = (status != COMPILED) | (method == "reference")
+    size = size_of(posture.robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
     # the kernel's forces act on translations in reference lengths
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
-    singular = {}
+    apart = {}
     for i in np.flatnonzero(left).tolist():
-        q = np.full(len(robot.frames), np.nan)
-        one = without_clearance(Posture(robot, q, T[i], float(off[i])))
+        one = without_clearance(posture[i])
         springs[i] = np.nan if one.free.size else one.springs @ one.root.T
         if one.free.size:
-            singular[i] = one
-    gave = np.where(left, "reference", "compiled").astype(object)
-    return Stiffnesses(robot, size, springs, tuple(owners(joints)), gave, singular)
+            apart[i] = one
+    return Stiffnesses(
+        posture=posture,
+        state="without clearance",
+        point=posture.platform[:, :3, 3],
+        length=size,
+        springs=springs,
+        parts=tuple(owners(joints)),
+        method=np.where(left, "reference", "compiled").astype(object),
+        apart=apart,
+    )
+
+
+def many_of_each(posture: Posture, each: Sequence[PlatformStiffness]) -> Stiffnesses:
+    """Stiffnesses that are known already.
+
+    Args:
+        posture: k postures.
+        each: k, of one state.
+
+    Returns:
+        All of them.
+    """
+    return Stiffnesses(
+        posture=posture,
+        state=each[0].state,
+        point=np.array([one.point for one in each]),
+        length=each[0].length,
+        springs=np.zeros((len(each), 0, 6)),
+        parts=(),
+        method=np.array([one.method for one in each], dtype=object),
+        apart=dict(enumerate(each)),
+    )

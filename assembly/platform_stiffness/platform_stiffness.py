@@ -1,11 +1,12 @@
 """The platform's stiffness matrix K_C at a posture, in the state that is asked for."""
 
-from typing import Literal, get_args
+from collections.abc import Sequence
+from typing import Literal, get_args, overload
 
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture
+from assembly.kinematics.posture import Posture, together
 from assembly.linear.energy import solve_assembly
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
@@ -13,25 +14,48 @@ from assembly.platform_stiffness.linear_tangent import (
     in_contact,
     without_clearance,
 )
+from assembly.platform_stiffness.many_stiffnesses import (
+    Stiffnesses,
+    many_of_each,
+    many_without_clearance,
+)
 from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
 from assembly.solvers.method import Method, check_method
 
 State = Literal["without clearance", "in contact", "exact"]
 
 
+@overload
 def platform_stiffness(
-    posture: Posture,
+    posture: Posture, state: State = "without clearance",
+    load: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
+    method: Method = "compiled",
+) -> PlatformStiffness: ...  # fmt: skip
+
+
+@overload
+def platform_stiffness(
+    posture: Sequence[Posture], state: State = "without clearance",
+    load: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
+    method: Method = "compiled",
+) -> Stiffnesses: ...  # fmt: skip
+
+
+def platform_stiffness(
+    posture: Posture | Sequence[Posture],
     state: State = "without clearance",
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
     side: Side = "holding",
     method: Method = "compiled",
-) -> PlatformStiffness:
+) -> PlatformStiffness | Stiffnesses:
     """How stiff the platform is: the tangent of its small motion under a small wrench.
 
     Args:
-        posture: where the robot stands.
+        posture: where the robot stands; or many postures of one robot.
         state: ``"without clearance"``, the classical virtual-joint model of the nominal
             robot, every clearance held at zero; ``"in contact"``, the tangent of
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
@@ -43,12 +67,16 @@ def platform_stiffness(
         at: (3,) [m] of the platform, in its axes: where screws and wrenches are read.
         side: of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
-        method: of :func:`assembly.linear.energy.solve_assembly`, state
-            ``"in contact"``; the classical model is numpy alone at one posture, and
-            the exact one has the method ``"compiled"`` only.
+        method: ``"compiled"``, and the reference where that does not do; or
+            ``"reference"``, numpy and Clarabel alone.  Of the state ``"in contact"`` it
+            is that of :func:`assembly.linear.energy.solve_assembly`.  The classical
+            model of one posture is numpy by either, which its ``method`` says; that of
+            many is compiled, side by side.  The exact state has no reference.
 
     Returns:
-        Stiffness, compliance, free motions and shares at that point, base axes.
+        Stiffness, compliance, free motions and shares at that point, base axes; of
+        many postures, also of a :class:`Posture` of many, all of them, a
+        :class:`~assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
@@ -63,16 +91,36 @@ def platform_stiffness(
         load = numbers_of("load", load, 6, "N m, N")
     if side not in get_args(Side):
         raise ValueError(f"platform_stiffness: no side {side!r}")
+    if state not in get_args(State):
+        raise ValueError(f"platform_stiffness: no state {state!r}")
+    if state == "exact" and method == "reference":
+        raise ValueError("platform_stiffness: state 'exact' has no reference")
+    if not isinstance(posture, Posture):
+        posture = together(posture)
+    if posture.transforms.ndim == 3:
+        return _of_one(posture, state, load, gravity, offset, side, method)
     if state == "without clearance":
-        tangent, platform = without_clearance(posture), posture.platform
+        many = many_without_clearance(posture, method)
+        turned = posture.platform[:, :3, :3] @ offset
+        return many.at(many.point + turned) if offset.any() else many
+    return many_of_each(posture, [
+        _of_one(posture[i], state, load, gravity, offset, side, method)
+        for i in range(len(posture.transforms))
+    ])  # fmt: skip
+
+
+def _of_one(
+    posture: Posture, state: State, load: ArrayLike | None, gravity: ArrayLike | None,
+    offset: NDArray, side: Side, method: Method,
+) -> PlatformStiffness:  # fmt: skip
+    """The same of one posture."""
+    platform = posture.platform
+    if state == "without clearance":
+        tangent = without_clearance(posture)
     elif state == "in contact":
         linear = solve_assembly(posture, load, gravity=gravity, method=method)
-        tangent, platform = in_contact(linear, side), posture.platform
-    elif state == "exact":
-        if method == "reference":
-            raise ValueError("platform_stiffness: state 'exact' has no reference")
+        tangent = in_contact(linear, side)
+    else:
         exact = solve_exact(posture, load, gravity=gravity)
         tangent, platform = exact_tangent(exact, side), exact.placement.platform
-    else:
-        raise ValueError(f"platform_stiffness: no state {state!r}")
     return tangent.at(platform[:3, 3] + platform[:3, :3] @ offset)

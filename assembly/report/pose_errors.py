@@ -101,7 +101,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
-        "cuts": bound.cuts,
+        "cuts": bound.supports,
         "method": bound.method,
     }
 
@@ -119,7 +119,7 @@ def _support(
     return _bracket((attained, support.height), support.screw)
 
 
-def _bracket(bounds: tuple[float, float], screw: NDArray) -> dict[str, Any]:
+def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
     """Two bounds, and the platform screw that attains the lower."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 

@@ -44,11 +44,16 @@ def zone_of(posture: Posture) -> dict[str, Any]:
         "status": "not proved" if unproved_parts else "ok",
         "assemblable": rigid.assemblable,
         "assemblable_free": free.assemblable,
-        "margin": rigid.margin,
-        "margin_free": free.margin,
-        "margin_bound": rigid.bound,
-        "margin_free_bound": free.bound,
+        "margin": _finite(rigid.margin),
+        "margin_free": _finite(free.margin),
+        "margin_bound": _finite(rigid.bound),
+        "margin_free_bound": _finite(free.bound),
     } | ({"reason": unproved_parts} if unproved_parts else {})
+
+
+def _finite(value: float) -> float | None:
+    """Null where no factor assembles."""
+    return None if np.isinf(value) else value
 
 
 def zone_text(zone: dict[str, Any]) -> str:

@@ -14,7 +14,7 @@ from assembly.kinematics.posture import Posture
 from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reference.reduction import complement, reduce_problem
-from assembly.linear.zone import zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.clearance import Compliant
 from assembly.solvers.cones import cone_starts
 from assembly.statistics.linear_response import checked_errors
@@ -81,10 +81,7 @@ class PostureMargins:
             open_ = left[no_factor] @ both[:, len(self.K) :].T
             errors = errors.copy()
             errors[no_factor] -= open_.reshape(-1, *errors.shape[1:])
-        found = zone_margins(
-            self.posture.robot, self.posture.transforms[None], self.compliant,
-            self.posture.mismatch, errors,
-        )  # fmt: skip
+        found = zone_margin(self.posture, self.compliant, errors)
         found.margin[no_factor] = found.bound[no_factor] = np.inf
         slopes = (found.forces @ self.B.T @ self.K).reshape(errors.shape)
         again = (found.method == "reference") & ~no_factor

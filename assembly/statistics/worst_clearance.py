@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.energy import Assembly, CannotAssemble
-from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.one_problem import farthest_points
@@ -74,15 +74,13 @@ def _without_load(
     draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
     """Bounds and screws of unloaded draws, compiled."""
-    posture = draws.posture
-    T = np.repeat(posture.transforms[None], len(draws), axis=0)
-    error_bounds = bound_pose_errors(
-        posture.robot, T, READING, draws.errors, posture.mismatch, draws,
+    found = bound_pose_error(
+        draws, READING,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
     )  # fmt: skip
     return (
-        np.stack([error_bounds.rotation_error, error_bounds.translation_error], axis=1),
-        np.stack([error_bounds.rotation_screw, error_bounds.translation_screw], axis=1),
+        np.stack([found.rotation_error, found.translation_error], axis=1),
+        np.stack([found.rotation_screw, found.translation_screw], axis=1),
     )
 
 

@@ -7,11 +7,13 @@ or pressed, or of the exact equilibrium, with its internal forces.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
+from assembly.kinematics.posture import Posture
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import CannotAssemble
 from assembly.linear.reference.reduction import FreeMotion
@@ -20,8 +22,8 @@ from assembly.measurement.predict import assemble_row
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import in_contact, owners
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.solvers.conic import SolverFailed
 
 STATES = {
@@ -61,19 +63,17 @@ def _name(part: Part) -> str:
 
 
 def classical_stiffnesses(
-    robot: Robot, T: NDArray, mismatch: NDArray
+    posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
     """The classical K_C of k postures, without errors and loads.
 
     Args:
-        robot: of n frames.
-        T: (k, n, 4, 4) frames seen from the base.
-        mismatch: (k,) [rad, m] nominal closure errors.
+        posture: k postures.
 
     Returns:
         Quantities by name, k rows each; and the free motions by row.
     """
-    many = platform_stiffnesses(robot, T, mismatch)
+    many: Any = platform_stiffness(posture)  # of many postures: Stiffnesses
     by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
     quantities = {
         "compliance": many.compliance,
@@ -82,7 +82,7 @@ def classical_stiffnesses(
         "stiffness_condition": many.condition,
         "share": np.array(by_axis).transpose(2, 1, 0),
     }
-    return quantities, {i: one.free_text for i, one in many.singular.items()}
+    return quantities, {i: one.free_text for i, one in many.apart.items()}
 
 
 def tangent_stiffnesses(

@@ -15,8 +15,8 @@ from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.pose_error import PoseErrors, bound_pose_errors
-from assembly.linear.zone import MARGIN_READINGS, zone_margins
+from assembly.linear.pose_error import PoseError, bound_pose_error
+from assembly.linear.zone import MARGIN_READINGS, zone_margin
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses, stressed_links
@@ -206,16 +206,15 @@ def _solve_reached(
     """Solve points whose posture exists; most failures become a status here."""
     out = solved.records
     conditions = point_conditions(question, robot, postures, errors)
-    T, mismatch = conditions.transforms, conditions.mismatch
     if robot.has_effects:
         robot, errors = conditions.robot, conditions.errors
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     there = replace(conditions.postures, robot=robot)
     failed: dict[int, str] = {}
     for key, compliant in MARGIN_READINGS.items():
-        zone = zone_margins(robot, T, compliant, mismatch, errors)
+        zone = zone_margin(there, compliant, errors)
         out[key][rows] = zone.margin
-        failed = {i: r for i, r in enumerate(zone.reason) if r} | failed
+        failed = {i: r for i, r in enumerate(zone.unproved) if r} | failed
     wrenches = at_tips = None
     if is_loaded(conditions):
         energies, wrenches, at_tips = assemble_rows(conditions)
@@ -238,14 +237,12 @@ def _solve_reached(
         own = np.zeros_like(wrenches) if at_tips is None else at_tips
         _record_wrenches(question, robot, wrenches[ok], own[ok], solved, rows_ok)
     if question.clearance_only:
-        _bound_clearance_only(perfect, T, mismatch, solved, rows)
+        _bound_clearance_only(replace(there, robot=perfect), solved, rows)
     if question.reading is not None and ok:
-        bounds = bound_pose_errors(
-            robot, T, question.reading, errors, mismatch, energies
-        )
+        bounds = bound_pose_error(energies, question.reading)
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
-        tangents = replace(conditions, robot=robot, mismatch=mismatch)
+        tangents = replace(conditions, robot=robot)
         _record_stiffness(question.stiffness, tangents, solved, rows)
     if question.frequencies:
         _record_frequencies(question.frequencies, robot, conditions, solved, rows)
@@ -296,9 +293,7 @@ def _record_stiffness(
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "classical":
         starts = [run.start for run in runs]
-        quantities, reasons = classical_stiffnesses(
-            conditions.robot, T[starts], conditions.mismatch[starts]
-        )
+        quantities, reasons = classical_stiffnesses(conditions.postures[starts])
     else:
         quantities, reasons = tangent_stiffnesses(conditions, state)
         runs = [slice(i, i + 1) for i in range(len(T))]
@@ -328,7 +323,7 @@ def _record_frequencies(
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
-def _record_bounds(bounds: PoseErrors, solved: SolvedPoints, rows: NDArray) -> None:
+def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
     """Bounds of (27) where (22) has a solution; their failure is the point's."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
@@ -341,12 +336,13 @@ def _record_bounds(bounds: PoseErrors, solved: SolvedPoints, rows: NDArray) -> N
 
 
 def _bound_clearance_only(
-    perfect: Robot, T: NDArray, mismatch: NDArray, solved: SolvedPoints, rows: NDArray
+    perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
     """Bounds of (27) by clearances alone, once for each posture."""
+    T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
-    bounds = bound_pose_errors(perfect, T[starts], "frozen", None, mismatch[starts])
+    bounds = bound_pose_error(solve_assembly(perfect[starts]), "frozen")
     for i, run in enumerate(runs):
         solved.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
         solved.records["translation_error_play"][rows[run]] = bounds.translation_error[

@@ -10,12 +10,12 @@ for objects of any size.
 """
 
 import html
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
@@ -124,7 +124,7 @@ def largest_row(sizes: ArrayLike) -> int:
     return int(np.argmax(values >= (1 - 1e-9) * np.nanmax(values)))
 
 
-def bracket(bounds: tuple[float, float], unit: str) -> str:
+def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
     """Two bounds [rad or m] in thousandths; the unit is mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"

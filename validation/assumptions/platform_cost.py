@@ -20,7 +20,7 @@ with the pose: they are meshed once, and a posture costs milliseconds.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from assembly.linear.closure import virtual_joints
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from stiffness.screws import screw_map
 from validation.assumptions.solid_links import SolidLink, solid_links
 
@@ -114,11 +114,9 @@ def _compliances(
 ) -> NDArray:
     """(k, 6, 6) by virtual joints, some links with another K_E."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
-    return platform_stiffnesses(
-        postures[0].robot.with_links({**links}),
-        np.array([posture.transforms for posture in postures]),
-        np.array([posture.mismatch for posture in postures]),
-    ).compliance
+    robot = postures[0].robot.with_links({**links})
+    linked = [replace(posture, robot=robot) for posture in postures]
+    return platform_stiffness(linked).compliance
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:

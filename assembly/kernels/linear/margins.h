@@ -9,7 +9,7 @@ namespace LANE_SPACE {
 
 // assembly/kinematics/ranks.py
 constexpr double INFEASIBLE = 1e-13;
-// assembly/linear/solutions.py
+// assembly/linear/lanes.py: COMPILED, REFERENCE
 enum { SOLVED, FALLBACK };
 
 // Solves blocks of points of one robot, one after the other.

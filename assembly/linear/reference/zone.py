@@ -22,9 +22,7 @@ from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import least_factor
 
 
-def least_margin(
-    posture: Posture, compliant: Compliant
-) -> tuple[float | None, float | None]:
+def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
     """Factor on all clearances at which a rigid manipulator just assembles, (21).
 
     Args:
@@ -32,7 +30,7 @@ def least_margin(
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
-        The margin and its certified lower bound; None for both if no factor does.
+        The margin and its certified lower bound; inf for both if no factor does.
 
     Raises:
         SolverFailed: the cone solver gave up.
@@ -41,7 +39,7 @@ def least_margin(
     margin, bound, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
     bounds = clearance_bounds(posture.robot, compliant)
     ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
-    if margin is not None and clearance_excess(screws, ranges) > 1e-9:
+    if clearance_excess(screws, ranges) > 1e-9:
         # the range of a passive joint's motion was left out, but it is active
         joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
@@ -50,7 +48,7 @@ def least_margin(
 
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
-) -> tuple[float | None, float | None, NDArray]:
+) -> tuple[float, float, NDArray]:
     """Margin with a given choice of what may move.
 
     Args:
@@ -58,7 +56,7 @@ def margin_with(
         joints: what may move, without springs.
 
     Returns:
-        The margin and its certified lower bound, None if no factor does; the (n, 6)
+        The margin and its certified lower bound, inf if no factor does; the (n, 6)
         [rad, m] clearance screws that attain it.
 
     Raises:
@@ -66,29 +64,28 @@ def margin_with(
     """
     reduced = reduce_problem(lin, joints)
     margin, bound, u = _margin_of(reduced)
-    if margin is None:
-        return None, None, np.zeros((len(joints.robot.frames), 6))
+    if margin == np.inf:
+        return np.inf, np.inf, np.zeros((len(joints.robot.frames), 6))
     motions = reduced.motions(u, np.zeros(joints.elastic.shape[1]))
     screws = joints.cones @ u + joints.free @ motions
     return margin, bound, screws.reshape(-1, 6)
 
 
-def _margin_of(
-    reduced: Reduction,
-) -> tuple[float | None, float | None, NDArray]:
+def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
     """Margin of a reduced problem, its bound, and the clearances that attain it."""
     joints = reduced.joints
     u = np.zeros(joints.cones.shape[1])
     if reduced.inconsistent:
-        return None, None, u
+        return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
     # orthonormal rows, whatever the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
-    bound = None if t is None else _margin_bound(B, right, joints, y)
-    return t, bound, u
+    if t is None:
+        return np.inf, np.inf, u
+    return t, _margin_bound(B, right, joints, y), u
 
 
 def _margin_bound(

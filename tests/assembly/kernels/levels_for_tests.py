@@ -4,16 +4,16 @@ Also what is to work where a wheel was installed and nothing else of the tests i
 """
 
 import hashlib
-from dataclasses import is_dataclass, replace
+from dataclasses import is_dataclass
 
 import numpy as np
 
 from assembly.kernels.choice import kernels
 from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_errors
-from assembly.linear.zone import zone_margins
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
 from assembly.statistics.clearance_positions import position_clearances
@@ -54,16 +54,15 @@ def answers():
             poses[:, 2:] = np.nan
         placed = [one for one in place_many(robot, poses)[0] if one is not None]
         yield f"{name} placed", [one.transforms for one in placed]
-        T = np.array([home.transforms] * k)
-        T[: len(placed)] = [one.transforms for one in placed]
+        at = together([*placed, *[home] * (k - len(placed))])
         errors = 1e-4 * rng.normal(size=(k, len(robot.frames), 6))
-        at = together([replace(home, transforms=own) for own in T])
         yield f"{name} (22)", solve_assembly(at, errors=errors)
         yield f"{name} (22) of one", solve_assembly(at[:1], errors=errors[:1])
         yield f"{name} loaded", solve_assembly([home] * k, LOAD, errors=errors)
-        yield f"{name} (21)", zone_margins(robot, T, "free", errors=errors)
-        yield f"{name} (27)", bound_pose_errors(robot, T[:3], errors=errors[:3])
-        yield f"{name} K_C", platform_stiffnesses(robot, T)
+        yield f"{name} (21)", zone_margin(at, "free", errors)
+        three = solve_assembly(at[:3], errors=errors[:3])
+        yield f"{name} (27)", bound_pose_error(three)
+        yield f"{name} K_C", platform_stiffness(at)
         one = linear_response(home)
         draws = one.solve(errors)
         yield f"{name} draws", draws

@@ -6,25 +6,23 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.zone import zone_margin, zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import coaxial_beams, random_robot, stack
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def assert_same_margin(batch, i, zone):
     """Both margins lie within 1e-8 of their common certified bounds."""
-    expected = np.inf if zone.margin is None else zone.margin
-    assert batch.margin[i] == pytest.approx(expected, rel=1e-7, abs=1e-10)
+    assert batch.margin[i] == pytest.approx(zone.margin, rel=1e-7, abs=1e-10)
     assert batch.bound[i] <= batch.margin[i] * (1 + 1e-11) + 1e-15
-    assert batch.bound[i] <= expected * (1 + 1e-9) + 1e-10
+    assert batch.bound[i] <= zone.margin * (1 + 1e-9) + 1e-10
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_equal_one_at_a_time(grid, compliant):
-    robot, postures = grid
-    T, mismatch = stack(postures)
-    batch = zone_margins(robot, T, compliant, mismatch)
+    _, postures = grid
+    batch = zone_margin(postures, compliant)
     assert set(batch.method) == {"compiled"}
     for i in range(0, len(postures), 5):
         assert_same_margin(
@@ -43,9 +41,9 @@ def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rn
     for home in homes:
         errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
         robot = home.robot.with_errors(errors)
-        batch = zone_margins(robot, home.transforms[None], compliant, home.mismatch)
-        compiled += batch.method[0] == "compiled"
         erring = replace(home, robot=robot)
+        batch = zone_margin([erring], compliant)
+        compiled += batch.method[0] == "compiled"
         one = zone_margin(erring, compliant, method="reference")
         assert_same_margin(batch, 0, one)
     assert compiled
@@ -55,7 +53,7 @@ def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
     """5e-5 m across, 2e-5 m of play: 2.5, by hand."""
     play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
-    batch = zone_margins(robot, home_posture(robot).transforms[None])
+    batch = zone_margin([home_posture(robot)])
     assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
     assert batch.method[0] == "compiled"
 
@@ -63,14 +61,13 @@ def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
 def test_a_margin_has_two_readings():
     robot = coaxial_beams(np.zeros(6))
     with pytest.raises(ValueError, match="compliant is 'soft'"):
-        zone_margins(robot, np.zeros((0, 6, 4, 4)), "soft")
+        zone_margin([home_posture(robot)], "soft")
 
 
 def test_margins_of_a_perfect_robot_are_zero_and_are_compiled(grid):
     robot, postures = grid
-    T, mismatch = stack(postures)
     for compliant in ("rigid", "free"):
-        margins = zone_margins(robot, T, compliant, mismatch, 0.0 * robot.errors)
+        margins = zone_margin(postures, compliant, 0.0 * robot.errors)
         assert set(margins.method) == {"compiled"}
-        assert np.array_equal(margins.margin, np.zeros(len(T)))
+        assert np.array_equal(margins.margin, np.zeros(len(postures)))
         assert np.array_equal(margins.bound, margins.margin)

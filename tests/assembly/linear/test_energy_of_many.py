@@ -69,7 +69,7 @@ def test_supports_of_both_halves_are_counted():
         both = [reachable.farthest(part, 1e-6, method)[2] for part in (0, 3)]
         assert min(both) > 0
         found = bound_pose_error(assembly, offset=at, method=method)
-        assert found.cuts == sum(both)
+        assert found.supports == sum(both)
 
 
 def test_bounds_are_too_wide_beyond_what_was_asked():

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, together
 from assembly.linear import energy, zone
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.zone import zone_margin, zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
     ROWS,
@@ -101,13 +101,13 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
     robot, postures = grid
-    T, off = stack(postures)
-    errors = robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
+    at, count = together(postures), len(postures)
+    errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
     errors[::5] = 0.0
-    whole = zone_margins(robot, T, compliant, off, errors)
-    orders = [rng.permutation(len(T)) for _ in range(4)] + [[i] for i in range(8)]
+    whole = zone_margin(at, compliant, errors)
+    orders = [rng.permutation(count) for _ in range(4)] + [[i] for i in range(8)]
     for order in orders:
-        other = zone_margins(robot, T[order], compliant, off[order], errors[order])
+        other = zone_margin(at[order], compliant, errors[order])
         for name in ("margin", "bound", "method"):
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
@@ -117,9 +117,8 @@ def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
 def test_margins_are_proportional_to_the_errors_and_proved(grid, compliant, kappa):
     """All clearances scale with the margin: no solver has a say in that."""
     robot, postures = grid
-    T, mismatch = stack(postures)
-    lanes = zone_margins(robot, T, compliant, mismatch, kappa * robot.errors)
-    whole = zone_margins(robot, T, compliant, mismatch)
+    lanes = zone_margin(postures, compliant, kappa * robot.errors)
+    whole = zone_margin(postures, compliant)
     assert set(lanes.method) == {"compiled"}
     assert lanes.margin == pytest.approx(kappa * whole.margin, rel=2e-8)
     assert np.all(lanes.bound >= lanes.margin * (1 - 1e-8))
@@ -132,17 +131,17 @@ def test_what_is_not_solved_side_by_side_the_reference_solves_with_its_own_error
 ):
     """The last point is left out; errors are each point's own, or those of all."""
     robot, postures = grid
-    T, mismatch = stack(postures[:count])
+    at = postures[:count]
     errors = robot.errors * np.arange(1.0, 1 + (count if each else 1))[:, None, None]
     errors = errors if each else errors[0]
-    expected = zone_margins(robot, T, "free", mismatch, errors)
+    expected = zone_margin(at, "free", errors)
 
     def all_but_the_last(structure, T, errors, mismatch, out):
         out[0][:-1], out[1][:-1] = expected.margin[:-1], expected.bound[:-1]
         out[3][:-1] = 0
 
     monkeypatch.setattr(zone, "margins_side_by_side", all_but_the_last)
-    found = zone_margins(robot, T, "free", mismatch, errors)
+    found = zone_margin(at, "free", errors)
     assert found.method.tolist() == ["compiled"] * (count - 1) + ["reference"]
     assert np.array_equal(found.margin[:-1], expected.margin[:-1])
     assert found.margin[-1] == pytest.approx(expected.margin[-1], rel=1e-7)
@@ -156,13 +155,13 @@ def test_two_lanes_have_the_bits_of_many(grid, kappa):
     T, mismatch = stack(postures)
     errors = kappa * robot.errors
     many = assemble_at(robot, T, errors, mismatch)
-    margins = zone_margins(robot, T, "rigid", mismatch, errors)
+    margins = zone_margin(postures, "rigid", errors)
     for i in range(0, len(T), 3):
         some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
         one = assemble_at(*some)
         for name in ROWS:
             assert np.array_equal(row(one, name)[0], row(many, name)[i]), name
-        one = zone_margins(robot, T[i : i + 1], "rigid", mismatch[i : i + 1], errors)
+        one = zone_margin(postures[i : i + 1], "rigid", errors)
         assert one.margin[0] == margins.margin[i]
         assert one.bound[0] == margins.bound[i]
 

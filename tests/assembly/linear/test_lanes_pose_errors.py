@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, together
 from assembly.linear import moving_clearances
 from assembly.linear.energy import solve_assembly
-from assembly.linear.lanes import bounds_side_by_side
-from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.robot_structure import structure_of
-from assembly.linear.solutions import FALLBACK, SOLVED, Bounds, Centres, ClearanceLoads
 from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import assemble_at, coaxial_beams, random_robot, stack
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 HALVES = ("rotation", "translation")
 READINGS = ("frozen", "free")
@@ -23,8 +22,8 @@ RADIUS = 1e-3
 @pytest.mark.parametrize("kappa", [0.0, 0.05, 0.2, 1.0])
 def test_brackets_of_the_papers_robot_are_as_narrow_as_asked(grid, reading, kappa):
     robot, postures = grid
-    T, off = stack(postures)
-    lanes = bound_pose_errors(robot, T, reading, kappa * robot.errors, off)
+    errors = np.array([kappa * robot.errors] * len(postures))
+    lanes = bound_pose_error(solve_assembly(postures, errors=errors), reading)
     assert not lanes.one_by_one.any()
     for half in HALVES:
         bounds = getattr(lanes, f"{half}_error")
@@ -48,15 +47,15 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
         if not own.any():
             own = 1e-4 * rng.normal(size=own.shape)
         errors = own * np.array([0.0, 0.1, 0.5, -1.0])[:, None, None]
-        robot, T = home.robot, np.repeat(home.transforms[None], 4, axis=0)
-        off = np.full(4, home.mismatch)
-        energies = assemble_at(robot, T, errors, off)
-        many = bound_pose_errors(robot, T, reading, errors, off, energies, offset=at)
+        assemblies = solve_assembly(home, errors=errors)
+        many = bound_pose_error(assemblies, reading, offset=at)
         solved = np.flatnonzero((many.status == "ok") & ~many.one_by_one)
         compiled += len(solved)
         for i in solved[:2].tolist():
             # of the same solution of (22)
-            one = bound_pose_error(energies[i], reading, offset=at, method="reference")
+            one = bound_pose_error(
+                assemblies[i], reading, offset=at, method="reference"
+            )
             for half in HALVES:
                 low, high = getattr(many, f"{half}_error")[i]
                 other = getattr(one, f"{half}_error")
@@ -69,13 +68,14 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
 def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, reading):
     """Other order, other neighbours, alone: not a bit changes."""
     robot, postures = grid
-    T, off = stack(postures)
-    errors = robot.errors * rng.uniform(0, 1, (len(T), 1, 1))
+    at, count = together(postures), len(postures)
+    errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
     errors[::7] = 0.0
-    whole = bound_pose_errors(robot, T, reading, errors, off)
-    orders = [rng.permutation(len(T)) for _ in range(3)] + [[i] for i in range(8)]
+    whole = bound_pose_error(solve_assembly(at, errors=errors), reading)
+    orders = [rng.permutation(count) for _ in range(3)] + [[i] for i in range(8)]
     for order in orders:
-        other = bound_pose_errors(robot, T[order], reading, errors[order], off[order])
+        some = solve_assembly(at[order], errors=errors[order])
+        other = bound_pose_error(some, reading)
         for name in ("rotation_error", "translation_error", "rotation_screw",
                      "translation_screw", "supports"):  # fmt: skip
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
@@ -84,17 +84,16 @@ def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, reading):
 def test_what_is_not_bounded_side_by_side_the_reference_bounds(grid, monkeypatch):
     """And only that."""
     robot, postures = grid
-    T, off = stack(postures[:4])
-    energies = assemble_at(robot, T, mismatch=off)
+    assemblies = solve_assembly(postures[:4])
 
-    def every_other(structure, T, mismatch, centres, loads, asked, out):
-        for name in HALVES:
-            getattr(out, name)[::2] = 7.0
-        out.supports[:] = 9
-        out.outcome[1::2] = FALLBACK
+    def every_other(structure, T, mismatch, centres, held, loads, asked, out):
+        rotation, translation, *_, supports, outcome = out
+        rotation[::2] = translation[::2] = 7.0
+        supports[:] = 9
+        outcome[1::2] = REFERENCE
 
     monkeypatch.setattr(moving_clearances, "bounds_side_by_side", every_other)
-    found = bound_pose_errors(robot, T, "free", None, off, energies)
+    found = bound_pose_error(assemblies, "free")
     assert found.one_by_one.tolist() == [False, True, False, True]
     assert np.all(found.rotation_error[::2] == 7.0)
     for i in (1, 3):
@@ -117,19 +116,17 @@ def judged(force, reach):
     row = np.zeros((1, 6 * len(robot.closures)))
     row[0, 3] = force * structure.size
     clearances = np.array([[0.6, 0.8]]) * reach
-    loads = ClearanceLoads(
-        structure, row, clearances, np.ones(1), np.ones(1), np.zeros(1, np.int64)
-    )
+    loads = row, clearances, np.ones(1), np.ones(1), np.zeros(1, np.int64)
     motions = np.zeros((1, len(moving.free_bound)))
-    centres = Centres(np.zeros((1, 6)), clearances, motions)
-    out = Bounds(
-        *np.zeros((2, 1, 2)), *np.zeros((2, 1, 6)), *np.zeros((2, 1), np.int64)
-    )
+    centres = np.zeros((1, 6)), clearances, motions
+    supports, outcome = np.zeros((2, 1), np.int64)
+    out = *np.zeros((2, 1, 2)), *np.zeros((2, 1, 6)), supports, outcome
     asked = np.zeros(3), np.full(2, 1e-9)
     T = posture.transforms[None].copy()
-    bounds_side_by_side(moving, T, np.zeros(1), centres, loads, asked, out)
-    decided = out.outcome[0] == SOLVED
-    return decided, decided and out.supports[0] == 0
+    off = np.zeros(1)
+    bounds_side_by_side(moving, T, off, centres, structure, loads, asked, out)
+    decided = outcome[0] == COMPILED
+    return decided, decided and supports[0] == 0
 
 
 @pytest.mark.parametrize(

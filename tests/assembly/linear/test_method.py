@@ -8,11 +8,10 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.linear import energy, zone
 from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_error, bound_pose_errors
+from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference import pose_error as reach
-from assembly.linear.zone import zone_margin, zone_margins
+from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import BUILT_IN
 from assembly.solvers import one_problem
@@ -43,7 +42,7 @@ def rigid():
 def questions(posture):
     """Every public solver, of one posture and of many."""
     T, off = stack([posture])
-    assembly = solve_assembly(posture)
+    assembly, many = solve_assembly(posture), solve_assembly([posture])
     return (
         lambda method: solve_assembly(posture, method=method),
         lambda method: solve_assembly([posture], method=method),
@@ -52,11 +51,10 @@ def questions(posture):
         lambda method: assemble_at(posture.robot, T, method=method),
         lambda method: zone_margin(posture, method=method),
         lambda method: zone_margin([posture], method=method),
-        lambda method: zone_margins(posture.robot, T, method=method),
         lambda method: bound_pose_error(assembly, method=method),
-        lambda method: bound_pose_errors(posture.robot, T, method=method),
+        lambda method: bound_pose_error(many, method=method),
         lambda method: platform_stiffness(posture, "in contact", method=method),
-        lambda method: platform_stiffnesses(posture.robot, T, method=method),
+        lambda method: platform_stiffness([posture], method=method),
     )
 
 
@@ -80,7 +78,6 @@ def test_the_reference_calls_nothing_compiled(monkeypatch):
         raise AssertionError("a compiled function was called")
 
     posture = beams()
-    robot, (T, off) = posture.robot, stack([posture])
     for module, names in (
         (energy, ["assemble_side_by_side"]),
         (zone, ["margins_side_by_side"]),
@@ -94,7 +91,8 @@ def test_the_reference_calls_nothing_compiled(monkeypatch):
     for reading in reach.READINGS:
         bounds = bound_pose_error(found, reading, method="reference")
         assert 0.0 < np.diff(bounds.translation_error) <= 1e-6
-    many = bound_pose_errors(robot, T, mismatch=off, method="reference")
+    many = solve_assembly([posture], method="reference")
+    many = bound_pose_error(many, method="reference")
     assert many[0].translation_error[0] > 0.0
 
 

@@ -84,7 +84,7 @@ def test_a_platform_that_moves_freely_has_no_bound():
         "door", "tip", (Frame("hinge", joint="revolute"), Frame("tip", "hinge"))
     )
     found = bounds(robot)
-    assert found.rotation_error == (np.inf, np.inf)
+    assert np.isinf(found.rotation_error).all()
     limited = Robot("door", "tip", (
         Frame("hinge", joint="revolute", clearance=Clearance(spin=0.01)),
         Frame("tip", "hinge", [0.5, 0, 0]),
@@ -114,14 +114,14 @@ def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
     hub = Frame("hub", joint="revolute", clearance=play)
     robot = Robot("spindle", "tool", (hub, Frame("tool", "hub", [0, 0, 0.4])))
     found = bounds(robot)
-    assert found.rotation_error == (np.inf, np.inf)
+    assert np.isinf(found.rotation_error).all()
     assert_holds(found.translation_error, np.hypot(1e-5 + 0.4 * 3e-4, 2e-5), 1e-9)
     found = bounds(robot, offset=[0, 1e-3, 0])
-    assert found.translation_error == (np.inf, np.inf)
+    assert np.isinf(found.translation_error).all()
     slide = replace(hub, joint="prismatic", clearance=Clearance(tilt=3e-4))
     found = bounds(replace(robot, frames=(slide, robot.frames[1])))
     assert_holds(found.rotation_error, 3e-4, 1e-9)
-    assert found.translation_error == (np.inf, np.inf)
+    assert np.isinf(found.translation_error).all()
 
 
 def hinged_frame(spin):

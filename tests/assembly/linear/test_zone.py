@@ -44,7 +44,7 @@ def test_margin_of_one_joint_is_gap_over_play(gap, margin):
 def test_no_factor_helps_where_there_is_no_play():
     robot = coaxial_beams(np.array([0, 0, 0, 0, 0, 1e-5]), clearance=Clearance(tilt=1))
     zone = zone_margin(home_posture(robot))
-    assert (zone.margin, zone.bound, zone.assemblable) == (None, None, False)
+    assert (zone.margin, zone.bound, zone.assemblable) == (np.inf, np.inf, False)
 
 
 def test_passive_joints_take_up_what_they_can_for_nothing():
@@ -54,7 +54,7 @@ def test_passive_joints_take_up_what_they_can_for_nothing():
     robot = planar_four_bar(errors=errors)
     assert zone_margin(home_posture(robot)).margin == 0.0
     errors[2, 5] = 1e-4
-    assert zone_margin(home_posture(robot.with_errors(errors))).margin is None
+    assert zone_margin(home_posture(robot.with_errors(errors))).margin == np.inf
 
 
 def test_range_of_a_passive_joint_does_not_scale_with_the_margin():
@@ -72,7 +72,7 @@ def test_range_of_a_passive_joint_does_not_scale_with_the_margin():
     assert zone_margin(home_posture(robot)).margin == pytest.approx(0.0, abs=1e-12)
     tight = replace(frames[1], clearance=None)
     robot = replace(robot, frames=(frames[0], tight, *frames[2:]))
-    assert zone_margin(home_posture(robot)).margin is None
+    assert zone_margin(home_posture(robot)).margin == np.inf
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
@@ -115,10 +115,10 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
         try:
             expected = margin_as_printed(posture, compliant)
         except RuntimeError:  # cvxpy gave up, as it does on some without an answer
-            assert zone.margin is None
+            assert zone.margin == np.inf
             continue
         if expected is None:
-            assert zone.margin is None
+            assert zone.margin == np.inf
         else:
             assert zone.margin == pytest.approx(expected, rel=1e-6, abs=1e-7)
             assert zone.bound <= zone.margin * (1 + 1e-9) + 1e-12
@@ -136,14 +136,39 @@ def test_many_errors_or_postures_have_their_own_margins():
     assert zone_margin(at, errors=sets).margin == pytest.approx(expected)
     assert zone_margin([at], errors=sets).margin == pytest.approx(expected)
     assert zone_margin([at] * 3, errors=sets).margin == pytest.approx(expected)
+    assert zone_margin(at, errors=sets[1]).margin == pytest.approx(expected[1])
+    assert zone_margin([at], errors=sets[1]).margin == pytest.approx(expected[[1]])
     erring = home_posture(robot.with_errors(sets[1]))
     assert zone_margin([erring]).margin == pytest.approx(expected[[1]])
     assert zone_margin([erring] * 2).margin == pytest.approx(expected[[1, 1]])
 
 
+def test_points_are_taken_out_of_many_and_one_has_no_length():
+    """Gap over play at one point; the sizes of the forces on its cones add up to 1."""
+    sets = np.zeros((3, 6, 6))
+    sets[:, 2, 5] = [1e-5, 4e-5, -3e-5]
+    at = home_posture(coaxial_beams(np.zeros(6), clearance=PLAY))
+    zones = zone_margin(at, errors=sets)
+    assert len(zones) == 3
+    assert zones.assemblable.tolist() == [True, False, False]
+    assert zones[1:].margin == pytest.approx([4.0, 3.0])
+    assert zones[zones.assemblable].margin == pytest.approx([1.0])
+    one = zones[-1]
+    assert one.margin == pytest.approx(3.0)
+    assert (one.method, one.unproved) == ("compiled", "")
+    assert one.assemblable is False
+    assert np.abs(one.forces).sum() == pytest.approx(1.0)
+    with pytest.raises(IndexError):
+        zones[3]
+    with pytest.raises(TypeError, match="Zone of one point has no length"):
+        len(one)
+
+
 def test_a_margin_that_does_not_exist_needs_no_proof():
-    assert not Zone(None, None, "reference").unproved
-    assert not Zone(None, None, "reference").assemblable
-    assert not Zone(2.0, None, "reference").unproved  # what nothing was proved of
-    assert not Zone(2.0, 2.0, "reference").unproved
-    assert Zone(2.0, 1.99, "reference").unproved
+    margin, bound = np.array([[np.inf] * 2, [2.0] * 2, [2.0, 1.99], [2.0, np.nan]]).T
+    none = np.full((4, 1), np.nan)
+    zones = Zone(margin, bound, np.full(4, "reference"), none, np.full(4, ""))
+    assert zones.assemblable.tolist() == [False] * 4
+    assert [bool(text) for text in zones.unproved] == [False, False, True, True]
+    assert [bool(zone.unproved) for zone in zones] == [False, False, True, True]
+    assert zones[2].unproved == "the margin 2 is proved down to 1.99 only"

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many
-from assembly.model.robot import Frame, MatrixLink, Robot
+from assembly.kinematics.posture import home_posture, place_many, together
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.linear_tangent import without_clearance
-from assembly.platform_stiffness.many_stiffnesses import platform_stiffnesses
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import BUILT_IN, load_robot
-from tests.robots_for_tests import random_robot
+from assembly.solvers.method import METHODS
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 UNIT = np.eye(6)
+LOAD = [0.0, 0, 0, 10, 0, -50]
 
 
 def assert_same(many, row, one):
@@ -18,7 +20,7 @@ def assert_same(many, row, one):
     C = one.compliance
     if one.free.size:
         np.testing.assert_array_equal(many.compliance[row], C)
-        assert many.singular[row].free_text == one.free_text
+        assert many.apart[row].free_text == one.free_text
         return
     size = np.sqrt(np.diag(C)) + 1e-300
     np.testing.assert_allclose(
@@ -39,7 +41,7 @@ def assert_same(many, row, one):
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_at_home_it_is_that_of_one_posture(name):
     posture = home_posture(load_robot(name))
-    many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    many = platform_stiffness([posture])
     assert set(many.method) == {"compiled"}
     assert_same(many, 0, without_clearance(posture))
 
@@ -49,15 +51,12 @@ def test_a_posture_does_not_depend_on_its_neighbours(rng):
     robot = load_robot("irsbot2")
     poses = np.full((19, 6), np.nan)
     poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 19), -0.45
-    T = np.array([p.transforms for p in place_many(robot, poses)[0]])
-    together = platform_stiffnesses(robot, T).compliance
-    order = rng.permutation(len(T))
-    shuffled = platform_stiffnesses(robot, T[order]).compliance
-    assert np.array_equal(shuffled, together[order])
+    at = together(place_many(robot, poses)[0])
+    whole = platform_stiffness(at).compliance
+    order = rng.permutation(19)
+    assert np.array_equal(platform_stiffness(at[order]).compliance, whole[order])
     for i in (0, 7, 18):
-        assert np.array_equal(
-            platform_stiffnesses(robot, T[i : i + 1]).compliance[0], together[i]
-        )
+        assert np.array_equal(platform_stiffness([at[i]]).compliance[0], whole[i])
 
 
 def test_over_a_workspace_it_is_that_of_each_posture():
@@ -65,7 +64,7 @@ def test_over_a_workspace_it_is_that_of_each_posture():
     poses = np.full((6, 6), np.nan)
     poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 6), -0.45
     postures, _ = place_many(robot, poses)
-    many = platform_stiffnesses(robot, np.array([p.transforms for p in postures]))
+    many = platform_stiffness(postures)
     for row, posture in enumerate(postures):
         assert_same(many, row, without_clearance(posture))
 
@@ -75,9 +74,7 @@ def test_of_random_robots_it_is_the_same(seed):
     """Some have free motions, some rigid directions; ranks are told alike."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
-    many = platform_stiffnesses(
-        posture.robot, posture.transforms[None], posture.mismatch
-    )
+    many = platform_stiffness([posture])
     assert_same(many, 0, without_clearance(posture))
 
 
@@ -87,13 +84,13 @@ def test_a_free_motion_has_no_number():
         Frame("tip", "slide"),
     )
     posture = home_posture(Robot("slider", "tip", frames))
-    many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    many = platform_stiffness([posture])
     free = np.isnan(many.compliance[0])
     assert free[5].all()
     np.testing.assert_allclose(many.compliance[0, :5, :5], np.eye(5))
     np.testing.assert_allclose(many.eigen_stiffnesses[0], [0, 1, 1, 1, 1, 1])
     assert [many.along(axis)[0] for axis in UNIT] == [1, 1, 1, 1, 1, 0]
-    assert many.singular[0].free_text == (
+    assert many.apart[0].free_text == (
         "nothing resists the platform's motion [0 0 0 0 0 1] [rad, m]"
     )
 
@@ -107,7 +104,65 @@ def test_stiffness_of_what_gives_way_along_x_alone_is_infinite_across_it():
         Frame("tip", "slide", rotation=[0, -np.pi / 2, 0]),
     )  # fmt: skip
     posture = home_posture(Robot("slide", "tip", frames))
-    many = platform_stiffnesses(posture.robot, posture.transforms[None])
+    many = platform_stiffness([posture])
     along = np.array([many.along(axis)[0] for axis in UNIT])
     assert along[3] == pytest.approx(1e5, rel=1e-9)
     assert np.isinf(np.delete(along, 3)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_of_many_read_anywhere_is_that_of_its_posture(method):
+    """Compliance, stiffness and shares by modes of its own."""
+    robot = load_robot("irsbot2")
+    poses = np.full((3, 6), np.nan)
+    poses[:, 0], poses[:, 2] = [-0.2, 0.0, 0.25], -0.45
+    postures, _ = place_many(robot, poses)
+    tip = [0.1, -0.05, 0.2]
+    many = platform_stiffness(postures, at=tip, method=method)
+    assert many.method.tolist() == [method] * len(many) == [method] * 3
+    for one, posture in zip(many, postures, strict=False):
+        expected = platform_stiffness(posture, at=tip)
+        np.testing.assert_allclose(one.point, expected.point, rtol=1e-14)
+        for name in ("compliance", "stiffness"):
+            other = getattr(expected, name)
+            size = np.sqrt(np.diag(other))
+            off = (getattr(one, name) - other) / np.outer(size, size)
+            assert np.abs(off).max() < 1e-8, name
+        for axis in UNIT:
+            assert one.along(axis) == pytest.approx(expected.along(axis), rel=1e-6)
+            own = one.shares(axis)
+            for part, share in expected.shares(axis).items():
+                assert own[part] == pytest.approx(share, abs=1e-8)
+
+
+def test_one_of_many_with_a_free_motion_names_it():
+    """A slide that nothing holds, of a link of unit stiffness."""
+    frames = (
+        Frame("slide", joint="prismatic", link=MatrixLink(UNIT)),
+        Frame("tip", "slide"),
+    )
+    posture = home_posture(Robot("slider", "tip", frames))
+    many = platform_stiffness([posture] * 2, at=[0.0, 0.0, 2.0])
+    np.testing.assert_array_equal(many[-1].free.ravel(), UNIT[5])
+    # 2 m above the turn about x, which shifts by 2 m / rad along -y
+    assert many.along(UNIT[4]) == pytest.approx([1 / 5] * 2)
+    with pytest.raises(IndexError):
+        many[2]
+
+
+@pytest.mark.parametrize("state", ["in contact", "exact"])
+def test_a_tangent_of_many_postures_is_that_of_each(state):
+    """To the last bit, whatever is asked of all."""
+    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    gap = np.array([0, 0, 0, 1e-4, 0, 0])
+    posture = home_posture(coaxial_beams(gap, clearance=play))
+    many = platform_stiffness([posture] * 2, state, LOAD, at=[0, 0.1, 0])
+    one = platform_stiffness(posture, state, LOAD, at=[0, 0.1, 0])
+    for own in many:
+        assert (own.state, own.method) == (state, one.method)
+        np.testing.assert_array_equal(own.compliance, one.compliance)
+    np.testing.assert_array_equal(many.compliance, [one.compliance] * 2)
+    np.testing.assert_array_equal(many.eigen_stiffnesses, [one.eigen.values] * 2)
+    np.testing.assert_array_equal(many.along(UNIT[3]), [one.along(UNIT[3])[0]] * 2)
+    shares = {part: share.tolist() for part, share in many.shares(UNIT[3]).items()}
+    assert shares == {part: [s] * 2 for part, s in one.shares(UNIT[3]).items()}

@@ -6,11 +6,11 @@ import pytest
 from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.pose_error import bound_pose_errors
-from assembly.linear.zone import zone_margins
+from assembly.linear.pose_error import bound_pose_error
+from assembly.linear.zone import zone_margin
 from assembly.sweeps.quantities import Question, variables
 from stiffness.screws import SCREW, WRENCH
-from tests.robots_for_tests import NUMBERS, assemble_at, irsbot2_with
+from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +21,9 @@ def answer():
 
 @pytest.fixture(scope="module")
 def batches(answer):
-    at = answer.posture.transforms[None].repeat(3, axis=0)
-    robot = answer.posture.robot
-    return (assemble_at(robot, at), zone_margins(robot, at),
-            bound_pose_errors(robot, at))  # fmt: skip
+    at = [answer.posture] * 3
+    many = solve_assembly(at)
+    return many, zone_margin(at), bound_pose_error(many)
 
 
 def test_an_assembly_is_a_data_set_over_frames(answer):

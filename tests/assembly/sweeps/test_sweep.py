@@ -159,15 +159,15 @@ def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
     """The solver gives up on one reading of one point: its neighbour is not touched."""
     from assembly.sweeps import points
 
-    solve = points.zone_margins
+    solve = points.zone_margin
 
-    def spoilt(robot, frames, reading, off, errors):
-        found = solve(robot, frames, reading, off, errors)
+    def spoilt(postures, reading, errors):
+        found = solve(postures, reading, errors)
         if reading == "free":
             found.margin[0], found.reason[0] = np.nan, "zone margin: gave up"
         return found
 
-    monkeypatch.setattr(points, "zone_margins", spoilt)
+    monkeypatch.setattr(points, "zone_margin", spoilt)
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = sweep_poses(robot, {"tx": np.array([0.0, 0.1]), "tz": np.array([-0.4])})
     assert data.status.values.ravel().tolist() == ["solver failed", "ok"]
