@@ -46,6 +46,9 @@ class Assemblies(PointResults[Assembly]):
         clearance_excess: (k,) [-] by how much the worst clearance leaves its cone.
         clearances: (k, nu) in units of the cones of :attr:`joints`; NaN where the
             bound of a passive joint's own motion is active.
+        bounded: (k, nu) likewise with the bounds of all passive joints' own motion as
+            cones too, where one of them is active or holds the platform; else NaN. No
+            columns where there are no such bounds.
         motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         outcome: (k,) index into :data:`OUTCOMES`.
@@ -66,6 +69,7 @@ class Assemblies(PointResults[Assembly]):
     closure_residual: NDArray
     clearance_excess: NDArray
     clearances: NDArray
+    bounded: NDArray
     motions: NDArray
     multipliers: NDArray
     outcome: NDArray
@@ -135,6 +139,7 @@ def assemblies_of(assembly: Assembly) -> Assemblies:
         closure_residual=unknown,
         clearance_excess=unknown,
         clearances=assembly.clearances[None],
+        bounded=np.zeros((1, 0)),
         motions=assembly.motions[None],
         multipliers=assembly.multipliers[None],
         outcome=np.zeros(1, dtype=int),
@@ -172,6 +177,7 @@ def solve_each(robot: Robot, count: int, one: Callable[[int], Assembly]) -> Asse
         closure_residual=unknown(),
         clearance_excess=unknown(),
         clearances=unknown(joints.cones.shape[1]),
+        bounded=unknown(0),
         motions=unknown(joints.free.shape[1]),
         multipliers=unknown(6 * len(robot.closures)),
         outcome=np.full(count, OUTCOMES.index("one by one")),
@@ -221,6 +227,8 @@ def solve_again(energies: Assemblies, i: int) -> None:
     a.clearance_excess[i] = assembly.clearance_excess()
     if assembly.clearances.shape == a.clearances[i].shape:
         a.clearances[i], a.motions[i] = assembly.clearances, assembly.motions
+    elif assembly.clearances.shape == a.bounded[i].shape:
+        a.bounded[i] = assembly.clearances
     a.bound[i] = assembly.energy - assembly.duality_gap()
     a.multipliers[i] = assembly.multipliers
     open_ = unproved(assembly)

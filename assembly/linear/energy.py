@@ -37,6 +37,7 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.linear.solutions import Solutions
+from assembly.linear.within_bounds import bounds_matter, solve_within_bounds
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
@@ -148,19 +149,23 @@ def _solve_one(
 
 
 def _compiled_assembly(
-    posture: Posture, load: ArrayLike | None, frame_loads: FrameLoads | None
-) -> Assembly | None:
+    posture: Posture, load: ArrayLike | None, frame_loads: FrameLoads | None,
+    bounded_motion: bool = False,
+) -> Assembly | None:  # fmt: skip
     """One posture; None where it is left to the reference."""
     robot = posture.robot
     rounding = _rounding_of(robot)
-    joints, _ = structure_of(robot)
+    joints, structure = structure_of(robot, "elastic", bounded_motion)
     # a copy: the address of an array that may be written is found three times as fast
     T = np.array(posture.transforms, ndmin=4)
     out = _solve_compiled(
         robot, T, robot.errors[None],
         np.array([posture.mismatch]), "elastic", len(joints.links),
         None if frame_loads is None else frame_loads.rows(1),
+        bounded_motion=bounded_motion,
     )  # fmt: skip
+    if bounds_matter(structure, out.outcome)[0]:
+        return _compiled_assembly(posture, load, frame_loads, True)
     if out.outcome[0] >= COMPILED:
         return None
     residual = out.residual + rounding
@@ -205,9 +210,10 @@ def _any_load(loads: NDArray | None, count: int) -> NDArray:
 def _solve_compiled(
     robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
     springs: int, loads: NDArray | None, method: Method = "compiled",
+    bounded_motion: bool = False,
 ) -> Solutions:  # fmt: skip
     """Rows of k points, and of the deformations of so many springs."""
-    joints, structure = structure_of(robot, compliant)
+    joints, structure = structure_of(robot, compliant, bounded_motion)
     count = len(errors) if len(T) == 1 else len(T)
     out = Solutions(
         outcome=np.zeros(count, dtype=np.int64),
@@ -351,6 +357,16 @@ def _minimise_all(
     """All points compiled, unless asked otherwise; one by one what that leaves."""
     joints, structure = structure_of(robot, compliant)
     out = _solve_compiled(robot, T, errors, off, compliant, 0, loads, method)
+    bounded = solve_within_bounds(
+        structure, (T, errors, off, loads), out,
+        lambda T, errors, off, loads: _solve_compiled(
+            robot, T, errors, off, compliant, 0, loads, bounded_motion=True
+        ),
+    )  # fmt: skip
+    excess = excess_of(out.clearances, structure.starts)
+    if bounded.size:
+        cones = structure_of(robot, compliant, True)[1].starts
+        excess = np.fmax(excess, excess_of(bounded, cones))
     count = len(out.outcome)
     energies = Assemblies(
         energy=out.energy,
@@ -359,8 +375,9 @@ def _minimise_all(
         work=out.work,
         platform_screw=out.platform_screw,
         closure_residual=out.residual,
-        clearance_excess=excess_of(out.clearances, structure.starts),
+        clearance_excess=excess,
         clearances=out.clearances,
+        bounded=bounded,
         motions=out.motions,
         multipliers=out.multipliers,
         outcome=out.outcome,

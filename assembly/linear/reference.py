@@ -1,8 +1,8 @@
 """The reference, in numpy and Clarabel: problems (21), (22) and (27) at one posture.
 
-Slow, and for everything: loads, rigid closures, ranks in doubt, bounds of passive
-joints that are active.  The method ``"reference"`` is this, and so is the answer where
-the compiled method does not cover a problem or falls short of its proof.
+Slow, and for everything: rigid closures and ranks in doubt too.  The method
+``"reference"`` is this, and so is the answer where the compiled method does not cover a
+problem or falls short of its proof.
 
 =========  ==========================================  ===============================
 paper      what                                        where

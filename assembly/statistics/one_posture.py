@@ -17,7 +17,7 @@ from assembly.linear.closure import (
     linearise,
     virtual_joints,
 )
-from assembly.linear.energy import Assemblies, Assembly, solve_assembly
+from assembly.linear.energy import Assembly, solve_assembly
 from assembly.linear.load import FrameLoads, loads_with_weight
 from assembly.linear.reduction import (
     FreeMotion,
@@ -141,20 +141,11 @@ class OnePosture:
         )
         clearances = found.clearances
         if clearances.shape[1] < self.starts[-1]:  # bounds of motions are cones here
-            clearances = self._with_bounds(found)
+            clearances = found.bounded
         return Draws(
             errors, found.energy, found.bound, clearances, found.multipliers,
             found.platform_screw, found.outcome >= COMPILED,
         )  # fmt: skip
-
-    def _with_bounds(self, found: Assemblies) -> NDArray:
-        """(k, nu) clearances and bounded motions, NaN without a solution."""
-        clearances = np.full((len(found), self.starts[-1]), np.nan)
-        for i in np.flatnonzero(np.isfinite(found.energy)).tolist():
-            own = found[i].clearances
-            if len(own) == self.starts[-1]:
-                clearances[i] = own
-        return clearances
 
     def wrenches(self, multipliers: NDArray) -> NDArray:
         """(k, n, 6) [N m, N] of every link's spring, at its frame in its axes."""

@@ -14,7 +14,7 @@ from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.robot_structure import structure_of
 from assembly.linear.zone import zone_margin, zone_margins
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import random_robot, stack
+from tests.robots_for_tests import random_robot, stack, with_bounded_motion
 
 ROWS = (
     "outcome", "energy", "bound", "energy_without_clearance", "platform_screw",
@@ -91,6 +91,60 @@ def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
         alone = minimise_energies(robot, T[[i]], errors[[i]], mismatch[[i]])
         for name in ROWS:
             assert np.array_equal(getattr(alone, name)[0], getattr(whole, name)[i])
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_where_bounds_of_motions_matter_no_answer_depends_on_its_neighbours(
+    seed, loaded
+):
+    """Draws of which some leave a bound: in other company, alone, by one posture."""
+    rng = np.random.default_rng(seed)
+    home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
+    load = rng.normal(size=6) if loaded else None
+    errors = 1e-4 * rng.normal(size=(11, len(home.robot.frames), 6))
+    errors[::3] *= 1e-2
+    whole = solve_assembly(home, load, errors=errors)
+    assert set(whole.method) == {"compiled"}
+    assert np.isfinite(whole.bounded).any()
+    order = rng.permutation(len(errors))
+    other = solve_assembly(home, load, errors=errors[order])
+    for name in (*ROWS, "bounded", "clearance_excess"):
+        found, again = getattr(whole, name)[order], getattr(other, name)
+        assert np.array_equal(found, again, equal_nan=True)
+    for i, one in enumerate(errors):
+        alone = solve_assembly(home, load, errors=one[None])
+        posture = replace(home, robot=home.robot.with_errors(one))
+        single = solve_assembly(posture, load)
+        for name in (*ROWS, "bounded", "clearance_excess"):
+            found, again = getattr(whole, name)[i], getattr(alone, name)[0]
+            assert np.array_equal(found, again, equal_nan=True)
+        assert single.method == "compiled"
+        held = np.isfinite(whole.bounded[i]).all()
+        assert held == bool(single.joints.bounded_motion)
+        clearances = (whole.bounded if held else whole.clearances)[i]
+        assert np.array_equal(single.clearances, clearances)
+        for name in ("energy", "platform_screw", "multipliers"):
+            assert np.array_equal(getattr(single, name), getattr(whole, name)[i])
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_within_bounds_of_motions_the_energy_is_the_references(loaded):
+    """Energies of each to 1e-8 of it and of the work: what both certificates allow."""
+    held = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
+        load = rng.normal(size=6) if loaded else None
+        one = solve_assembly(home, load)
+        reference = solve_assembly(home, load, method="reference")
+        held += bool(one.joints.bounded_motion)
+        assert bool(reference.joints.bounded_motion) <= bool(one.joints.bounded_motion)
+        allowed = 2e-8 * (reference.stored + abs(reference.work))
+        allowed += 2e-12 * reference.energy_without_clearance + 1e-25
+        assert abs(one.potential - reference.potential) <= allowed
+        assert one.clearance_excess() <= 1e-9
+    assert held >= 5
 
 
 def test_postures_of_different_rank_stand_side_by_side(rng):
