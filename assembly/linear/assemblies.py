@@ -48,7 +48,7 @@ class Assemblies(PointResults[Assembly]):
             bound of a passive joint's own motion is active.
         bounded: (k, nu) likewise with the bounds of all passive joints' own motion as
             cones too, where one of them is active or holds the platform; else NaN. No
-            columns where there are no such bounds.
+            columns where no point asks for it.
         motions: (k, nq) [rad, m] free motions of :attr:`joints`; NaN likewise.
         multipliers: (k, 6 closures) of the scaled closure rows.
         outcome: (k,) index into :data:`OUTCOMES`.

@@ -247,7 +247,7 @@ def _solve_compiled(
 
 def _fill(given: _Given, loads: NDArray | None) -> None:
     """Every point; zeros are the answer where nothing has to move."""
-    if loads is not None or np.count_nonzero(given[2]):
+    if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         assemble_side_by_side(*given, loads)
 
 

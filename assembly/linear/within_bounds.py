@@ -37,7 +37,7 @@ def solve_within_bounds(
     structure: Structure, points: Points, out: Solutions,
     solve: Callable[..., Solutions],
 ) -> NDArray:  # fmt: skip
-    """Solve again the points that bounds matter to, in place.
+    """Solve again, in place, the points to which bounds matter.
 
     Args:
         structure: without these bounds.
@@ -48,11 +48,13 @@ def solve_within_bounds(
 
     Returns:
         (k, nu) clearances with all bounds as cones, in units of these; NaN at points
-        that are not solved here.
+        that are not solved here.  No columns where all points were solved before.
     """
     limited = int(np.isfinite(structure.free_bound).sum())
     count, nu = out.clearances.shape
-    bounded = np.full((count, nu + limited if limited else 0), np.nan)
+    if not limited or np.all(out.outcome < COMPILED):
+        return np.zeros((count, 0))
+    bounded = np.full((count, nu + limited), np.nan)
     rows = np.flatnonzero(bounds_matter(structure, out.outcome))
     if not len(rows):
         return bounded

@@ -141,7 +141,7 @@ class OnePosture:
         )
         clearances = found.clearances
         if clearances.shape[1] < self.starts[-1]:  # bounds of motions are cones here
-            clearances = found.bounded
+            clearances = found.bounded.reshape(len(errors), self.starts[-1])
         return Draws(
             errors, found.energy, found.bound, clearances, found.multipliers,
             found.platform_screw, found.outcome >= COMPILED,
