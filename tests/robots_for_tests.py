@@ -47,6 +47,20 @@ def with_bodies(robot, rng, heaviest=5.0, off=0.2):
     ))  # fmt: skip
 
 
+def with_bounded_motion(robot, rng):
+    """Every passive joint's own motion within some 1e-4 rad or m."""
+
+    def bounded(frame):
+        if not frame.passive or frame.compliant:
+            return frame
+        key = "axial" if frame.joint == "prismatic" else "spin"
+        clearance = frame.clearance or Clearance()
+        bound = {key: float(rng.uniform(0.3, 3) * 1e-4)}
+        return replace(frame, clearance=replace(clearance, **bound))
+
+    return replace(robot, frames=tuple(bounded(f) for f in robot.frames))
+
+
 def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):
     """Two links on the x axis that meet end to end, ``gap`` [6] apart.
 

@@ -82,6 +82,8 @@ class Assembly(PointResults):
         reason: (...) message where the status is not ok.
         apart: of many those with other columns than ``joints``, or why there is none,
             by their row.
+        held: of many the rows of those that bounds of passive joints' own motion hold,
+            in order, and these with all such bounds as cones.
     """
 
     linearisation: Linearisation
@@ -98,6 +100,7 @@ class Assembly(PointResults):
     status: Any = "ok"
     reason: Any = ""
     apart: dict[int, "Assembly | Exception"] = field(default_factory=dict)
+    held: "tuple[NDArray, Assembly] | None" = None
 
     VARIABLES: ClassVar = {
         "energy": "energy",
@@ -149,6 +152,8 @@ class Assembly(PointResults):
             raise apart.with_traceback(None)
         if apart is not None:
             return apart
+        if self.held is not None and i in self.held[0]:
+            return self.held[1][int(np.searchsorted(self.held[0], i))]
         one = self._taken(i)
         lin, robot = one.linearisation, self.posture.robot
         # one robot for all where the errors are its own: its columns are cached
@@ -179,8 +184,32 @@ class Assembly(PointResults):
             if isinstance(one, Assembly) and one.joints is joints:
                 for name, values in rows.items():
                     values[i] = getattr(one, name)
+        if self.held is not None and self.held[1].joints is joints:
+            for name, values in rows.items():
+                values[self.held[0]] = getattr(self.held[1], name)
         known = {k: vars(self)[k] for k in _OF_MANY if k in vars(self)}
         return _with_known(replace(self, joints=joints, **rows), known, _OF_MANY)
+
+    def with_held(
+        self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
+    ) -> "Assembly":
+        """Many of which bounds of passive joints' own motion hold some.
+
+        Args:
+            rows: of those, in order.
+            joints: with all such bounds as cones.
+            parts: their ``clearances`` and ``motions`` in these.
+
+        Returns:
+            The same points.
+        """
+        some = self._taken(rows)
+        own = replace(
+            some, joints=joints, clearances=parts["clearances"],
+            motions=parts["motions"],
+        )  # fmt: skip
+        held = rows, _with_known(own, vars(some), _OF_MANY)
+        return _with_known(replace(self, held=held), vars(self), _OF_MANY)
 
     @property
     def as_many(self) -> "Assembly":
@@ -209,7 +238,16 @@ class Assembly(PointResults):
         lin, loads = self.linearisation, self.frame_loads
         if lin.posture.transforms.ndim > 3:
             lin = replace(lin, posture=lin.posture[rows])
-        order = {old: new for new, old in enumerate(np.atleast_1d(rows).tolist())}
+        taken_rows = np.atleast_1d(rows)
+        apart = {
+            new: self.apart[old] for new, old in enumerate(taken_rows.tolist())
+            if old in self.apart
+        }  # fmt: skip
+        held = None
+        if self.held is not None and np.ndim(rows):
+            own = np.isin(taken_rows, self.held[0])
+            at = np.searchsorted(self.held[0], taken_rows[own])
+            held = np.flatnonzero(own), self.held[1][at]
         part = replace(
             self,
             linearisation=lin,
@@ -226,7 +264,8 @@ class Assembly(PointResults):
             errors=taken(self.errors, 2),
             status=self.status[rows],
             reason=self.reason[rows],
-            apart={order[i]: one for i, one in self.apart.items() if i in order},
+            apart=apart,
+            held=held,
         )
         known = {k: vars(self)[k][rows] for k in _OF_MANY if k in vars(self)}
         return _with_known(part, known, _OF_MANY)

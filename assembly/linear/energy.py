@@ -25,7 +25,7 @@ from assembly.linear.lanes import assemble_side_by_side
 from assembly.linear.load import FrameLoads, no_loads
 from assembly.linear.reference.energy import CannotAssemble, least_energy
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.robot_structure import structure_of
+from assembly.linear.robot_structure import Structure, structure_of
 from assembly.linear.rounding import (
     SPREAD,
     closure_rounding,
@@ -40,7 +40,9 @@ from assembly.solvers.method import Method, check_method
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-_LEFT = 2  # outcomes from this on, of assembly/kernels/linear/energies.h, are no answer
+# outcomes of assembly/kernels/linear/energies.h: from the first on they are no answer,
+# and with these a bound of a passive joint's own motion, left out, may be the cause
+_LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: "cannot assemble",
     FreeMotion: "no equilibrium",
@@ -160,13 +162,18 @@ def _solve_one(
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
-    rounding, (joints, _) = _rounding_of(robot), structure_of(robot)
-    acting = loads.rows() if loads else None
+    rounding, acting = _rounding_of(robot), loads.rows() if loads else None
     # a copy: the address of an array that may be written is found three times as fast
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
-    rows = _compiled(robot, T, robot.errors[None], off, "elastic", acting)
-    if rows["outcome"][0] >= _LEFT:
+    for bounded in (False, True):
+        joints, structure = structure_of(robot, "elastic", bounded)
+        rows = _compiled(joints, structure, T, robot.errors[None], off, acting)
+        if rows["outcome"][0] < _LEFT:
+            break
+        if not _bounds_matter(structure, rows["outcome"])[0]:
+            return least_energy(posture, load, loads)
+    else:
         return least_energy(posture, load, loads)
     _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
     return known_assembly(
@@ -196,8 +203,14 @@ def _solve_many(
     if acting is not None and len(T) == len(sets) == 1:  # loads alone differ
         sets = np.repeat(sets, len(acting), axis=0)
     count = len(sets) if len(T) == 1 else len(T)
-    rows = _compiled(robot, T, sets, off, compliant, acting, method)
+    rows = _compiled(joints, structure, T, sets, off, acting, method)
     rows["excess"] = _excess_of(rows["clearances"], structure.starts)
+    held, within = np.zeros(0, dtype=int), rows
+    bounded, own_structure = structure_of(robot, compliant, bounded_motion=True)
+    if _bounds_matter(structure, rows["outcome"]).any():
+        held, within = _within_bounds(
+            bounded, own_structure, structure, (T, sets, off, acting), rows
+        )
     rows |= _unsaid(count)
     if len(T) == 1 and posture.transforms.ndim > 3:
         posture = posture[0]
@@ -209,7 +222,39 @@ def _solve_many(
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
     _certify(rows, points)
-    return points
+    return points.with_held(held, bounded, within) if len(held) else points
+
+
+def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
+    """(k,) bool, points that a bound which was left out may hold."""
+    return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
+
+
+def _within_bounds(
+    joints: VirtualJoints, structure: Structure, without: Structure,
+    given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
+) -> tuple[NDArray, _Rows]:  # fmt: skip
+    """Solve again points to which bounds of passive joints' own motion matter.
+
+    Returns:
+        Which are solved now, and their rows with all bounds as cones; what both have is
+        written into ``rows`` too.
+    """
+    held = np.flatnonzero(_bounds_matter(without, rows["outcome"]))
+    T, sets, off, acting = (
+        part if part is None or len(part) == 1 else part[held] for part in given
+    )
+    assert T is not None
+    assert sets is not None
+    assert off is not None
+    again = _compiled(joints, structure, T, sets, off, acting)
+    again["excess"] = _excess_of(again["clearances"], structure.starts)
+    proved = again["outcome"] < _LEFT
+    held, again = held[proved], {name: part[proved] for name, part in again.items()}
+    for name, part in again.items():
+        own = rows[name].shape[1:] == part.shape[1:]
+        rows[name][held] = part if own else np.nan
+    return held, again
 
 
 def _checked(
@@ -242,11 +287,10 @@ def _checked(
 
 
 def _compiled(
-    robot: Robot, T: NDArray, errors: NDArray, mismatch: NDArray, compliant: Compliant,
-    loads: NDArray | None, method: Method = "compiled",
+    joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
+    mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
     """Rows of k points, by the compiled method, or left to the reference."""
-    joints, structure = structure_of(robot, compliant)
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -301,7 +345,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
     """Every point; zeros are the answer where nothing has to move."""
-    if loads is not None or np.count_nonzero(given[2]):
+    if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
 

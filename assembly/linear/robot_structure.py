@@ -67,18 +67,19 @@ class Structure(NamedTuple):
 
 @lru_cache(maxsize=32)
 def structure_of(
-    robot: Robot, compliant: Compliant = "elastic"
+    robot: Robot, compliant: Compliant = "elastic", bounded_motion: bool = False
 ) -> tuple[VirtualJoints, Structure]:
     """What may move, as columns and as arrays.
 
     Args:
         robot: any.
         compliant: as for :func:`assembly.linear.closure.virtual_joints`.
+        bounded_motion: likewise.
 
     Returns:
         The columns; the same as arrays.
     """
-    joints = virtual_joints(robot, compliant)
+    joints = virtual_joints(robot, compliant, bounded_motion)
     rows = tuple((robot.index(a), robot.index(b)) for a, b in robot.closures)
     tree = _Tree(robot.index(robot.platform), rows, robot)
     return joints, _structure(joints, tree, compliant)

@@ -38,6 +38,7 @@ private:
     // kept while the posture stays
     int64_t prepared = -1;  // at which change of it
     Table G, unfelt;        // of Z's other rows, orthonormal: nothing feels them
+    Real largest_column;    // |G's columns|^2
     Whole stuck;            // clearances enter rows that no spring enters
 
     void prepare(int r, int count);
@@ -88,15 +89,17 @@ inline Whole Energies::rigid_rows(int rank, int count, Real tolerance) {
 
 // What depends on the posture alone, and G and h.
 inline void Energies::prepare(int r, int count) {
-    if (!posture.empty() && prepared == changes) {
-        right_sides(r);
-        for (int i = 0; i < r; ++i) std::copy(G[i], G[i] + nu, programme.M[i]);
-        return;
-    }
+    if (!posture.empty() && prepared == changes) return right_sides(r);
     prepared = changes;
     stuck = stuck_clearances(r, count);
     small_problem(r);
+    largest_column = Real{};
     for (int i = 0; i < r; ++i) std::copy(programme.M[i], programme.M[i] + nu, G[i]);
+    for (int c = 0; c < nu; ++c) {
+        Real column = {};
+        for (int i = 0; i < r; ++i) column += G[i][c] * G[i][c];
+        largest_column = larger(column, largest_column);
+    }
     for (int i = 0; i < count - r; ++i) {
         Real *own = unfelt[i];
         std::copy(Z[r + i], Z[r + i] + m, own);
@@ -114,12 +117,8 @@ inline void Energies::prepare(int r, int count) {
 // Returns the outcomes.
 inline Whole Energies::minimise(int r, Whole asked) {
     Programme &q = programme;
-    Real square = inner(q.h.data(), q.h.data(), r), size = square;
-    for (int c = 0; c < nu; ++c) {
-        Real column = {};
-        for (int i = 0; i < r; ++i) column += q.M[i][c] * q.M[i][c];
-        size = larger(column, size);
-    }
+    const Real square = inner(q.h.data(), q.h.data(), r);
+    Real size = larger(largest_column, square);
     Whole some = square > 0.0;
     for (int c = 0; loaded && c < nu; ++c) {
         size = larger(magnitude(q.d[c]), size);
@@ -134,7 +133,7 @@ inline Whole Energies::minimise(int r, Whole asked) {
     const Real over = 1.0 / (some ? size : real(1.0));
     for (int i = 0; i < r; ++i) {
         q.h[i] *= over;
-        for (int c = 0; c < nu; ++c) q.M[i][c] *= over;
+        for (int c = 0; c < nu; ++c) q.M[i][c] = G[i][c] * over;
     }
     const Real without = 0.5 * inner(q.h.data(), q.h.data(), r);
     Real absolute = STOP * GAP_WITHOUT_CLEARANCE * without;

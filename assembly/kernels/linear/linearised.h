@@ -73,9 +73,11 @@ inline Linearised::Linearised(const Robot &s, const Points &points)
     for (int c = 0; c < s.ny; ++c) felt[s.spring_frame[c]] = true;
     // a frame without errors at any point adds exact zeros
     const int64_t sets = points.own_errors ? points.count : 1;
-    for (int64_t i = 0; i < sets * n; ++i)
-        for (int axis = 0; axis < 6; ++axis)
-            if (points.errors[6 * i + axis] != 0.0) erring[i % n] = true;
+    const double *own = points.errors;
+    for (int64_t i = 0; i < sets; ++i)
+        for (int j = 0; j < n; ++j, own += 6)
+            if (!erring[j])
+                erring[j] = std::any_of(own, own + 6, [](double e) { return e != 0.0; });
 }
 
 // Whether all lanes stand where all lanes of the block before stood: what depends on the

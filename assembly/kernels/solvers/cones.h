@@ -90,6 +90,7 @@ private:
     Real fastest() const;
     void correct(Real target);
     struct Slopes { Real smooth, residual, kink, primal; Whole closed; };
+    void forces(const Programme &q, int rows, const Real *y);
     Slopes slopes(const Programme &q, Real sigma, const Real *y);
 };
 

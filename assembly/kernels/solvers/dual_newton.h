@@ -22,11 +22,15 @@
 
 namespace LANE_SPACE {
 
-// Value and derivatives at y of the dual smoothed about `old`: the clearances u, the
-// gradient `right`, and D of minus the curvature M D M^T + 1.
-inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real *y) {
+// z1 = M^T y - d.
+inline void Solver::forces(const Programme &q, int rows, const Real *y) {
     for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
-    combine(q.M.rows(), q.r + q.p, y, k.nu, z1.data());
+    combine(q.M.rows(), rows, y, k.nu, z1.data());
+}
+
+// Value and derivatives at y, whose forces are known, of the dual smoothed about `old`:
+// the clearances u, the gradient `right`, and D of minus the curvature M D M^T + 1.
+inline Solver::Slopes Solver::slopes(const Programme &q, Real sigma, const Real *y) {
     const Real over_twice = 0.5 / sigma;
     Slopes at = {{}, {}, {}, {}, whole(-1)};
     k.each([&](auto size, int c, int first) {
@@ -99,16 +103,18 @@ inline Whole Solver::dual_newton(
     for (int i = 0; i < m; ++i) y[i] = i < r ? q.h[i] : q.y[i];
     multiply(q.M.rows(), r, old.data(), k.nu, right.data());
     for (int i = 0; i < r; ++i) y[i] += right[i];
-    for (int j = 0; j < k.nu; ++j) z1[j] = -q.d[j];
-    combine(q.M.rows(), r, q.h.data(), k.nu, z1.data());
-    Real mean = {};
-    for (int j = 0; j < k.nu; ++j) mean += magnitude(z1[j]);
-    mean /= double(k.nu);
-    Real sigma = first_sigma > 0.0 ? first_sigma / larger(mean, real(1e-12)) : real(1e30);
+    Real sigma = real(1e30);
+    if (first_sigma > 0.0) {
+        forces(q, r, q.h.data());
+        Real mean = {};
+        for (int j = 0; j < k.nu; ++j) mean += magnitude(z1[j]);
+        sigma = first_sigma / larger(mean / double(k.nu), real(1e-12));
+    }
     Real before = real(-INFINITY);
     Whole going = asked, done = {}, halvings = {}, taken = {};
     Row step(m);
     while (true) {
+        forces(q, m, y.data());
         Slopes at = slopes(q, sigma, y.data());
         const Whole close =
             at.closed & (at.residual + at.kink <= relative * at.primal + absolute);

@@ -52,6 +52,9 @@ inline Real once(Real x) {
     return x;
 }
 
+// Before the loops of a tile over its own sums: these stay in registers.
+#define UNROLL _Pragma("GCC unroll 8")
+
 inline Real magnitude(Real x) { return x < 0.0 ? -x : x; }
 inline Real larger(Real a, Real b) { return a > b ? a : b; }
 
@@ -83,20 +86,22 @@ typedef Array<Real> Row;
 template <int R>
 inline void inner_tile(Real *const *rows, const Real *x, int from, int to, Real *out) {
     constexpr int PARTS = 8 / R;
-    Real total[R][PARTS] = {};
+    Real total[R][PARTS];
+    UNROLL for (int i = 0; i < R; ++i)
+        UNROLL for (int b = 0; b < PARTS; ++b) total[i][b] = Real{};
     int a = from;
     for (; a + PARTS <= to; a += PARTS)
-        for (int b = 0; b < PARTS; ++b) {
+        UNROLL for (int b = 0; b < PARTS; ++b) {
             const Real own = once(x[a + b]);
-            for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
+            UNROLL for (int i = 0; i < R; ++i) total[i][b] += rows[i][a + b] * own;
         }
     for (; a < to; ++a) {
         const Real own = once(x[a]);
-        for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
+        UNROLL for (int i = 0; i < R; ++i) total[i][0] += rows[i][a] * own;
     }
-    for (int i = 0; i < R; ++i) {
-        for (int half = PARTS / 2; half > 0; half /= 2)
-            for (int b = 0; b < half; ++b) total[i][b] += total[i][b + half];
+    UNROLL for (int i = 0; i < R; ++i) {
+        UNROLL for (int half = PARTS / 2; half > 0; half /= 2)
+            UNROLL for (int b = 0; b < half; ++b) total[i][b] += total[i][b + half];
         out[i] = total[i][0];
     }
 }
@@ -118,12 +123,12 @@ inline void multiply(Real *const *A, int count, const Real *x, int columns, Real
 template <int C>
 inline void combine_tile(Real *const *A, int count, const Real *y, int column, Real *out) {
     Real total[C];
-    for (int j = 0; j < C; ++j) total[j] = out[column + j];
+    UNROLL for (int j = 0; j < C; ++j) total[j] = out[column + j];
     for (int i = 0; i < count; ++i) {
-        const Real own = once(y[i]);
-        for (int j = 0; j < C; ++j) total[j] += own * A[i][column + j];
+        const Real own = once(y[i]), *row = A[i] + column;
+        UNROLL for (int j = 0; j < C; ++j) total[j] += own * row[j];
     }
-    for (int j = 0; j < C; ++j) out[column + j] = total[j];
+    UNROLL for (int j = 0; j < C; ++j) out[column + j] = total[j];
 }
 
 // out += A^T y.
@@ -137,17 +142,19 @@ inline void combine(Real *const *A, int count, const Real *y, int columns, Real 
 template <int R, int C>
 inline void product_tile(
     Real *const *B, Real *const *M, int column, int width, Real *const *out) {
-    Real total[R][C] = {};
+    Real total[R][C];
+    UNROLL for (int i = 0; i < R; ++i)
+        UNROLL for (int j = 0; j < C; ++j) total[i][j] = Real{};
     for (int a = 0; a < width; ++a) {
         Real own[R];
-        for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
-        for (int j = 0; j < C; ++j) {
+        UNROLL for (int i = 0; i < R; ++i) own[i] = once(B[i][a]);
+        UNROLL for (int j = 0; j < C; ++j) {
             const Real other = once(M[column + j][a]);
-            for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
+            UNROLL for (int i = 0; i < R; ++i) total[i][j] += own[i] * other;
         }
     }
-    for (int i = 0; i < R; ++i)
-        for (int j = 0; j < C; ++j) out[i][column + j] = total[i][j];
+    UNROLL for (int i = 0; i < R; ++i)
+        UNROLL for (int j = 0; j < C; ++j) out[i][column + j] = total[i][j];
 }
 
 // R rows B M^T, of the first rows of M.

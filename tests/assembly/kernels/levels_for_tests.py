@@ -13,6 +13,7 @@ from assembly.kinematics.posture import home_posture, place_many, together
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
@@ -71,6 +72,15 @@ def answers():
             rngs = [np.random.default_rng(i) for i in range(k)]
             moved = position_clearances(one, draws, model, rngs)
             yield f"{name} {model}", moved
+    link = MatrixLink(1e6 * np.eye(6))
+    play = Clearance(radial=1e-5, axial=1e-4)
+    slider = Robot("slider", "end", (
+        Frame("link", translation=[0, 0, 0.5], link=link),
+        Frame("slide", "link", joint="prismatic", clearance=play),
+        Frame("end", "slide"), Frame("wall", translation=[0, 0, 0.5], link=link),
+    ), (("end", "wall"),))  # fmt: skip
+    errors = 1e-4 * rng.normal(size=(11, 4, 6))
+    yield "slider within its bound", solve_assembly(home_posture(slider), errors=errors)
     group = np.repeat(np.arange(4), [1, 2, 3, 4])
     H = rng.normal(size=(2, 10))
     given = rng.normal(size=(5, 10)), 3 * rng.normal(size=5), rng.normal(size=10)

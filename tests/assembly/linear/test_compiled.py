@@ -226,7 +226,7 @@ def test_what_is_not_compiled_falls_back():
     assert "no clearance within its bounds" in batch.reason[0]
 
 
-def test_a_bound_on_a_joints_own_motion_falls_back():
+def test_a_bound_on_a_joints_own_motion_holds_compiled():
     """A passive slider of +-1e-4 m and a gap of 3e-4: the spring takes the rest."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
@@ -238,10 +238,14 @@ def test_a_bound_on_a_joints_own_motion_falls_back():
     robot = Robot("slider", "end", frames, (("end", "wall"),))
     T = home_posture(robot).transforms[None]
     batch = assemble_at(robot, T)
-    assert list(batch.method).count("reference") == 1
+    assert set(batch.method) == {"compiled"}
     assert batch.energy[0] == pytest.approx(1e6 * 2e-4**2 / 2, rel=1e-9)
     assert batch.certified[0]
-    assert set(assemble_at(robot, T, robot.errors / 4).method) == {"compiled"}
+    assert np.isnan(batch.motions[0, 0])
+    np.testing.assert_allclose(np.abs(batch[0].clearances), 1.0, rtol=1e-12)
+    within = assemble_at(robot, T, robot.errors / 4)
+    assert within.held is None
+    assert np.abs(within.motions) == pytest.approx(3e-4 / 4, rel=1e-9)
 
 
 def test_the_certificate_refuses_a_spoilt_point(grid):

@@ -20,6 +20,7 @@ from tests.robots_for_tests import (
     random_robot,
     row,
     stack,
+    with_bounded_motion,
 )
 
 
@@ -77,6 +78,57 @@ def test_an_answer_does_not_depend_on_its_neighbours(grid, rng, kappa):
         alone = assemble_at(robot, T[[i]], errors[[i]], mismatch[[i]])
         for name in ROWS:
             assert np.array_equal(row(alone, name)[0], row(whole, name)[i])
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_where_bounds_of_motions_matter_no_answer_depends_on_its_neighbours(
+    seed, loaded
+):
+    """Draws of which some leave a bound: in other company, alone, by one posture."""
+    rng = np.random.default_rng(seed)
+    home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
+    load = rng.normal(size=6) if loaded else None
+    errors = 1e-4 * rng.normal(size=(11, len(home.robot.frames), 6))
+    errors[::3] *= 1e-2
+    whole = solve_assembly(home, load, errors=errors)
+    assert set(whole.method) == {"compiled"}
+    held = whole.held[0].tolist()
+    assert held
+    order = rng.permutation(len(errors))
+    other = solve_assembly(home, load, errors=errors[order])
+    for name in ROWS:
+        np.testing.assert_array_equal(row(whole, name)[order], row(other, name))
+    for i, one in enumerate(errors):
+        alone = solve_assembly(home, load, errors=one[None])
+        posture = replace(home, robot=home.robot.with_errors(one))
+        single = solve_assembly(posture, load)
+        for name in ROWS:
+            np.testing.assert_array_equal(row(whole, name)[i], row(alone, name)[0])
+        assert single.method == "compiled"
+        assert (i in held) == bool(single.joints.bounded_motion)
+        assert np.array_equal(single.clearances, whole[i].clearances)
+        for name in ("energy", "platform_screw", "multipliers"):
+            assert np.array_equal(getattr(single, name), getattr(whole, name)[i])
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_within_bounds_of_motions_the_energy_is_the_references(loaded):
+    """Energies of each to 1e-8 of it and of the work: what both certificates allow."""
+    held = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
+        load = rng.normal(size=6) if loaded else None
+        one = solve_assembly(home, load)
+        reference = solve_assembly(home, load, method="reference")
+        held += bool(one.joints.bounded_motion)
+        assert bool(reference.joints.bounded_motion) <= bool(one.joints.bounded_motion)
+        allowed = 2e-8 * (reference.stored + abs(reference.work))
+        allowed += 2e-12 * reference.energy_without_clearance + 1e-25
+        assert abs(one.potential - reference.potential) <= allowed
+        assert one.clearance_excess() <= 1e-9
+    assert held >= 5
 
 
 def test_postures_of_different_rank_stand_side_by_side(rng):

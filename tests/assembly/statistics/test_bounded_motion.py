@@ -1,7 +1,5 @@
 """Clearance models where passive joints' own motion is bounded: intervals by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -12,7 +10,7 @@ from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.clearance_positions import position_clearances
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
-from tests.robots_for_tests import random_robot
+from tests.robots_for_tests import random_robot, with_bounded_motion
 
 SPIN, RADIAL, ARM = 1e-4, 1e-6, 1.0
 
@@ -108,17 +106,3 @@ def test_no_clearance_model_exceeds_the_certified_worst_in_any_draw(seed):
         for key in ("rotation", "translation"):
             assert np.isfinite(of_model[key][solved]).all()
             assert (of_model[key] <= worst[key] * (1 + 1e-7))[solved].all()
-
-
-def with_bounded_motion(robot, rng):
-    """Every passive joint's own motion within some 1e-4 rad or m."""
-
-    def bounded(frame):
-        if not frame.passive or frame.compliant:
-            return frame
-        key = "axial" if frame.joint == "prismatic" else "spin"
-        clearance = frame.clearance or Clearance()
-        bound = {key: float(rng.uniform(0.3, 3) * 1e-4)}
-        return replace(frame, clearance=replace(clearance, **bound))
-
-    return replace(robot, frames=tuple(bounded(f) for f in robot.frames))

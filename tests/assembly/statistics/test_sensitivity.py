@@ -104,7 +104,7 @@ def test_wrenches_of_random_robots_have_slopes(seed):
     weights = rng.normal(size=errors.shape) * np.array([10.0] * 3 + [1.0] * 3)
     step = 1e-5 * rng.normal(size=errors.shape) * np.abs(errors)
     found = ready.solve(errors[None])
-    if "reference" in found.method:
+    if not np.isfinite(found.clearances).all():
         pytest.skip("it does not close, or a passive joint is at the end of its motion")
     slopes = solution_slopes(ready, found, weights[None], np.zeros((1, 6)))[0]
     both = ready.solve(np.array([errors + step, errors - step]))
