@@ -16,17 +16,15 @@ series carry the same wrench, which (23) adds to itself, and the paths to the pl
 alone, (24)-(26), sum to zero on an unloaded platform.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.closure_rates import closure_signs
-from assembly.kinematics.posture import Posture, together
-from assembly.linear.closure import Linearisation, VirtualJoints
+from assembly.kinematics.posture import Posture
 from assembly.linear.load import (
     FrameLoads,
     loads_on_frames,
@@ -36,8 +34,9 @@ from assembly.linear.load import (
 )
 from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
+from assembly.linear.solution import Solution
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
-from assembly.model.point_results import Numbers, PointResults
+from assembly.model.point_results import Numbers, plain
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from forcefit.inputs.display import (
@@ -58,61 +57,12 @@ _NOTHING = 1e-12  # [N m, N]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assembly(PointResults):
+class Assembly(Solution):
     """A manipulator forced together at least energy; or many, with a leading axis.
 
-    ``[i]`` of many is one of them; where it has no solution that raises why.
-
-    Attributes:
-        linearisation: the assembly constraints it satisfies; where it stands.
-        joints: what was allowed to move.
-        load: (..., 6) [N m, N] on the platform at its origin, base axes.
-        frame_loads: all loads, this one among them, on every small screw.
-        elastic: (..., ny) [sqrt(2 J)] scaled deformation of the springs.
-        clearances: (..., nu) clearances in units of their cones; of many NaN where the
-            bound of a passive joint's own motion is active, and ``[i]`` has more.
-        motions: (..., nq) [rad, m] free motions; NaN likewise.
-        multipliers: (..., 6 closures) of the scaled closure rows.
-        energy_without_clearance: (...) [J] least energy with all clearances at zero.
-        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
-            Clarabel.
-        errors: (..., n, 6) [rad, m] geometric errors; the robot's if absent.
-        status: (...) ``"ok"``; of many also ``"cannot assemble"``, ``"no equilibrium"``
-            or ``"solver failed"``, also where its certificate falls short.
-        reason: (...) message where the status is not ok.
-        apart: of many those with other columns than ``joints``, or why there is none,
-            by their row.
-        held: of many the rows of those that bounds of passive joints' own motion hold,
-            in order, and these with all such bounds as cones.
+    ``[i]`` of many is one of them; where it has no solution that raises why.  The
+    fields are those of :class:`~assembly.linear.solution.Solution`.
     """
-
-    linearisation: Linearisation
-    joints: VirtualJoints
-    load: NDArray
-    frame_loads: FrameLoads
-    elastic: NDArray
-    clearances: NDArray
-    motions: NDArray
-    multipliers: NDArray
-    energy_without_clearance: Numbers
-    method: Any
-    errors: Any = None
-    status: Any = "ok"
-    reason: Any = ""
-    apart: dict[int, "Assembly | Exception"] = field(default_factory=dict)
-    held: "tuple[NDArray, Assembly] | None" = None
-
-    VARIABLES: ClassVar = {
-        "energy": "energy",
-        "duality_gap": "_gap",
-        "energy_without_play": "energy_without_clearance",
-        "platform_screw": "platform_screw",
-        "closure_residual": "_residual",
-        "clearance_excess": "_excess",
-        "method": "method",
-        "status": "status",
-        "reason": "reason",
-    }
 
     summary = short_repr
 
@@ -138,138 +88,6 @@ class Assembly(PointResults):
             f"excess {self.clearance_excess():.1e}, gap {self.duality_gap():.1e} J",
         }
 
-    @property
-    def _first(self) -> Numbers:
-        return self.energy_without_clearance
-
-    def __getitem__(self, rows: Any) -> "Assembly":
-        """One of many, by a whole number, or why it has no solution; or some."""
-        if not isinstance(rows, (int, np.integer)):
-            return self._taken(np.arange(len(self))[rows])
-        i = range(len(self))[rows]
-        apart = self.apart.get(i)
-        if isinstance(apart, Exception):
-            raise apart.with_traceback(None)
-        if apart is not None:
-            return apart
-        if self.held is not None and i in self.held[0]:
-            return self.held[1][int(np.searchsorted(self.held[0], i))]
-        one = self._taken(i)
-        lin, robot = one.linearisation, self.posture.robot
-        # one robot for all where the errors are its own: its columns are cached
-        if one.errors is not None and not np.array_equal(one.errors, robot.errors):
-            robot = robot.with_errors(one.errors)
-            lin = replace(lin, posture=replace(lin.posture, robot=robot))
-        alone = replace(one, linearisation=lin, errors=None)
-        return _with_known(alone, vars(one), _OF_ONE)
-
-    def in_columns(self, joints: VirtualJoints) -> "Assembly":
-        """Many with the columns of other virtual joints.
-
-        Args:
-            joints: those of some of the points apart.
-
-        Returns:
-            The same points; NaN for clearances and motions of all others.
-        """
-        parts = {
-            "elastic": joints.elastic, "clearances": joints.cones,
-            "motions": joints.free,
-        }  # fmt: skip
-        rows: dict[str, Any] = {
-            name: np.full((len(self), columns.shape[1]), np.nan)
-            for name, columns in parts.items()
-        }
-        for i, one in self.apart.items():
-            if isinstance(one, Assembly) and one.joints is joints:
-                for name, values in rows.items():
-                    values[i] = getattr(one, name)
-        if self.held is not None and self.held[1].joints is joints:
-            for name, values in rows.items():
-                values[self.held[0]] = getattr(self.held[1], name)
-        known = {k: vars(self)[k] for k in _OF_MANY if k in vars(self)}
-        return _with_known(replace(self, joints=joints, **rows), known, _OF_MANY)
-
-    def with_held(
-        self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
-    ) -> "Assembly":
-        """Many of which bounds of passive joints' own motion hold some.
-
-        Args:
-            rows: of those, in order.
-            joints: with all such bounds as cones.
-            parts: their ``clearances`` and ``motions`` in these.
-
-        Returns:
-            The same points.
-        """
-        some = self._taken(rows)
-        own = replace(
-            some, joints=joints, clearances=parts["clearances"],
-            motions=parts["motions"],
-        )  # fmt: skip
-        held = rows, _with_known(own, vars(some), _OF_MANY)
-        return _with_known(replace(self, held=held), vars(self), _OF_MANY)
-
-    @property
-    def as_many(self) -> "Assembly":
-        """One point with a leading axis."""
-        lin = self.linearisation
-        many = replace(
-            self, linearisation=replace(lin, posture=together([lin.posture])),
-            elastic=self.elastic[None], clearances=self.clearances[None],
-            motions=self.motions[None], multipliers=self.multipliers[None],
-            energy_without_clearance=np.array([self.energy_without_clearance]),
-            method=np.array([self.method], dtype=object),
-            status=np.array([self.status], dtype=object),
-            reason=np.array([self.reason], dtype=object),
-        )  # fmt: skip
-        known = {"energy": np.array([self.energy])}
-        known["platform_screw"] = self.platform_screw[None]
-        return _with_known(many, known, _OF_ONE)
-
-    def _taken(self, rows: Any) -> "Assembly":
-        """Rows of every array that has them."""
-
-        def taken(values: Any, dimensions: int) -> Any:
-            own = values is not None and np.ndim(values) > dimensions
-            return values[rows] if own else values
-
-        lin, loads = self.linearisation, self.frame_loads
-        if lin.posture.transforms.ndim > 3:
-            lin = replace(lin, posture=lin.posture[rows])
-        taken_rows = np.atleast_1d(rows)
-        apart = {
-            new: self.apart[old] for new, old in enumerate(taken_rows.tolist())
-            if old in self.apart
-        }  # fmt: skip
-        held = None
-        if self.held is not None and np.ndim(rows):
-            own = np.isin(taken_rows, self.held[0])
-            at = np.searchsorted(self.held[0], taken_rows[own])
-            held = np.flatnonzero(own), self.held[1][at]
-        part = replace(
-            self,
-            linearisation=lin,
-            load=taken(self.load, 1),
-            frame_loads=FrameLoads(
-                *(taken(a, 1) for a in (loads.body, loads.joint, loads.distributed))
-            ),
-            elastic=self.elastic[rows],
-            clearances=self.clearances[rows],
-            motions=self.motions[rows],
-            multipliers=self.multipliers[rows],
-            energy_without_clearance=_plain(self.energy_without_clearance[rows]),
-            method=self.method[rows],
-            errors=taken(self.errors, 2),
-            status=self.status[rows],
-            reason=self.reason[rows],
-            apart=apart,
-            held=held,
-        )
-        known = {k: vars(self)[k][rows] for k in _OF_MANY if k in vars(self)}
-        return _with_known(part, known, _OF_MANY)
-
     def to_xarray(self) -> "xarray.Dataset":
         """Frames, closures and platform, or points; :mod:`assembly.model.tables`."""
         from assembly.model.tables import assembly_dataset
@@ -288,16 +106,11 @@ class Assembly(PointResults):
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
-    def posture(self) -> Posture:
-        """Where the robot stands nominally."""
-        return self.linearisation.posture
-
-    @property
     def loaded(self) -> Any:
         """(...) bool, whether there are loads."""
         acting = np.any(self.frame_loads.body, axis=-1)
         acting = acting | np.any(self.frame_loads.joint, axis=-1)
-        return _plain(np.broadcast_to(acting, np.shape(self._first)))
+        return plain(np.broadcast_to(acting, np.shape(self.energy_without_clearance)))
 
     @cached_property
     def energy(self) -> Numbers:
@@ -306,25 +119,25 @@ class Assembly(PointResults):
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
         )  # fmt: skip
-        return _plain(np.where(nonzero, self.stored, 0.0))
+        return plain(np.where(nonzero, self.stored, 0.0))
 
     @property
     def stored(self) -> Numbers:
         """(...) [J] in the springs of the numerical solution."""
-        return _plain(np.vecdot(self.elastic, self.elastic) / 2)
+        return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
     def potential(self) -> Numbers:
         """(...) [J] energy minus the work of the loads."""
         on_errors = np.vecdot(self.frame_loads.body, _flat(self._errors))
-        return _plain(self.stored - self.work - on_errors)
+        return plain(self.stored - self.work - on_errors)
 
     @cached_property
     def work(self) -> Numbers:
         """(...) [J] of the loads on all small screws but the errors."""
         joints = self.clearance_screws + self.joint_screws
         on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
-        return _plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
+        return plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
 
     @property
     def _errors(self) -> NDArray:
@@ -424,7 +237,7 @@ class Assembly(PointResults):
         slip = np.vecdot(np.abs(joint @ self.joints.free), np.abs(self.motions))
         errors = np.vecdot(_flat(self.wrenches), _flat(self._errors))
         gains = clearances.sum(axis=-1)
-        return _plain(-errors - np.vecdot(springs, springs) / 2 - gains - slip)
+        return plain(-errors - np.vecdot(springs, springs) / 2 - gains - slip)
 
     @property
     def _balancing(self) -> NDArray:
@@ -452,14 +265,14 @@ class Assembly(PointResults):
     @cached_property
     def _residual(self) -> Numbers:
         residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
-        return _plain(residual.max(axis=-1, initial=0.0))
+        return plain(residual.max(axis=-1, initial=0.0))
 
     def clearance_excess(self, compliant: Compliant = "elastic") -> Numbers:
         """(...) [-] by how much the worst clearance leaves its cone, of its size."""
         if compliant == "elastic" and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, compliant)
-        return _plain(clearance_excess(self.clearance_screws, bounds))
+        return plain(clearance_excess(self.clearance_screws, bounds))
 
     @cached_property
     def _excess(self) -> Numbers:
@@ -469,7 +282,7 @@ class Assembly(PointResults):
     def rounding(self) -> Numbers:
         """(...) [rad, lengths] what rounding may leave open in a closure."""
         size = self.linearisation.size
-        return _plain(closure_rounding(self._errors, self.joints, size))
+        return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
     def uncertainty(self) -> Numbers:
@@ -487,7 +300,7 @@ class Assembly(PointResults):
         residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
         rounding = np.asarray(self.rounding)[..., None]
         work_on_residual = np.vecdot(np.abs(self.multipliers), residual + rounding)
-        return _plain(
+        return plain(
             np.vecdot(springs, springs) / 2
             + np.maximum(gains, 0.0).sum(axis=-1) + 2 * slip + work_on_residual
             + ROUNDING * (sizes.sum(axis=-1) + np.abs(self.work))
@@ -499,13 +312,13 @@ class Assembly(PointResults):
 
     @cached_property
     def _gap(self) -> Numbers:
-        return _plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
+        return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> Numbers:
         """(...) [-] duality gap by energy, or by 1e-4 of that without clearance."""
         # inside an assembly zone the least energy is zero, and no gap relative to it
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
-        return _plain(self.duality_gap() / np.maximum(self.stored, least))
+        return plain(self.duality_gap() / np.maximum(self.stored, least))
 
     @property
     def certified(self) -> Any:
@@ -516,44 +329,6 @@ class Assembly(PointResults):
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
         return (self.duality_gap() <= allowed) & (np.asarray(self.status) == "ok")
-
-
-# what compiled functions say beside a solution, of one point and of many
-_OF_ONE = ("energy", "platform_screw")
-_OF_MANY = (*_OF_ONE, "work", "potential", "bound", "_gap", "_residual", "_excess")
-
-
-def _with_known(
-    assembly: Assembly, known: Mapping[str, Any], names: tuple[str, ...]
-) -> Assembly:
-    """What is known already, and so not computed again when somebody asks."""
-    own = vars(assembly)
-    for name in names:
-        if name in known:
-            own[name] = _plain(known[name])
-    return assembly
-
-
-def known_assembly(known: Mapping[str, Any], **fields: Any) -> Assembly:
-    """An assembly of which more is known than its fields.
-
-    Args:
-        known: values of properties: ``energy``, ``platform_screw``, ``work``,
-            ``potential``, ``bound``, and, as ``_gap``, ``_residual``, ``_excess``, the
-            rest of its certificate.
-        fields: of the assembly.
-
-    Returns:
-        It.
-    """
-    return _with_known(Assembly(**fields), known, _OF_MANY)
-
-
-def _plain(values: Any) -> Any:
-    """Arrays as they are; of one point the number itself."""
-    if isinstance(values, np.ndarray):
-        return values if values.ndim else values.item()
-    return values.item() if isinstance(values, np.generic) else values
 
 
 def _flat(screws: NDArray) -> NDArray:

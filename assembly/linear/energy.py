@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture, together
-from assembly.linear.assembled import Assembly, all_loads, known_assembly
+from assembly.linear.assembled import Assembly, all_loads
 from assembly.linear.certificate import unproved
 from assembly.linear.closure import (
     VirtualJoints,
@@ -32,6 +32,7 @@ from assembly.linear.rounding import (
     drop_zeros,
     stiffness_spread,
 )
+from assembly.linear.solution import with_known
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
@@ -176,12 +177,13 @@ def _solve_one(
     else:
         return least_energy(posture, load, loads)
     _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
-    return known_assembly(
-        {key: rows[key][0] for key in ("energy", "platform_screw")},
+    assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
         **{key: rows[key][0] for key in _VECTORS},
     )  # fmt: skip
+    known = {key: rows[key][0] for key in ("energy", "platform_screw")}
+    return with_known(assembly, known)
 
 
 @lru_cache(maxsize=32)  # of one robot at many postures
@@ -370,14 +372,14 @@ def _of_rows(
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
-    return known_assembly(
-        {name: rows[key] for name, key in known.items()},
+    points = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         elastic=rows["elastic"], clearances=rows["clearances"],
         motions=rows["motions"], multipliers=rows["multipliers"],
         energy_without_clearance=rows["tight"], method=rows["method"],
         status=rows["status"], reason=rows["reason"], errors=errors,
     )  # fmt: skip
+    return with_known(points, {name: rows[key] for name, key in known.items()})
 
 
 def _by_reference(where: Assembly, compliant: Compliant) -> Assembly | Exception:

@@ -25,7 +25,7 @@ one.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -79,6 +79,10 @@ class PoseError(PointResults):
     reason: Any = ""
     proof: Callable[[], str] = str
 
+    AXES: ClassVar = {
+        "supports": 0, "rotation_error": 1, "translation_error": 1, "rotation_screw": 1,
+        "translation_screw": 1, "method": 0, "one_by_one": 0, "status": 0, "reason": 0,
+    }  # fmt: skip
     VARIABLES: ClassVar = {
         "rotation_error": "rotation_error",
         "translation_error": "translation_error",
@@ -90,19 +94,6 @@ class PoseError(PointResults):
     }
 
     summary = short_repr
-
-    @property
-    def _first(self) -> Numbers:
-        return self.supports
-
-    def __getitem__(self, rows: Any) -> "PoseError":
-        """One point, NaN, and why, where there is no solution; or some of them."""
-        own = [field.name for field in fields(self)][1:-1]
-        values = {name: getattr(self, name)[rows] for name in own}
-        if np.ndim(values["supports"]) == 0:
-            values["supports"] = int(values["supports"])
-            values["one_by_one"] = bool(values["one_by_one"])
-        return PoseError(self.reading, **values)
 
     @cached_property
     def unproved(self) -> Any:

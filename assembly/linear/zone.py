@@ -55,6 +55,7 @@ class Zone(PointResults):
     forces: NDArray
     reason: Any
 
+    AXES: ClassVar = {"margin": 0, "bound": 0, "method": 0, "forces": 1, "reason": 0}
     VARIABLES: ClassVar = {
         "margin": "margin",
         "margin_bound": "bound",
@@ -64,13 +65,10 @@ class Zone(PointResults):
 
     def __getitem__(self, rows: Any) -> "Zone":
         """One point, which raises where the solver failed; or some of them."""
-        margin, bound = self.margin[rows], self.bound[rows]
-        if np.ndim(margin) == 0:
-            if np.isnan(margin):
-                raise SolverFailed("least factor on the clearances", self.reason[rows])
-            margin, bound = float(margin), float(bound)
-        forces, reason = self.forces[rows], self.reason[rows]
-        return Zone(margin, bound, self.method[rows], forces, reason)
+        taken = super().__getitem__(rows)
+        if not taken.of_many and np.isnan(taken.margin):
+            raise SolverFailed("least factor on the clearances", taken.reason)
+        return taken
 
     @property
     def assemblable(self) -> Any:

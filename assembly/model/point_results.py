@@ -1,7 +1,7 @@
 """Results of one point, or of many with a leading axis in every array."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -16,39 +16,44 @@ if TYPE_CHECKING:
 Numbers = Any
 
 
-class PointResults(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class PointResults:
     """A result whose arrays have a leading axis where it is of many points.
 
     Attributes:
+        AXES: the fields that have one, and how many axes each has of one point; an
+            array with no more serves all points.
         VARIABLES: the array of each variable of the table of many points, by the names
             of :mod:`assembly.model.tables`.
     """
 
-    VARIABLES: ClassVar[dict[str, str]]
+    AXES: ClassVar[Mapping[str, int]]
+    VARIABLES: ClassVar[Mapping[str, str]]
 
     __repr__, _repr_html_ = short_repr, html_table
 
     @property
     def of_many(self) -> bool:
         """Whether there is a leading axis."""
-        return np.ndim(self._first) > 0
-
-    @property
-    def _first(self) -> Numbers:
-        """One of the numbers that every point has."""
-        return getattr(self, next(iter(self.VARIABLES.values())))
+        name, axes = next(iter(self.AXES.items()))
+        return np.ndim(getattr(self, name)) > axes
 
     def __len__(self) -> int:
         if not self.of_many:
             raise TypeError(f"{type(self).__name__} of one point has no length")
-        return len(self._first)
+        return len(getattr(self, next(iter(self.AXES))))
 
     def __bool__(self) -> bool:
         return True
 
-    @abstractmethod
     def __getitem__(self, rows: Any) -> Self:
         """One point, by a whole number; or some, by a slice, numbers or a mask."""
+        taken = {}
+        for name, axes in self.AXES.items():
+            values = getattr(self, name)
+            many = np.ndim(values) > axes
+            taken[name] = plain(values[rows]) if many else values
+        return replace(self, **taken)
 
     def __iter__(self) -> Iterator[Self]:
         return (self[i] for i in range(len(self)))
@@ -65,3 +70,10 @@ class PointResults(ABC):
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
+
+
+def plain(values: Any) -> Any:
+    """Arrays as they are; of one point the number itself."""
+    if isinstance(values, np.ndarray):
+        return values if values.ndim else values.item()
+    return values.item() if isinstance(values, np.generic) else values

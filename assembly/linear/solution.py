@@ -1,0 +1,217 @@
+"""The numbers of a least energy, of one point or of many, taken together or apart.
+
+What follows from them is :class:`assembly.linear.assembled.Assembly`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.kinematics.posture import Posture, together
+from assembly.linear.closure import Linearisation, VirtualJoints
+from assembly.linear.load import FrameLoads
+from assembly.model.point_results import Numbers, PointResults, plain
+
+# what may be known beside a solution: properties, and parts of its certificate
+KNOWN = (
+    "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
+    "_excess",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(PointResults):
+    """The numbers of a manipulator at least energy; or many, with a leading axis.
+
+    Attributes:
+        linearisation: the assembly constraints it satisfies; where it stands.
+        joints: what was allowed to move.
+        load: (..., 6) [N m, N] on the platform at its origin, base axes.
+        frame_loads: all loads, this one among them, on every small screw.
+        elastic: (..., ny) [sqrt(2 J)] scaled deformation of the springs.
+        clearances: (..., nu) clearances in units of their cones; of many NaN where the
+            bound of a passive joint's own motion is active, and ``[i]`` has more.
+        motions: (..., nq) [rad, m] free motions; NaN likewise.
+        multipliers: (..., 6 closures) of the scaled closure rows.
+        energy_without_clearance: (...) [J] least energy with all clearances at zero.
+        method: (...) which gave it: ``"compiled"``, or ``"reference"``, numpy and
+            Clarabel.
+        errors: (..., n, 6) [rad, m] geometric errors; the robot's if absent.
+        status: (...) ``"ok"``; of many also ``"cannot assemble"``, ``"no equilibrium"``
+            or ``"solver failed"``, also where its certificate falls short.
+        reason: (...) message where the status is not ok.
+        apart: of many those with other columns than ``joints``, or why there is none,
+            by their row.
+        held: of many the rows of those that bounds of passive joints' own motion hold,
+            in order, and these with all such bounds as cones.
+    """
+
+    linearisation: Linearisation
+    joints: VirtualJoints
+    load: NDArray
+    frame_loads: FrameLoads
+    elastic: NDArray
+    clearances: NDArray
+    motions: NDArray
+    multipliers: NDArray
+    energy_without_clearance: Numbers
+    method: Any
+    errors: Any = None
+    status: Any = "ok"
+    reason: Any = ""
+    apart: dict[int, Any] = field(default_factory=dict)
+    held: Any = None
+
+    AXES: ClassVar = {
+        "energy_without_clearance": 0, "method": 0, "status": 0, "reason": 0, "load": 1,
+        "elastic": 1, "clearances": 1, "motions": 1, "multipliers": 1, "errors": 2,
+    }  # fmt: skip
+    VARIABLES: ClassVar = {
+        "energy": "energy",
+        "duality_gap": "_gap",
+        "energy_without_play": "energy_without_clearance",
+        "platform_screw": "platform_screw",
+        "closure_residual": "_residual",
+        "clearance_excess": "_excess",
+        "method": "method",
+        "status": "status",
+        "reason": "reason",
+    }
+
+    @property
+    def posture(self) -> Posture:
+        """Where the robot stands nominally."""
+        return self.linearisation.posture
+
+    def __getitem__(self, rows: Any) -> Self:
+        """One of many, by a whole number, or why it has no solution; or some."""
+        if not isinstance(rows, (int, np.integer)):
+            return self._taken(np.arange(len(self))[rows])
+        i = range(len(self))[rows]
+        apart = self.apart.get(i)
+        if isinstance(apart, Exception):
+            raise apart.with_traceback(None)
+        if apart is not None:
+            return apart
+        if self.held is not None and i in self.held[0]:
+            return self.held[1][int(np.searchsorted(self.held[0], i))]
+        one = super().__getitem__(i)
+        lin, robot = self.linearisation, self.posture.robot
+        if self.posture.transforms.ndim > 3:
+            lin = replace(lin, posture=self.posture[i])
+        # one robot for all where the errors are its own: its columns are cached
+        if one.errors is not None and not np.array_equal(one.errors, robot.errors):
+            robot = robot.with_errors(one.errors)
+            lin = replace(lin, posture=replace(lin.posture, robot=robot))
+        alone = replace(
+            one, linearisation=lin, frame_loads=self.frame_loads[i], errors=None,
+            apart={}, held=None,
+        )  # fmt: skip
+        known = {name: vars(self)[name][i] for name in ("energy", "platform_screw")}
+        return with_known(alone, known)
+
+    def _taken(self, rows: NDArray) -> Self:
+        """Some of many, perhaps more than once."""
+        lin, held = self.linearisation, self.held
+        if self.posture.transforms.ndim > 3:
+            lin = replace(lin, posture=self.posture[rows])
+        if held is not None:
+            own = np.isin(rows, held[0])
+            held = np.flatnonzero(own), held[1][np.searchsorted(held[0], rows[own])]
+        apart = {
+            i: self.apart[k] for i, k in enumerate(rows.tolist()) if k in self.apart
+        }
+        taken = replace(
+            super().__getitem__(rows), linearisation=lin, apart=apart, held=held,
+            frame_loads=self.frame_loads[rows],
+        )  # fmt: skip
+        known = {k: vars(self)[k][rows] for k in KNOWN if k in vars(self)}
+        return with_known(taken, known)
+
+    def in_columns(self, joints: VirtualJoints) -> Self:
+        """Many with the columns of other virtual joints.
+
+        Args:
+            joints: those of some of the points apart.
+
+        Returns:
+            The same points; NaN for clearances and motions of all others.
+        """
+        parts = {
+            "elastic": joints.elastic, "clearances": joints.cones,
+            "motions": joints.free,
+        }  # fmt: skip
+        nu = joints.cones.shape[1]
+        rows: dict[str, Any] = {
+            name: np.full((len(self), columns.shape[1]), np.nan)
+            for name, columns in parts.items()
+        }
+        for i, one in self.apart.items():
+            if isinstance(one, Solution) and one.clearances.shape[-1] == nu:
+                for name, values in rows.items():
+                    values[i] = getattr(one, name)
+        if self.held is not None and self.held[1].clearances.shape[-1] == nu:
+            for name, values in rows.items():
+                values[self.held[0]] = getattr(self.held[1], name)
+        return with_known(replace(self, joints=joints, **rows), vars(self))
+
+    def with_held(
+        self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
+    ) -> Self:
+        """Many of which bounds of passive joints' own motion hold some.
+
+        Args:
+            rows: of those, in order.
+            joints: with all such bounds as cones.
+            parts: their ``clearances`` and ``motions`` in these.
+
+        Returns:
+            The same points.
+        """
+        some = self._taken(rows)
+        own = replace(
+            some, joints=joints, clearances=parts["clearances"],
+            motions=parts["motions"],
+        )  # fmt: skip
+        held = rows, with_known(own, vars(some))
+        return with_known(replace(self, held=held), vars(self))
+
+    @property
+    def as_many(self) -> Self:
+        """One point with a leading axis."""
+        lin = self.linearisation
+        many = replace(
+            self, linearisation=replace(lin, posture=together([lin.posture])),
+            elastic=self.elastic[None], clearances=self.clearances[None],
+            motions=self.motions[None], multipliers=self.multipliers[None],
+            energy_without_clearance=np.array([self.energy_without_clearance]),
+            method=np.array([self.method], dtype=object),
+            status=np.array([self.status], dtype=object),
+            reason=np.array([self.reason], dtype=object),
+        )  # fmt: skip
+        names = ("energy", "platform_screw")
+        known = {name: np.asarray(getattr(self, name))[None] for name in names}
+        return with_known(many, known)
+
+
+One = TypeVar("One", bound=Solution)
+
+
+def with_known(solution: One, known: Mapping[str, Any]) -> One:
+    """What is known already, and so not computed again when somebody asks.
+
+    Args:
+        solution: of one point or of many.
+        known: values by :data:`KNOWN`; others are ignored.
+
+    Returns:
+        The same object.
+    """
+    own = vars(solution)
+    for name in KNOWN:
+        if name in known:
+            own[name] = plain(known[name])
+    return solution

@@ -1,0 +1,89 @@
+"""Many least energies in one: some of them, each of them, and loads of each."""
+
+import numpy as np
+import pytest
+
+from assembly.kinematics.posture import home_posture
+from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from tests.robots_for_tests import coaxial_beams
+
+K = 1e6
+
+
+def pins(gaps):
+    """A spring that ends in a pin of 1e-4 m: errors along x and across it, a row each."""
+    frames = (
+        Frame("arm", translation=[0.5, 0, 0], link=MatrixLink(K * np.eye(6))),
+        Frame("pin", "arm", clearance=Clearance(radial=1e-4)),
+        Frame("end", "pin"),
+        Frame("wall", translation=[0.5, 0, 0]),
+    )
+    home = home_posture(Robot("pins", "end", frames, (("end", "wall"),)))
+    errors = np.zeros((len(gaps), 4, 6))
+    errors[:, 3, 3] = gaps
+    return home, errors
+
+
+def rigid_pins(gaps):
+    """The same without the spring: a gap beyond the clearance cannot be closed."""
+    home, errors = pins(gaps)
+    frames = (Frame("arm", translation=[0.5, 0, 0]), *home.robot.frames[1:])
+    robot = Robot("rigid", "end", frames, (("end", "wall"),))
+    return home_posture(robot), errors
+
+
+def test_many_loads_at_one_posture_are_a_row_each():
+    """Two springs side by side: F^2 / 4 K and F / 2 K, and no load no energy."""
+    forces = np.array([0.0, 10.0, -30.0])
+    loads = np.zeros((3, 6))
+    loads[:, 5] = forces
+    found = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (K, K))), loads)
+    assert found.energy == pytest.approx(forces**2 / (4 * K), rel=1e-12)
+    assert found.platform_screw[:, 5] == pytest.approx(forces / (2 * K), rel=1e-12)
+    assert found.loaded.tolist() == [False, True, True]
+    assert found[2].load.tolist() == loads[2].tolist()
+
+
+def test_a_load_and_gravity_of_each_posture_add_up(rng):
+    """Linear in the loads where nothing has clearance: superposition, row by row."""
+    home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))
+    load, gravity = rng.normal(size=(4, 6)), rng.normal(size=(4, 3))
+    both = solve_assembly([home] * 4, load, gravity=gravity)
+    apart = (
+        solve_assembly([home] * 4, load), solve_assembly([home] * 4, gravity=gravity)
+    )  # fmt: skip
+    whole = sum(one.platform_screw for one in apart)
+    assert both.platform_screw == pytest.approx(whole, rel=1e-12, abs=1e-20)
+
+
+def test_some_of_many_are_taken_by_mask_slice_and_numbers_more_than_once():
+    """By hand: K (gap - 1e-4)^2 / 2 beyond the clearance."""
+    gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])
+    home, errors = pins(gaps)
+    many = solve_assembly(home, errors=errors)
+    by_hand = K * np.maximum(gaps - 1e-4, 0.0) ** 2 / 2
+    assert many.energy == pytest.approx(by_hand, rel=1e-6, abs=1e-15)
+    for rows in (gaps > 1e-4, slice(1, 3), [2, 2, 0]):
+        some = many[rows]
+        assert some.energy.tolist() == many.energy[rows].tolist()
+        assert np.array_equal(some.wrenches, many.wrenches[rows])
+        assert np.array_equal(some[0].wrenches, some.wrenches[0])
+
+
+def test_a_point_without_solution_is_so_wherever_it_is_taken():
+    home, errors = rigid_pins(np.array([0.5e-4, 2e-4, 0.1e-4]))
+    many = solve_assembly(home, errors=errors)
+    assert many.status.tolist() == ["ok", "cannot assemble", "ok"]
+    twice = many[[1, 0, 1]]
+    for some, i in ((many, 1), (twice, 0), (twice, 2)):
+        assert np.isnan(some.energy[i])
+        with pytest.raises(CannotAssemble, match="no clearance within its bounds"):
+            some[i]
+    assert twice[1].energy == many[0].energy == 0.0
+
+
+def test_one_point_has_no_length():
+    home, _ = pins([0.0])
+    with pytest.raises(TypeError, match="Assembly of one point has no length"):
+        len(solve_assembly(home))
