@@ -4,10 +4,10 @@ from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
 from assembly.exchange.robot_files import load_robot, read_robot, write_robot
 from assembly.kinematics.closing import preloaded, rest_in
+from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture, home_posture, place_robot
 from assembly.kinematics.singular_posture import is_singular
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
-from assembly.linear.mobility import mobility
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import read_sources

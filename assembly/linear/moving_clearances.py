@@ -65,7 +65,9 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         "supports": np.zeros(count, np.int64),
     }
     outcome = np.full(count, COMPILED, np.int64)
-    left = (assembly.status != "ok") | assembly.loaded
+    left = assembly.status != "ok"
+    if assembly.frame_loads:
+        left |= assembly.loaded
     left[list(assembly.apart)] = True
     left |= ~np.isfinite(assembly.clearances).all(axis=1)
     outcome[left] = REFERENCE
@@ -85,12 +87,10 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         np.ascontiguousarray(assembly.clearances[:, places.columns]),
         motions,
     )
-    loads = tuple(
-        np.require(array, requirements=["C", "W"])
-        for array in (
-            solution.multipliers, solution.clearances, solution.energy,
-            solution.energy_without_clearance, places.cone_of,
-        )
+    loads = (
+        np.require(solution.multipliers, requirements=["C", "W"]),
+        np.require(solution.clearances, requirements=["C", "W"]),
+        solution.energy, solution.energy_without_clearance, places.cone_of,
     )  # fmt: skip
     T = assembly.posture.transforms
     T = T.copy() if T.ndim > 3 else np.repeat(T[None], count, axis=0)

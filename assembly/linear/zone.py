@@ -24,6 +24,7 @@ from assembly.model.clearance import Compliant
 from assembly.model.point_results import Numbers, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
+from forcefit.inputs.display import Figures
 
 MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
 _GAP_ABSOLUTE = 1e-12  # .. plus this
@@ -62,6 +63,16 @@ class Zone(PointResults):
         "method": "method",
         "reason": "unproved",
     }
+
+    def _figures(self) -> Figures:
+        """The margin, or the largest there is."""
+        if not self.of_many:
+            margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
+            return {"margin": margin, "bound": bound, "method": self.method}
+        largest = self.margin[np.isfinite(self.margin)].max(initial=0.0)
+        inside = np.count_nonzero(self.assemblable)
+        points = f"{len(self)}, {inside} assemble rigidly"
+        return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
 
     def __getitem__(self, rows: Any) -> "Zone":
         """One point, which raises where the solver failed; or some of them."""

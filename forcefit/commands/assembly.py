@@ -225,9 +225,9 @@ def show(
 ) -> None:
     """Plot the nominal and the forced robot, and its errors."""
     from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-    from assembly.report.error_body import PARTS
     from assembly.linear.reference.pose_error import READINGS
     from assembly.linear.reference.reduction import FreeMotion
+    from assembly.report.error_body import PARTS
     from assembly.report.plot import plot_assembly
     from assembly.report.results import remark_lines
     from assembly.solvers.conic import SolverFailed

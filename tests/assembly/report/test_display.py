@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.kinematics.singularity import find_singularities
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.zone import zone_margin
+from assembly.model.robot import Clearance
 from assembly.report.results import solution_of, solution_text
 from forcefit.inputs.display import brief, html_table, short_repr
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import round_section
 from stiffness.link import LinkStiffness
-from tests.robots_for_tests import NUMBERS, irsbot2_with
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 from validation.campaign.campaign_file import read_campaign
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
@@ -75,6 +76,22 @@ def test_an_assembly_shows_what_the_command_prints(answer):
         (said,) = re.findall(rf"^{name}: (.*)$", printed, flags=re.M)
         assert f"{name:14}  {said}\n" in answer.summary()
     assert answer.summary() == repr(answer)
+
+
+def test_many_points_show_how_many_and_the_largest():
+    """Gap over play is 1, 2 and 4."""
+    play = Clearance(axial=1e-5, radial=1e-5)
+    at = home_posture(coaxial_beams(np.zeros(6), clearance=play))
+    errors = np.zeros((3, 6, 6))
+    errors[:, 2, 5] = [1e-5, 2e-5, 4e-5]
+    zones = zone_margin(at, errors=errors)
+    assert repr(zones) == (
+        "Zone\n  points  3, 1 assemble rigidly\n  margin  at most 4 where there is one"
+    )
+    bounds = bound_pose_error(solve_assembly(at, errors=errors))
+    assert "points       3, 3 bounded" in repr(bounds)
+    low, high = bounds.translation_error.max(axis=0)
+    assert f"translation  {1e3 * low:.6g} to {1e3 * high:.6g} mm" in repr(bounds)
 
 
 def test_the_largest_force_and_error_are_those_of_the_arrays(answer):
