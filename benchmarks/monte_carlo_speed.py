@@ -2,7 +2,7 @@
 
 The paper's robot, every delta l of its section IV drawn: uniform, random signs, sizes
 up to a share of the paper's.  Printed for each share: how many of the draws cost
-nothing, how many were certified and how many needed the fallback; draws per second of
+nothing, how many were certified and how many needed the reference; draws per second of
 processor time and what 1e7 would take on two cores at that rate, which other work on
 the machine does not blur; and draws per second of the clock on two threads.
 ``python benchmarks/monte_carlo_speed.py [DRAWS]``.

@@ -281,7 +281,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
         f"\nthe study, {len(at.transforms)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "
         f"{done - solved:.2f}); widest bracket {widest:.1e}, "
-        f"{energies.certified.mean():.0%} of energies certified, {slow} by fallbacks"
+        f"{energies.certified.mean():.0%} of energies certified, {slow} in numpy"
     )
 
 

@@ -36,7 +36,7 @@ from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import LinearResponse, linear_response
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.posture_margins import prepare_margins
+from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.scenes import drawn_robot, margin_map, tightest_robot
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.tolerances import present_errors, present_text
@@ -85,8 +85,7 @@ def at_once(name: str, nudge: float) -> Any:
     return {
         "alone": drawn(linear_response(posture), errors),
         "loaded": drawn(linear_response(posture, load, gravity), errors),
-        "free": prepare_margins(posture, "free").solve(errors),
-        "rigid": prepare_margins(posture, "rigid").solve(errors),
+        **{r: margins(prepare_margins(posture, r), errors) for r in ("free", "rigid")},
     }
 
 
@@ -96,6 +95,13 @@ def drawn(response: LinearResponse, errors: NDArray) -> dict[str, Any]:
     names = ("energy", "clearances", "multipliers", "platform_screw", "method")
     own = {name: getattr(found, name) for name in names}
     return own | {"bound": found.energy - found.duality_gap()}
+
+
+def margins(prepared: PostureMargins, errors: NDArray) -> dict[str, Any]:
+    """The same of margins."""
+    found = prepared.solve(errors)
+    own = {name: getattr(found, name) for name in ("margin", "bound", "method")}
+    return own | {"slopes": prepared.slopes(found)}
 
 
 def pressed(robot: Robot) -> Robot:

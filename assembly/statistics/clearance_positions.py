@@ -162,7 +162,7 @@ def _at_contact(
     directions = wrenches @ prepared.screws[:, : clearances.shape[1]]
     ends = move_to_contact(rows, prepared.starts, free, clearances, directions)
     for k in np.flatnonzero(np.isnan(ends).any(axis=1)).tolist():
-        ends[k] = _contact_fallback(prepared, rows, free, clearances[k], directions[k])
+        ends[k] = _at_contact_alone(prepared, rows, free, clearances[k], directions[k])
     return ends
 
 
@@ -172,7 +172,7 @@ def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
-def _contact_fallback(
+def _at_contact_alone(
     prepared: LinearResponse,
     rows: NDArray,
     free: NDArray,

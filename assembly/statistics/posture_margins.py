@@ -14,31 +14,12 @@ from assembly.kinematics.posture import Posture
 from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reference.reduction import complement, reduce_problem
-from assembly.linear.zone import zone_margin
+from assembly.linear.zone import Zone, zone_margin
 from assembly.model.clearance import Compliant
 from assembly.solvers.cones import cone_starts
 from assembly.statistics.linear_response import checked_errors
 
 _CLEARLY_INFEASIBLE = 1e-10  # [rad, reference lengths] where nothing closes the errors
-
-
-@dataclass(frozen=True, eq=False)
-class DrawMargins:
-    """Zone margins of k draws at one posture.
-
-    Attributes:
-        margin: (k,) factor on all clearances at which it just assembles; inf where
-            none does, NaN where the solver failed.
-        bound: (k,) certified lower bound.
-        slopes: (k, n, 6) [1/rad, 1/m] how the margin grows with each error, where it is
-            inf that of what clearances close; NaN where the reference solved.
-        fallback: (k,) bool, solved by :mod:`assembly.linear.reference`.
-    """
-
-    margin: NDArray
-    bound: NDArray
-    slopes: NDArray
-    fallback: NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +42,15 @@ class PostureMargins:
     infeasible: NDArray
     compliant: Compliant
 
-    def solve(self, errors: ArrayLike) -> DrawMargins:
+    def solve(self, errors: ArrayLike) -> Zone:
         """Margins of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
 
         Returns:
-            Margins with their certificates and slopes.
+            Margins with their certificates; where no factor closes the errors, the
+            forces are those of what clearances close.
 
         Raises:
             ValueError: the shape does not fit the robot, or a value is not finite.
@@ -76,16 +58,26 @@ class PostureMargins:
         errors = checked_errors(errors, len(self.posture.robot.frames))
         left = errors.reshape(len(errors), -1) @ self.infeasible.T
         no_factor = np.abs(left).max(axis=1, initial=0.0) > _CLEARLY_INFEASIBLE
-        if no_factor.any():  # slopes are those of what clearances close
+        if no_factor.any():
             both = np.linalg.pinv(np.vstack([self.K, self.infeasible]))
             open_ = left[no_factor] @ both[:, len(self.K) :].T
             errors = errors.copy()
             errors[no_factor] -= open_.reshape(-1, *errors.shape[1:])
         found = zone_margin(self.posture, self.compliant, errors)
         found.margin[no_factor] = found.bound[no_factor] = np.inf
-        slopes = (found.forces @ self.B.T @ self.K).reshape(errors.shape)
-        again = (found.method == "reference") & ~no_factor
-        return DrawMargins(found.margin, found.bound, slopes, again)
+        return found
+
+    def slopes(self, zone: Zone) -> NDArray:
+        """How margins grow with each error.
+
+        Args:
+            zone: of k draws, by :meth:`solve`.
+
+        Returns:
+            (k, n, 6) [1/rad, 1/m]; NaN where the reference solved.
+        """
+        slopes = zone.forces @ self.B.T @ self.K
+        return slopes.reshape(len(slopes), -1, 6)
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:

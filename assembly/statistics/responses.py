@@ -47,7 +47,8 @@ def respond(
     errors = sources.errors(values)
     if isinstance(prepared, PostureMargins):
         margins = prepared.solve(errors)
-        return margins.margin, margins.slopes[:, sources.frame, sources.component]
+        slopes = prepared.slopes(margins)
+        return margins.margin, slopes[:, sources.frame, sources.component]
     draws = prepared.solve(errors)
     wrenches = draws.wrenches
     if key == "energy":

@@ -103,18 +103,16 @@ def present_errors(
         The margins, the largest and where; the factor on all errors at which it is 1;
         slopes of the margin and of the energy there, by error, the steepest first.
     """
-    margins = []
+    prepared, zones = [], []
     for i, posture in enumerate(postures):
-        margins_there = prepare_margins(posture, compliant).solve(
-            posture.robot.errors[None]
-        )
-        margins.append(margins_there)
+        prepared.append(prepare_margins(posture, compliant))
+        zones.append(prepared[i].solve(posture.robot.errors[None]))
         progress(i + 1, len(postures))
-    values = np.array([m.margin[0] for m in margins])
+    values = np.array([zone.margin[0] for zone in zones])
     worst = int(np.nanargmax(values))
     posture, margin = postures[worst], float(values[worst])
     robot = posture.robot
-    slopes = margins[worst].slopes[0]
+    slopes = prepared[worst].slopes(zones[worst])[0]
     try:
         assembly = solve_assembly(posture)
         energy, energies = assembly.energy, energy_slopes(assembly)

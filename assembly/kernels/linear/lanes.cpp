@@ -14,10 +14,10 @@ void bound_all(
     ReachableSets sets(robot, points, centres, loads, asked.offset);
     std::vector<int64_t> left;
     for (int64_t i = 0; i < points.count; ++i)
-        if (out.outcome[i] == SOLVED) left.push_back(i);
+        if (out.outcome[i] == COMPILED) left.push_back(i);
     const auto settle = [&](const Search &search, bool solved) {
         const int64_t i = search.body->point, half = search.half / 3;
-        if (!solved) out.outcome[i] = FALLBACK;
+        if (!solved) out.outcome[i] = REFERENCE;
         out.supports[i] += search.supports;
         out.bounds[half][2 * i] = search.low, out.bounds[half][2 * i + 1] = search.high;
         std::copy(search.best, search.best + 6, out.screw[half] + 6 * i);

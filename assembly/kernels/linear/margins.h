@@ -10,7 +10,7 @@ namespace LANE_SPACE {
 // assembly/kinematics/ranks.py
 constexpr double INFEASIBLE = 1e-13;
 // assembly/linear/lanes.py: COMPILED, REFERENCE
-enum { SOLVED, FALLBACK };
+enum { COMPILED, REFERENCE };
 
 // Solves blocks of points of one robot, one after the other.
 class ZoneMargins : public Rows {
@@ -53,7 +53,7 @@ inline Whole ZoneMargins::margins(
         block.write(out.margin, 1, 0, margin, where);
         block.write(out.bound, 1, 0, bound, where);
         for (int l = 0; l < LANES; ++l)
-            if (where[l]) out.outcome[block.point[l]] = proved[l] ? SOLVED : FALLBACK;
+            if (where[l]) out.outcome[block.point[l]] = proved[l] ? COMPILED : REFERENCE;
         return ~where;
     };
     const Real unknown = real(NAN);

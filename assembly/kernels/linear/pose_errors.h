@@ -170,7 +170,7 @@ inline Whole ReachableSets::read_bodies(
     int64_t *outcome) {
     const auto leave = [&](Whole where) {
         for (int l = 0; l < LANES; ++l)
-            if (where[l]) outcome[block.point[l]] = FALLBACK;
+            if (where[l]) outcome[block.point[l]] = REFERENCE;
         return ~where;
     };
     Whole others = asked;

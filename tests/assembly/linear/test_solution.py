@@ -12,7 +12,7 @@ K = 1e6
 
 
 def pins(gaps):
-    """A spring that ends in a pin of 1e-4 m: errors along x and across it, a row each."""
+    """A spring that ends in a pin of 1e-4 m, and a gap along x in each row."""
     frames = (
         Frame("arm", translation=[0.5, 0, 0], link=MatrixLink(K * np.eye(6))),
         Frame("pin", "arm", clearance=Clearance(radial=1e-4)),

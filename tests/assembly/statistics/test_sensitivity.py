@@ -56,7 +56,8 @@ def test_margin_slopes_of_the_papers_robot(pose, compliant, rng):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     errors = some_errors(robot, rng)
-    slopes = prepare_margins(posture, compliant).solve(errors[None]).slopes[0]
+    ready = prepare_margins(posture, compliant)
+    slopes = ready.slopes(ready.solve(errors[None]))[0]
     for _ in range(8):
         step = 1e-4 * some_errors(robot, rng)
         above, below = (
@@ -90,9 +91,10 @@ def test_slopes_of_random_robots(seed):
 
 def test_errors_that_nothing_decides_have_no_slopes():
     robot = load_robot("hexapod")  # mobile in every direction: margin 0, slopes 0
-    margins = prepare_margins(place_robot(robot), "free").solve(robot.errors[None])
+    ready = prepare_margins(place_robot(robot), "free")
+    margins = ready.solve(robot.errors[None])
     assert margins.margin == 0.0
-    assert not margins.slopes.any()
+    assert not ready.slopes(margins).any()
 
 
 @pytest.mark.parametrize("seed", range(25))
