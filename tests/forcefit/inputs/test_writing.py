@@ -38,6 +38,7 @@ _MAY = {
     "stiffness/mesh/mesh.py",  # its cache through whole_file; the mesher's scratch
     "stiffness/mesh/mesh_worker.py",  # likewise
     "stiffness/surface/surface_worker.py",  # a temporary folder
+    "assembly/files/stored_solutions.py",  # through whole_file
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "forcefit/commands/assembly.py",  # pixels of a screenshot
     "forcefit/page/page.py",  # into memory
