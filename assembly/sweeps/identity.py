@@ -31,7 +31,7 @@ _LIBRARIES = ("numpy", "scipy", "clarabel")
 def program_hash() -> str:
     """SHA-256 of the program's sources and of the versions of its libraries."""
     packages = forcefit.inputs, stiffness, assembly
-    own = sources_hash(packages, ("forcefit", *_LIBRARIES))
+    own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
