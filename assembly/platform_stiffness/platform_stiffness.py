@@ -44,8 +44,8 @@ def platform_stiffness(
         side: of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
         method: of :func:`assembly.linear.energy.solve_assembly`, state
-            ``"in contact"``; the classical model is numpy alone at one posture, and
-            the exact one has the method ``"compiled"`` only.
+            ``"in contact"``, or of :func:`assembly.exact.exact.solve_exact`; the
+            classical model is numpy alone at one posture.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes.
@@ -55,7 +55,7 @@ def platform_stiffness(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
         BadInput: a point or a load that is no number.
-        ValueError: no such state, side or method, or not the method of this state.
+        ValueError: no such state, side or method.
     """
     check_method(method)
     offset = numbers_of("at", at, 3, "m")
@@ -69,9 +69,7 @@ def platform_stiffness(
         linear = solve_assembly(posture, load, gravity=gravity, method=method)
         tangent, platform = in_contact(linear, side), posture.platform
     elif state == "exact":
-        if method == "reference":
-            raise ValueError("platform_stiffness: state 'exact' has no reference")
-        exact = solve_exact(posture, load, gravity=gravity)
+        exact = solve_exact(posture, load, gravity=gravity, method=method)
         tangent, platform = exact_tangent(exact, side), exact.placement.platform
     else:
         raise ValueError(f"platform_stiffness: no state {state!r}")
