@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-import forcefit as ff
-
 ROOT = Path(__file__).parents[1]
 RULES = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
 NEXT = RULES["setuptools_scm"]["fallback_version"].removesuffix(".dev0")
@@ -82,8 +80,3 @@ def test_a_tag_is_the_version_and_commits_after_it_lead_to_the_next(repository):
     changed = repository / "pyproject.toml"
     changed.write_text(changed.read_text("utf-8") + "\n", encoding="utf-8")
     assert ".d20" in version(repository)
-
-
-def test_the_program_says_the_version_that_was_installed(run):
-    done, out, _ = run("--version")
-    assert (done, out) == (0, f"forcefit {ff.__version__}\n")
