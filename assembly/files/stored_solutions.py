@@ -7,6 +7,8 @@ written whole or not at all; one that cannot be used counts as absent.
 import hashlib
 import io
 import json
+import os
+import time
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import fields, is_dataclass, replace
@@ -30,6 +32,7 @@ from forcefit.inputs.writing import whole_file
 # they read surfaces, make meshes and solve: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
+_UNUSED = 90 * 86_400  # [s] since a solution was read or written: it is removed
 
 
 def solution_key(link: MeshLink, digest: str, options: object) -> str:
@@ -108,7 +111,11 @@ def _read(path: Path, key: str) -> MeshSolution | None:
             solution = _decoded(content["solution"], stored)
     except Exception:  # NumPy, zipfile and json raise a dozen kinds of it
         return None
-    return solution if isinstance(solution, MeshSolution) else None
+    if not isinstance(solution, MeshSolution):
+        return None
+    with suppress(OSError):
+        os.utime(path)
+    return solution
 
 
 def _write(path: Path, key: str, solution: MeshSolution) -> None:
@@ -119,8 +126,16 @@ def _write(path: Path, key: str, solution: MeshSolution) -> None:
     try:
         with whole_file(path) as part, part.open("wb") as file:
             np.savez(file, content=np.array(content), **named)
+        _remove_unused(path.parent)
     except (OSError, BadInput):
         return
+
+
+def _remove_unused(folder: Path) -> None:
+    """Remove solutions that were not used for long, as those of older programs."""
+    for path in folder.glob("link-*.npz"):
+        if time.time() - path.stat().st_mtime > _UNUSED:
+            path.unlink()
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:

@@ -1,7 +1,9 @@
 """Solutions of mesh links on disk: the same bits, and only for the same question."""
 
+import os
 import subprocess
 import sys
+import time
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -244,6 +246,23 @@ def test_a_folder_that_cannot_be_written_changes_no_answer(
     monkeypatch.setattr(stored_solutions, "cache_folder", lambda: None)
     assert_same(solved_link(frame(surface)).solution, solved_once[1])
     assert len(runs) == 2
+
+
+def test_solutions_that_were_not_used_for_months_are_removed(surface, cache, runs):
+    file = stored_file(cache)
+    months_ago = time.time() - 100 * 86_400
+    mesh = cache / "mesh-of-old.npz"
+    for old in (cache / "link-of-old.npz", file, mesh):
+        old.touch()
+        os.utime(old, (months_ago, months_ago))
+    solved_link(frame(surface))  # reads, which counts as use
+    assert not runs
+    assert time.time() - file.stat().st_mtime < 86_400
+    solved_link(frame(surface, young=7e10))
+    kept = {path.name for path in cache.glob("link-*")}
+    assert file.name in kept
+    assert len(kept) == 2
+    assert mesh.exists()
 
 
 def test_what_is_refused_stays_refused_and_leaves_nothing_behind(surface, cache):
