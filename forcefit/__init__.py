@@ -131,7 +131,7 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    """Of the installed package, whose one source is pyproject.toml."""
+    """Of the installed package: the last tag and the commits since, when installed."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.cones import cone_sizes
 from assembly.solvers.conic import minimise_energy
+from assembly.solvers.method import Method
 
 AT_BOUNDARY = 1e-5  # [-] below size 1 within which a cone may be active
 _STEPS = 15  # of Newton's method on the active boundaries
@@ -88,49 +89,51 @@ def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
 
 
 def clearance_step(
-    problem: ClearanceProblem, near: bool
+    problem: ClearanceProblem, near: bool, method: Method = "compiled"
 ) -> tuple[NDArray, NDArray] | None:
     """Change of the clearances that minimises the quadratic energy within the cones.
 
     Args:
         problem: the quadratic problem.
         near: whether the solution is near enough for Newton's method to be tried.
+        method: of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances
         within the cones satisfy them.
     """
     step = _newton(problem) if near else None
-    return step or _convex(problem)
+    return step or _convex(problem, method)
 
 
-def _convex(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
+def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
     """The step with S made convex, first without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
-        return _conic(p, p.S, p.s)
+        return _conic(p, p.S, p.s, method)
     # f (|u_k|^2 - 1) / 2 vanishes at the boundary, and normal to it nothing moves to
     # first order: both make S convex where needed, and leave the minimum where it is
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
-    step = _conic(p, convex, p.s + held * p.start)
+    step = _conic(p, convex, p.s + held * p.start, method)
     if step is None:
         return None
     inside = cone_sizes(p.start + step[0], p.group) < 0.999
-    return _conic(p, p.S, p.s) if active[inside[p.group]].any() else step
+    free = active[inside[p.group]].any()
+    return _conic(p, p.S, p.s, method) if free else step
 
 
 def _conic(
-    p: ClearanceProblem, S: NDArray, s: NDArray
+    p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
     """The step of the conic solver; negative curvature is replaced by almost none."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
-    least = minimise_energy(G, -G @ p.start, -s, p.rows, p.right, p.group)
+    least = minimise_energy(G, -G @ p.start, -s, p.rows, p.right, p.group, method)
     if not least.feasible:
         return None
     return least.clearances - p.start, least.rigid_multipliers

@@ -45,6 +45,7 @@ from assembly.exact.placement import Placement, place
 from assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import SolverFailed
+from assembly.solvers.method import Method
 from forcefit.inputs.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
@@ -208,7 +209,10 @@ def potential(at: Placement, loads: DeadLoads) -> float:
     return energy_of(at) - work_of(at, loads)
 
 
-def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Step:
+def advance(
+    local: Expansion, penalty: float, damping: float, near: bool,
+    method: Method = "compiled",
+) -> Step:  # fmt: skip
     """A step that lowers energy plus penalty.
 
     Args:
@@ -216,6 +220,7 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
         penalty: [N m] on the norm of the scaled residual; more than the multipliers'.
         damping: [J/rad^2] of the last step.
         near: whether Newton's method is tried for the clearances.
+        method: of :func:`assembly.exact.contact_qp.clearance_step`.
 
     Returns:
         The step.
@@ -235,7 +240,7 @@ def advance(local: Expansion, penalty: float, damping: float, near: bool) -> Ste
     for attempt in range(_ATTEMPTS):
         # a refused Newton step is followed by the conic one before either is damped
         newton = near and attempt != 1
-        step = _solve(local, damping + _LEAST_DAMPING * least, newton)
+        step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
             after = potential(step.placement, local.loads)
             after += penalty * float(np.linalg.norm(step.placement.residual))
@@ -259,7 +264,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
     return f"exact equilibrium of {at.model.posture.robot.name}{under}"
 
 
-def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
+def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
     """The expansion's minimum; None where it has none."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
@@ -282,7 +287,7 @@ def _solve(local: Expansion, damping: float, near: bool) -> Step | None:
         rows=local.rigid_rows,
         right=local.rigid_right,
     )
-    step = clearance_step(problem, near)
+    step = clearance_step(problem, near, method)
     if step is None:
         status = "no clearance within its bounds closes what no spring can"
         raise NotConverged(problem_name(at, local.loads), status)

@@ -66,6 +66,7 @@ from assembly.model.clearance import (
     has_bounded_motion,
 )
 from assembly.solvers.cones import into_cones
+from assembly.solvers.method import Method, check_method
 from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
 from stiffness.screws import rotation_matrix, screw_map, transform
 
@@ -113,6 +114,8 @@ class ExactAssembly:
         expansion: of the problem here, with the multipliers of the scaled closures.
         stationarity: [-] largest imbalance of any unknown, relative to what acts on it.
         iterations: steps taken.
+        method: of all cone programmes on the way: ``"compiled"``, where in doubt
+            Clarabel solves them; or ``"reference"``, numpy and Clarabel alone.
     """
 
     whole: Posture
@@ -121,6 +124,7 @@ class ExactAssembly:
     expansion: Expansion
     stationarity: float
     iterations: int
+    method: Method
 
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
@@ -300,6 +304,7 @@ def solve_exact(
     point: ArrayLike = (0.0, 0.0, 0.0),
     near: ExactAssembly | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
+    method: Method = "compiled",
 ) -> ExactAssembly:
     """Close a manipulator at least energy with finite motions, from the linear model.
 
@@ -316,6 +321,8 @@ def solve_exact(
         near: an equilibrium of the same posture under another load, from which to
             start instead.
         progress: called with the steps taken and how many there may be.
+        method: of the linear solution and of every step: ``"compiled"``, in doubt
+            Clarabel, or ``"reference"``, numpy and Clarabel alone.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.
@@ -324,8 +331,12 @@ def solve_exact(
         CannotAssemble: the linear model has no solution to start from.
         FreeMotion: a load drives a motion that nothing resists.
         NotConverged: there is no equilibrium nearby; a :class:`SolverFailed`.
-        ValueError: ``start`` belongs to another posture or other loads.
+        ValueError: ``start`` belongs to another posture or other loads; ``start`` or
+            ``near`` is not the reference's, which is asked for; no such method.
     """
+    check_method(method)
+    if method == "reference":
+        _refuse_compiled(start, near)
     cut = cut_beams(posture.robot)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     wrench[:3] += np.cross(posture.platform[:3, :3] @ np.asarray(point), wrench[3:])
@@ -342,19 +353,28 @@ def solve_exact(
         bodies = None if bodies is None else cut.spread(np.asarray(bodies))
     loads = dead_loads(placed, load, bodies, gravity, point)
     if start is None:
-        start = solve_assembly(placed, wrench, bodies, gravity)
+        start = solve_assembly(placed, wrench, bodies, gravity, method=method)
 
     def search(joints: VirtualJoints) -> ExactAssembly:
         known = near is not None and len(near.placement.x) == _count(joints)
         first = near.placement.x if near is not None and known else None
-        found = _search(joints, start, loads, first, progress)
-        return ExactAssembly(posture, cut, start, *found)
+        found = _search(joints, start, loads, first, progress, method)
+        return ExactAssembly(posture, cut, start, *found, method)
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
         # the bound of a passive joint's own motion was left out, but it is active
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
+
+
+def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
+    """Refuse to begin the reference's steps where a compiled method ended."""
+    if any(start is not None and start.method != "reference" for start in starts):
+        raise ValueError(
+            "solve_exact: start or near is a compiled answer, expected one of method "
+            "'reference'; leave it out to have it computed"
+        )
 
 
 def _count(joints: VirtualJoints) -> int:
@@ -364,7 +384,7 @@ def _count(joints: VirtualJoints) -> int:
 
 def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
     """Step after step from a first guess; where it ends, imbalance and count."""
     model = FiniteRobot(linear.posture, joints)
@@ -375,7 +395,7 @@ def _search(
         progress(count, _STEPS)
         local = expand(current, loads, rigid)
         penalty = max(penalty, 2.0 * float(np.linalg.norm(local.multipliers)))
-        step = advance(local, penalty, damping, near)
+        step = advance(local, penalty, damping, near, method)
         current, rigid, damping = step.placement, step.rigid, step.damping
         scale = max(_energy_scale(current, linear, loads), local.small_energy)
         near = step.decrement <= _NEAR * scale

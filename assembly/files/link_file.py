@@ -1,6 +1,5 @@
 """The ``link`` table of a robot file, read and written: the elasticity of a body."""
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from assembly.model.robot import (
     MeshLink,
 )
 from forcefit.inputs.table import Table, describe, quoted
+from forcefit.inputs.writing import path_from
 from stiffness.surface.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] below that of any machine
@@ -264,7 +264,4 @@ def _from(folder: Path | None, path: Path) -> str:
     """A path relative to the new file's folder."""
     if folder is None or path.is_absolute():
         return str(path)
-    try:
-        return os.path.relpath(path.resolve(), folder.resolve())
-    except ValueError:  # another drive
-        return str(path.resolve())
+    return path_from(folder.resolve(), path.resolve())

@@ -1,7 +1,6 @@
 """Robot files read and written (``docs/robot_files.md``), every rule checked."""
 
 import math
-import os.path
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from forcefit.inputs.table import (
     quoted,
     read_toml,
 )
-from forcefit.inputs.writing import ROBOT_MARK, write_text
+from forcefit.inputs.writing import ROBOT_MARK, path_from, write_text
 from stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
@@ -365,8 +364,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         table["diagnosis"] = dict(robot.diagnosis)
         path = table["diagnosis"].get("covariance")
         if path and folder is not None:
-            relative = os.path.relpath(path, folder.resolve())
-            table["diagnosis"]["covariance"] = relative
+            table["diagnosis"]["covariance"] = path_from(folder.resolve(), path)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
     if robot.closures:
         table["closure"] = [{"frames": list(pair)} for pair in robot.closures]

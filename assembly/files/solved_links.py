@@ -8,10 +8,12 @@ import hashlib
 import logging
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.files.stored_solutions import solution_key, stored_solution
 from assembly.model.frame import between_origins
 from assembly.model.link_kinds import MeshSolution
 from assembly.model.mesh_link import mesh_turn
@@ -19,9 +21,12 @@ from assembly.model.robot import Frame, LibraryLink, Link, MeshLink, Robot
 from forcefit.inputs.table import BadInput, quoted
 from stiffness.beam.beam import section_axes
 
+if TYPE_CHECKING:
+    from stiffness.fem.fea import FemOptions, MeshedLink
+
 _LOG = logging.getLogger(__name__)
 # of this process: links of one shape and material are solved once
-_SOLVED: dict[tuple[object, ...], MeshSolution] = {}
+_SOLVED: dict[str, MeshSolution] = {}
 
 
 def solve_links(robot: Robot) -> Robot:
@@ -87,21 +92,26 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
     """The finite elements of a mesh link; those of this process are kept."""
+    from stiffness.fem.fea import FemOptions
     from stiffness.surface.surface_files import named_solid
 
     digest = _digest(named_solid(link.surface)[0])
-    key = (digest, repr(replace(link, up=None, frame_up=None, axis=None)), accuracy)
-    if key in _SOLVED:
-        base, tip = _SOLVED[key].solved.centers
-        _check_place(frame, link, tip - base)
-    else:
-        _SOLVED[key] = _solve(frame, link, accuracy, digest)
+    options = FemOptions(accuracy, link.interface)
+    key = solution_key(link, digest, options)
+    if key not in _SOLVED:
+        _SOLVED[key] = stored_solution(
+            key, lambda: _solve(frame, link, digest, options)
+        )
+    base, tip = _SOLVED[key].solved.centers
+    _check_place(frame, link, tip - base)
     return _SOLVED[key]
 
 
-def _solve(frame: Frame, link: MeshLink, accuracy: float, digest: str) -> MeshSolution:
+def _solve(
+    frame: Frame, link: MeshLink, digest: str, options: "FemOptions"
+) -> MeshSolution:
     """Mesh a link's surface and solve it by finite elements."""
-    from stiffness.fem.fea import FemOptions, interface_center, solve_link
+    from stiffness.fem.fea import interface_center, solve_link
     from stiffness.fem.material import Material
     from stiffness.fem.part_text import parse_part
     from stiffness.fem.two_ends import two_ends
@@ -115,11 +125,16 @@ def _solve(frame: Frame, link: MeshLink, accuracy: float, digest: str) -> MeshSo
     _check_place(frame, link, tip - base)  # before the finite elements
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
-    options = FemOptions(accuracy, link.interface)
     _LOG.info("finite elements of frame %s, %s", quoted(frame.name), link.surface)
-    solved = solve_link(surface, *ends, (material, *parts), options=options)
+    solved = _as_stored(solve_link(surface, *ends, (material, *parts), options=options))
     mass = np.zeros((12, 12)) if link.density is None else two_ends(solved).mass
     return MeshSolution(solved, link.young, digest, mass)
+
+
+def _as_stored(solved: "MeshedLink") -> "MeshedLink":
+    """Without what only a further refinement needs: the part's own surface."""
+    solid = replace(solved.level.solid, walls={}, surface=None)
+    return replace(solved, level=replace(solved.level, solid=solid))
 
 
 def _digest(path: Path) -> str:

@@ -36,13 +36,16 @@ from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import has_bounded_motion
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import minimise_energy
+from assembly.solvers.method import Method
 from stiffness.screws import skew
 
 _STILL = 1e-11  # [rad, m] a pose that moves less counts as fixed
 
 
 def nearest_pose(
-    assembly: Assembly, offset: ArrayLike = (0.0, 0.0, 0.0)
+    assembly: Assembly,
+    offset: ArrayLike = (0.0, 0.0, 0.0),
+    method: Method = "compiled",
 ) -> tuple[Assembly, bool]:
     """The assembly of the same energy whose pose deviates least.
 
@@ -50,6 +53,7 @@ def nearest_pose(
         assembly: of least energy.
         offset: (3,) [m] from the platform's origin to the point whose deviation counts,
             base axes.
+        method: of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The assembly, its deviation (rotation vector [rad] and shift of the point [m])
@@ -64,7 +68,7 @@ def nearest_pose(
     h = free.deviation - free.map @ free.start
     none = np.zeros(len(free.start))
     right = free.rows @ free.start
-    least = minimise_energy(free.map, h, none, free.rows, right, free.group)
+    least = minimise_energy(free.map, h, none, free.rows, right, free.group, method)
     moved = assembly
     if least.feasible:
         moved = _with_clearances(assembly, free, least.clearances)
@@ -77,10 +81,10 @@ def nearest_pose(
                 assembly.linearisation, virtual_joints(robot, bounded_motion=True),
                 assembly.load, assembly.frame_loads,
             )  # fmt: skip
-            return nearest_pose(bounded, offset)
+            return nearest_pose(bounded, offset, method)
     if unproved(moved) and not unproved(assembly):
         moved = assembly
-    return moved, _moves(free)
+    return moved, _moves(free, method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,18 +143,23 @@ def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> A
     return replace(assembly, clearances=u, motions=q)
 
 
-def _moves(free: _FreeClearances) -> bool:
+def _moves(free: _FreeClearances, method: Method) -> bool:
     """Whether the closures leave the platform free to move."""
     projected = free.map - free.map @ free.rows.T @ free.rows
     U, S, _ = np.linalg.svd(projected, full_matrices=False)
-    return any(sum(_heights(free, direction)) > _STILL for direction in U.T[S > _STILL])
+    directions = U.T[S > _STILL]
+    return any(sum(_heights(free, way, method)) > _STILL for way in directions)
 
 
-def _heights(free: _FreeClearances, direction: NDArray) -> Iterator[float]:
+def _heights(
+    free: _FreeClearances, direction: NDArray, method: Method
+) -> Iterator[float]:
     """[rad, m] how far the platform goes both ways along a direction."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start
     for d in (gradient / size, -gradient / size):
-        least = minimise_energy(none, np.zeros(0), d, free.rows, right, free.group)
+        least = minimise_energy(
+            none, np.zeros(0), d, free.rows, right, free.group, method
+        )
         yield size * float(d @ (least.clearances - free.start))

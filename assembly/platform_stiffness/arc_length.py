@@ -47,6 +47,7 @@ from assembly.platform_stiffness.exact_tangent import (
     platform_moves,
 )
 from assembly.platform_stiffness.matrices import Part
+from assembly.solvers.method import Method, check_method
 
 _STEPS = 400  # of the path at most
 _CORRECTIONS = 8  # of a step
@@ -140,6 +141,7 @@ def follow_load(
     gravity: ArrayLike | None = None,
     count: int = 20,
     progress: Progress = lambda what, done, most: None,
+    method: Method = "compiled",
 ) -> DeflectionCurve:
     """Follow the path of equilibria until the load leaves a range.
 
@@ -153,6 +155,7 @@ def follow_load(
         count: of steps of the first one's length from first to last load; steps grow
             to twice that where the path is straight.
         progress: called with the points found and how many there may be.
+        method: of the first equilibrium; the path from it is followed in numpy.
 
     Returns:
         The curve; its events are ``"critical"`` loads, with the mode.
@@ -162,14 +165,16 @@ def follow_load(
         FreeMotion: a load drives a motion that nothing resists.
         NotConverged: no equilibrium was found at the first load, or the path is lost;
             a :class:`SolverFailed`.
+        ValueError: no such method.
     """
+    check_method(method)
     frames = (replace(f, clearance=None) for f in posture.robot.frames)
     tight = replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
-    start = solve_exact(tight, rest, gravity=gravity)
+    start = solve_exact(tight, rest, gravity=gravity, method=method)
     # a motion that the load would drive is named before it is followed
-    solve_assembly(tight, np.eye(6)[component])
+    solve_assembly(tight, np.eye(6)[component], method=method)
     span = abs(last - first)
     cut = start.cut.cut(tight)
     path = _Path(cut, component, rest, gravity, 1.0, span, part_owners(start))
@@ -191,7 +196,7 @@ def follow_load(
         places.append(there)
         grown = 1.5 if corrections <= 3 else 0.7 if corrections > 5 else 1.0
         step = min(longest, step * grown)
-    return _curve(path, tight, places, events)
+    return _curve(path, tight, places, events, method)
 
 
 def _begin(
@@ -304,8 +309,9 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
 
 
 def _curve(
-    path: _Path, posture: Posture, places: list[_Place], events: list[Event]
-) -> DeflectionCurve:
+    path: _Path, posture: Posture, places: list[_Place], events: list[Event],
+    method: Method,
+) -> DeflectionCurve:  # fmt: skip
     """What was met."""
     screws = np.array([p.local.placement.platform_screw for p in places])
     moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
@@ -321,4 +327,5 @@ def _curve(
         pressed=(frozenset(),) * len(places),
         open_=np.zeros(len(places), dtype=bool),
         events=tuple(events),
+        method=method,
     )

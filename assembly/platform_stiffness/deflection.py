@@ -32,6 +32,7 @@ from assembly.platform_stiffness.matrices import (
     numbers_of,
 )
 from assembly.solvers.conic import SolverFailed
+from assembly.solvers.method import Method, check_method
 from forcefit.inputs.display import html_table, largest_row, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 
@@ -78,6 +79,7 @@ class DeflectionCurve:
         pressed: (k,) names of the clearances that carry a force.
         open_: (k,) bool, where play leaves the pose undetermined.
         events: in the order met.
+        method: of all equilibria, as asked: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -89,6 +91,7 @@ class DeflectionCurve:
     pressed: tuple[frozenset[str], ...]
     open_: NDArray
     events: tuple[Event, ...]
+    method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -120,6 +123,7 @@ def load_deflection(
     gravity: ArrayLike | None = None,
     exact: bool = False,
     progress: Progress = lambda what, done, most: None,
+    method: Method = "compiled",
 ) -> DeflectionCurve:
     """Follow the platform while one component of the load changes.
 
@@ -132,6 +136,8 @@ def load_deflection(
         exact: whether with finite motions, else by problem (22).
         progress: called at each load with the steps taken there and how many there
             may be.
+        method: of :func:`assembly.linear.energy.solve_assembly` or
+            :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The curve with its kinks and critical loads.
@@ -141,7 +147,9 @@ def load_deflection(
         FreeMotion: the load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found; the load at which is in the message.
         BadInput: no such component, no loads, or not numbers.
+        ValueError: no such method.
     """
+    check_method(method)
     if component not in range(6) or not len(loads):
         raise BadInput(
             f"load_deflection: found component {component} and {len(loads)} loads, "
@@ -157,7 +165,7 @@ def load_deflection(
         what = f"steps at load {value:.6g}"
         return _solve(
             posture, value, wrench, gravity, exact, near,
-            lambda done, most: progress(what, done, most),
+            lambda done, most: progress(what, done, most), method,
         )  # fmt: skip
 
     points: list[_Point] = []
@@ -169,7 +177,7 @@ def load_deflection(
             events += _events(before, point, at, component)
         points.append(point)
     screws, open_ = zip(
-        *(_settled(p, largest, rest, gravity) for p in points), strict=True
+        *(_settled(p, largest, rest, gravity, method) for p in points), strict=True
     )
     axis = np.eye(6)[component]
     return DeflectionCurve(
@@ -182,17 +190,19 @@ def load_deflection(
         pressed=tuple(p.pressed for p in points),
         open_=np.array(open_),
         events=tuple(events),
+        method=method,
     )
 
 
 def _solve(
     posture: Posture, value: float, wrench: NDArray, gravity: ArrayLike | None,
     exact: bool, near: _Point | None, progress: Callable[[int, int], None],
+    method: Method,
 ) -> _Point:  # fmt: skip
     """The equilibrium under one load."""
     progress(0, 1)
     if not exact:
-        linear = solve_assembly(posture, wrench, gravity=gravity)
+        linear = solve_assembly(posture, wrench, gravity=gravity, method=method)
         names = clearance_names(linear.joints, contacts(linear)[0])
         return _Point(value, linear, in_contact(linear, "letting go"), names)
     start = (
@@ -202,12 +212,15 @@ def _solve(
     )
     try:
         equilibrium = solve_exact(
-            posture, wrench, gravity=gravity, near=start, progress=progress
-        )
+            posture, wrench, gravity=gravity, near=start, progress=progress,
+            method=method,
+        )  # fmt: skip
     except SolverFailed:
         if start is None:
             raise
-        equilibrium = solve_exact(posture, wrench, gravity=gravity, progress=progress)
+        equilibrium = solve_exact(
+            posture, wrench, gravity=gravity, progress=progress, method=method
+        )
     active, force = active_clearances(equilibrium.expansion)
     # what carries rounding alone changes with it
     active &= force > _CARRIES * force.max(initial=0.0)
@@ -216,13 +229,14 @@ def _solve(
 
 
 def _settled(
-    point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None
-) -> tuple[NDArray, bool]:
+    point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None,
+    method: Method,
+) -> tuple[NDArray, bool]:  # fmt: skip
     """Platform screw, where play leaves it open the one nearest to nominal."""
     equilibrium = point.equilibrium
     idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
     if idle and isinstance(equilibrium, Assembly):
-        nearest, open_ = nearest_pose(equilibrium, np.zeros(3))
+        nearest, open_ = nearest_pose(equilibrium, np.zeros(3), method)
         return nearest.platform_screw, open_
     return equilibrium.platform_screw, bool(point.tangent.free.shape[1])
 

@@ -65,7 +65,7 @@ def exact_tangent(
         springs=bent[model.springs],
         parts=part_owners(equilibrium),
         free=unit_screws(moves @ modes[:, flat], length),
-        method="compiled",
+        method=equilibrium.method,
     )
 
 

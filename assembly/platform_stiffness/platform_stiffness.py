@@ -69,9 +69,10 @@ def platform_stiffness(
             force: ``"holding"`` or ``"letting go"``.
         method: ``"compiled"``, and the reference where that does not do; or
             ``"reference"``, numpy and Clarabel alone.  Of the state ``"in contact"`` it
-            is that of :func:`assembly.linear.energy.solve_assembly`.  The classical
-            model of one posture is numpy by either, which its ``method`` says; that of
-            many is compiled, side by side.  The exact state has no reference.
+            is that of :func:`assembly.linear.energy.solve_assembly`, of ``"exact"`` of
+            :func:`assembly.exact.exact.solve_exact`.  The classical model of one
+            posture is numpy by either, which its ``method`` says; that of many is
+            compiled, side by side.
 
     Returns:
         Stiffness, compliance, free motions and shares at that point, base axes; of
@@ -83,7 +84,7 @@ def platform_stiffness(
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
         BadInput: a point or a load that is no number.
-        ValueError: no such state, side or method, or not the method of this state.
+        ValueError: no such state, side or method.
     """
     check_method(method)
     offset = numbers_of("at", at, 3, "m")
@@ -93,8 +94,6 @@ def platform_stiffness(
         raise ValueError(f"platform_stiffness: no side {side!r}")
     if state not in get_args(State):
         raise ValueError(f"platform_stiffness: no state {state!r}")
-    if state == "exact" and method == "reference":
-        raise ValueError("platform_stiffness: state 'exact' has no reference")
     if not isinstance(posture, Posture):
         posture = together(posture)
     if posture.transforms.ndim == 3:
@@ -121,6 +120,6 @@ def _of_one(
         linear = solve_assembly(posture, load, gravity=gravity, method=method)
         tangent = in_contact(linear, side)
     else:
-        exact = solve_exact(posture, load, gravity=gravity)
+        exact = solve_exact(posture, load, gravity=gravity, method=method)
         tangent, platform = exact_tangent(exact, side), exact.placement.platform
     return tangent.at(platform[:3, 3] + platform[:3, :3] @ offset)

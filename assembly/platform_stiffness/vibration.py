@@ -29,6 +29,7 @@ from assembly.model.mesh_link import mesh_link_mass
 from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
+from assembly.solvers.method import Method
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import section_axes
@@ -50,6 +51,7 @@ class NaturalModes:
             first; empty where there is none.
         idle: how many motions nothing resists that leave the platform where it is, as
             a rod's spin between two ball joints; they are not among the modes.
+        method: of the equilibrium they belong to: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -57,6 +59,7 @@ class NaturalModes:
     platform_screws: NDArray
     shares: tuple[dict[Part, float], ...]
     idle: int
+    method: Method
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -67,6 +70,7 @@ def natural_modes(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     exact: bool = False,
+    method: Method = "compiled",
 ) -> NaturalModes:
     """Natural frequencies and modes of a robot, its drives held.
 
@@ -77,6 +81,7 @@ def natural_modes(
         gravity: (3,) [m/s^2] likewise.
         exact: whether around the equilibrium with errors, clearances and loads; else of
             the nominal robot with clearances held at zero.
+        method: of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The modes.
@@ -86,13 +91,14 @@ def natural_modes(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
+        ValueError: no such method.
     """
     if not exact:
         frames = (replace(f, clearance=None) for f in posture.robot.frames)
         tight = replace(posture.robot, frames=tuple(frames))
         posture = replace(posture, robot=tight.with_errors(0 * tight.errors))
         load = gravity = None
-    equilibrium = solve_exact(posture, load, gravity=gravity)
+    equilibrium = solve_exact(posture, load, gravity=gravity, method=method)
     D, H = tangent_space(equilibrium.expansion)
     M = D.T @ mass_matrix(equilibrium) @ D
     if not np.trace(M) > 0.0:
@@ -107,7 +113,7 @@ def natural_modes(
     bent = x[equilibrium.expansion.placement.model.springs] * (squares != 0.0)
     return NaturalModes(
         posture, frequencies, platform_moves(equilibrium.expansion) @ x,
-        tuple(_shares(part_owners(equilibrium), y) for y in bent.T), idle,
+        tuple(_shares(part_owners(equilibrium), y) for y in bent.T), idle, method,
     )  # fmt: skip
 
 

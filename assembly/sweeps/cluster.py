@@ -192,13 +192,20 @@ def _check_workers(client: "distributed.Client") -> None:
         ) from None
     ours = _program()
     for worker, theirs in client.run(_program).items():
-        if theirs != ours:
-            raise BadInput(f"sweep: worker {worker} has {theirs}, expected {ours}")
+        if theirs["program_sha256"] != ours["program_sha256"]:
+            found, expected = (
+                f"{one['program']}, program_sha256 {one['program_sha256'][:12]}"
+                for one in (theirs, ours)
+            )
+            raise BadInput(f"sweep: worker {worker} has {found}, expected {expected}")
 
 
-def _program() -> str:
-    """This program: its version, and the digest of its sources and libraries."""
-    return f"forcefit {version('forcefit')}, program_sha256 {program_hash()[:12]}"
+def _program() -> dict[str, str]:
+    """This program's version, and the digest of its sources and libraries."""
+    return {
+        "program": f"forcefit {version('forcefit')}",
+        "program_sha256": program_hash(),
+    }
 
 
 def solve_task(

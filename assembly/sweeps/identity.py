@@ -8,8 +8,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +21,7 @@ from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_solution
 from assembly.model.robot import LibraryLink, MeshLink, Robot
 from assembly.sweeps.parameters import Design
+from forcefit.inputs.program import sources_hash
 
 # libraries that the numbers depend on: another version may round differently
 _LIBRARIES = ("numpy", "scipy", "clarabel")
@@ -31,18 +30,9 @@ _LIBRARIES = ("numpy", "scipy", "clarabel")
 @cache
 def program_hash() -> str:
     """SHA-256 of the program's sources and of the versions of its libraries."""
-    digest = hashlib.sha256()
-    for package in (forcefit.inputs, stiffness, assembly):
-        root = Path(str(package.__file__)).parent
-        for path in sorted(root.rglob("*.py")):
-            # line ends are the checkout's
-            source = path.read_bytes().replace(b"\r\n", b"\n")
-            name = path.relative_to(root.parent).as_posix()
-            digest.update(f"{name} {len(source)}\n".encode() + source)
-    digest.update(kernels.sources.encode())
-    versions = [f"{name} {version(name)}" for name in ("forcefit", *_LIBRARIES)]
-    digest.update("\n".join(versions).encode())
-    return digest.hexdigest()
+    packages = forcefit.inputs, stiffness, assembly
+    own = sources_hash(packages, _LIBRARIES)
+    return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:

@@ -126,7 +126,8 @@ def open_journal(
 
     Args:
         path: of the file.
-        whose: plain values that identify the sweep: all must be equal.
+        whose: plain values that identify the sweep: all must be equal, except
+            ``program``, whose version differs between commits of equal sources.
         record_type: of the rows.
 
     Yields:
@@ -137,7 +138,8 @@ def open_journal(
             journal, or cannot be written.
     """
     check_writable(path)
-    line = json.dumps({"kind": _KIND} | whose).encode()
+    equal = {name: value for name, value in whose.items() if name != "program"}
+    line = json.dumps({"kind": _KIND} | equal).encode()
     header = b"%s %08x\n" % (line, zlib.crc32(line))
     with ExitStack() as held:
         try:

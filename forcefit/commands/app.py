@@ -1,5 +1,6 @@
 """The command ``forcefit``: mounts the three packages' commands, plus ``study``."""
 
+import io
 import signal
 import sys
 import threading
@@ -98,6 +99,7 @@ def main() -> None:
     if not sys.warnoptions:
         # libraries' warnings are for programmers; ``python -W default -m forcefit``
         warnings.simplefilter("ignore")
+    _print_any_letter()
     report_loading()
     with _interrupts() as interrupts:
         try:
@@ -106,6 +108,16 @@ def main() -> None:
         except BaseException as error:
             sys.exit(_status_after(error, interrupted=bool(interrupts)))
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _print_any_letter() -> None:
+    r"""Print letters that standard output's encoding lacks as ``\u03a9``.
+
+    As stderr does: on Windows the encoding of a file or a pipe has 256 letters.
+    """
+    out = sys.stdout
+    if isinstance(out, io.TextIOWrapper) and out.errors == "strict":
+        out.reconfigure(errors="backslashreplace")
 
 
 def _status_after(error: BaseException, interrupted: bool) -> int:

@@ -1,4 +1,4 @@
-"""Where meshes and compiled code are kept: the first folder that can be written.
+"""Where meshes and links' solutions are kept: the first folder that can be written.
 
 A read-only installation, a user without a home or with a read-only one, and a full
 disk are no errors: the next folder is tried, and where there is none nothing is kept.
@@ -53,7 +53,7 @@ def _of_user() -> Path:
 
 def _temporary() -> Path:
     """The user's own folder among the temporary files, which nobody else may write."""
-    # code is loaded from it
+    # numbers of other programs are read from it
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"forcefit-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

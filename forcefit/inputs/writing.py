@@ -205,6 +205,22 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
         shutil.rmtree(part, ignore_errors=True)
 
 
+def path_from(folder: Path, path: Path | str) -> str:
+    """A path as a file of a folder names it, on every system with slashes.
+
+    Args:
+        folder: of the file.
+        path: absolute, or from where the program runs.
+
+    Returns:
+        The path relative to the folder; on another drive than it, the absolute one.
+    """
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).absolute().as_posix()
+
+
 def write_text(text: str, path: Path | str) -> None:
     r"""Write a text file whole or not at all.
 

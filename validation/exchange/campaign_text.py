@@ -1,6 +1,5 @@
 """The two texts of an imported campaign: its table, and ``campaign.toml``."""
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
+from forcefit.inputs.writing import path_from
 from validation.exchange.commands_table import Commands
 from validation.exchange.device_frame import DeviceFrame
 from validation.exchange.reading import Reading
@@ -118,7 +118,7 @@ def declaration(
     name = declared.robot_name
     path = declared.file.parent / name
     if path.is_file():
-        name = os.path.relpath(path.resolve(), folder.resolve())
+        name = path_from(folder.resolve(), path.resolve())
     places: Mapping[str, list[float]] = {
         k: [float(x) for x in v] for k, v in declared.places.items()
     }

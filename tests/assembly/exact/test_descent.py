@@ -288,7 +288,7 @@ def test_a_step_is_that_of_clarabel_on_all_unknowns(seed, rigid_legs):
         cp.Minimize((slope @ z + cp.sum_squares(root.T @ z) / 2) / size), cones
     )
     problem.solve(solver="CLARABEL", tol_gap_abs=1e-12, tol_gap_rel=1e-12)
-    step = _solve(local, damping, False)
+    step = _solve(local, damping, False, "compiled")
     assert step.gain == pytest.approx(-problem.value * size, rel=1e-6)
     assert step.decrement == pytest.approx(step.gain, rel=1e-6)
     change = N @ z.value

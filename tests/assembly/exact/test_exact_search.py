@@ -34,7 +34,7 @@ def ends(monkeypatch):
     def run(*steps):
         called = []
 
-        def advance(local, penalty, damping, near):
+        def advance(local, penalty, damping, near, method):
             share, decrement, length, after = steps[min(len(called), len(steps) - 1)]
             called.append((damping, near))
             there = place(local.placement.model, np.array([share * BALANCED]))
@@ -97,9 +97,9 @@ def calls_of(monkeypatch, posture, load=None):
     """The expansions and penalties of all steps, and the answer."""
     called, advance = [], exact.advance
 
-    def watched(local, penalty, damping, near):
+    def watched(local, penalty, damping, near, method):
         called.append((local, penalty))
-        return advance(local, penalty, damping, near)
+        return advance(local, penalty, damping, near, method)
 
     monkeypatch.setattr(exact, "advance", watched)
     return called, solve_exact(posture, load)

@@ -245,7 +245,11 @@ def test_a_file_of_a_link_that_is_not_usable_is_refused(
     assert "\n" not in str(refused.value)
 
 
-def test_finite_elements_of_one_shape_run_once_and_are_told(folder, caplog):
+def test_finite_elements_of_one_shape_run_once_and_are_told(
+    folder, caplog, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path))
+    monkeypatch.setattr("assembly.files.solved_links._SOLVED", {})
     link = 'link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, '
     link += "young = 7e10, poisson = 0.3, density = 2700 }"
     both = "\n".join(

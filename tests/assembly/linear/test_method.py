@@ -141,8 +141,5 @@ def test_brackets_of_both_methods_share_a_point_on_every_built_in_robot(name):
             assert max(high - low, most - least) <= 1e-6
 
 
-def test_the_exact_stiffness_has_no_reference():
-    with pytest.raises(ValueError, match="state 'exact' has no reference"):
-        platform_stiffness(beams(), "exact", method="reference")
-    assert platform_stiffness(beams(), "exact").method == "compiled"
+def test_the_classical_stiffness_is_the_reference():
     assert platform_stiffness(beams()).method == "reference"

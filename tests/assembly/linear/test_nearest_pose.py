@@ -283,10 +283,10 @@ def shift_along_x(start, rows=()):
 def test_how_far_an_interval_goes_both_ways(start):
     """From its start to either bound; not at all where a closure holds it."""
     x = np.eye(6)[3]
-    ways = list(_heights(shift_along_x(start), x))
+    ways = list(_heights(shift_along_x(start), x, "compiled"))
     assert ways == pytest.approx([1e-3 * (1 - start), 1e-3 * (1 + start)], abs=1e-9)
-    assert _moves(shift_along_x(start))
-    assert not _moves(shift_along_x(start, [1.0]))
+    assert _moves(shift_along_x(start), "compiled")
+    assert not _moves(shift_along_x(start, [1.0]), "compiled")
 
 
 def test_nearest_is_counted_at_the_platforms_origin_where_no_point_is_given():

@@ -57,17 +57,19 @@ def test_workers_with_other_sources_are_refused():
     from assembly.sweeps import cluster
 
     class Client:
+        def __init__(self, **theirs):
+            self.theirs = theirs
+
         def wait_for_workers(self, *_, **__):
             pass
 
         def run(self, program):
-            assert program() == cluster._program()
-            return {
-                "tcp://h:1": program().replace("program_sha256 ", "program_sha256 0")
-            }
+            return {"tcp://h:1": program() | self.theirs}
 
     with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
-        cluster._check_workers(Client())
+        cluster._check_workers(Client(program_sha256=64 * "0"))
+    # another commit of the same sources
+    cluster._check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
 
 
 def test_draws_do_not_depend_on_who_makes_them():

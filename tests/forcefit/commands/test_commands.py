@@ -5,8 +5,9 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 import warnings
+from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -283,9 +284,9 @@ def test_there_are_units_to_print():
 
 
 def test_the_version_is_that_of_the_package(run):
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert run("--version") == (0, f"forcefit {declared['version']}\n", "")
-    assert forcefit.__version__ == declared["version"]
+    installed = version("forcefit")
+    assert run("--version") == (0, f"forcefit {installed}\n", "")
+    assert forcefit.__version__ == installed
     with pytest.raises(AttributeError, match="no attribute 'version'"):
         forcefit.version  # noqa: B018
 
@@ -302,6 +303,19 @@ def test_a_shell_completes_commands_options_and_robots(typed, offered):
     done = subprocess.run([sys.executable, "-m", "forcefit"], env=os.environ | asked,
                           capture_output=True, text=True, check=True)  # fmt: skip
     assert done.stdout.split() == [offered]
+
+
+def test_letters_that_the_output_lacks_are_printed_as_numbers(tmp_path):
+    """As in a file or a pipe on Windows."""
+    robot = replace(coaxial_beams([0, 0, 0, 1e-4, 0, 0]), name="Ω-4")
+    write_robot(robot, tmp_path / "omega.toml")
+    words = [sys.executable, "-m", "forcefit", "assembly", "solve", "omega.toml"]
+    paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    env = os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": paths}
+    done = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True,
+                          check=False)  # fmt: skip
+    assert done.stderr == b""
+    assert b"\\u03a9-4" in done.stdout
 
 
 def test_the_installed_command_refuses_without_a_traceback():

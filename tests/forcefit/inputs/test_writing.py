@@ -22,6 +22,7 @@ from forcefit.inputs.writing import (
     PIXELS,
     ROBOT,
     check_writable,
+    path_from,
     save_figure,
     save_pixels,
     whole_file,
@@ -38,6 +39,7 @@ _MAY = {
     "stiffness/mesh/mesh.py",  # its cache through whole_file; the mesher's scratch
     "stiffness/mesh/mesh_worker.py",  # likewise
     "stiffness/surface/surface_worker.py",  # a temporary folder
+    "assembly/files/stored_solutions.py",  # through whole_file
     "assembly/sweeps/dataset.py",  # NetCDF through whole_file
     "forcefit/commands/assembly.py",  # pixels of a screenshot
     "forcefit/page/page.py",  # into memory
@@ -251,3 +253,13 @@ def test_what_a_killed_program_left_is_replaced(tmp_path):
     assert left == ["x.txt.part", "x.txt.part.lock"]
     write_text("whole", path)
     assert [p.read_text() for p in tmp_path.iterdir()] == ["whole"]
+
+
+def test_a_path_is_written_with_slashes_from_the_files_folder(tmp_path, monkeypatch):
+    assert path_from(tmp_path / "a" / "b", tmp_path / "c.stl") == "../../c.stl"
+
+    def another_drive(*given):
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr("os.path.relpath", another_drive)
+    assert path_from(tmp_path, "/c.stl") == "/c.stl"

@@ -1,0 +1,192 @@
+"""Solutions of mesh links on disk: finite elements of the same link run once.
+
+A solution is found by a digest of everything that its numbers depend on.  Files are
+written whole or not at all; one that cannot be used counts as absent.
+"""
+
+import hashlib
+import io
+import json
+import os
+import time
+from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import fields, is_dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import assembly.files
+import forcefit.inputs
+import stiffness
+from assembly.model.link_kinds import MeshLink, MeshSolution
+from forcefit.inputs.cache_folder import cache_folder
+from forcefit.inputs.locking import locked_file
+from forcefit.inputs.program import sources_hash
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import whole_file
+
+# they read surfaces, make meshes and solve: another version may round differently
+_LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
+              "gmsh", "meshio")  # fmt: skip
+_UNUSED = 90 * 86_400  # [s] since a solution was read or written: it is removed
+
+
+def solution_key(link: MeshLink, digest: str, options: object) -> str:
+    """Name of the solution of a link.
+
+    Args:
+        link: to be solved.  Where its surface lies and how its mesh is turned is left
+            out: a solution is in the mesh's axes.
+        digest: SHA-256 of the surface file.
+        options: :class:`stiffness.fem.fea.FemOptions` of the solution.
+
+    Returns:
+        A digest of the link, the options and the program; links of one key have equal
+        solutions.
+    """
+    from stiffness.surface.surface_files import named_solid
+
+    file, solid = named_solid(link.surface)
+    name = Path(f"{file.suffix.lower()}#{solid}")  # the ending says how it is read
+    content = replace(link, surface=name, up=None, frame_up=None, axis=None)
+    text = "\n".join([digest, repr(content), repr(options), _program()])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def _program() -> str:
+    """SHA-256 of what reads surfaces and solves links."""
+    return sources_hash((forcefit.inputs, stiffness, assembly.files), _LIBRARIES)
+
+
+def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
+    """The solution of a key: from the disk, or solved and stored.
+
+    Args:
+        key: of :func:`solution_key`.
+        solve: called where no solution is stored; other processes that ask for this key
+            wait until it is done.
+
+    Returns:
+        The solution, the same to the last bit in both cases.
+    """
+    folder = cache_folder()
+    if folder is None:
+        return solve()
+    path = folder / f"link-{key[:32]}.npz"
+    found = _read(path, key)
+    if found is None:
+        with _one_process(path.with_suffix(".solving")):
+            found = _read(path, key)  # another process may have been faster
+            if found is None:
+                found = solve()
+                _write(path, key, found)
+    return found
+
+
+@contextmanager
+def _one_process(mark: Path) -> Generator[None, None, None]:
+    """One process at a time; all at once on a disk that is full or has no locks."""
+    with ExitStack() as stack:
+        with suppress(OSError):
+            stack.enter_context(locked_file(mark))
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                mark.unlink()
+
+
+def _read(path: Path, key: str) -> MeshSolution | None:
+    """A stored solution; None if there is none, or a file of something else."""
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
+            content = json.loads(str(stored["content"]))
+            if content["key"] != key:
+                return None
+            solution = _decoded(content["solution"], stored)
+    except Exception:  # NumPy, zipfile and json raise a dozen kinds of it
+        return None
+    if not isinstance(solution, MeshSolution):
+        return None
+    with suppress(OSError):
+        os.utime(path)
+    return solution
+
+
+def _write(path: Path, key: str, solution: MeshSolution) -> None:
+    """Write a solution whole or not at all; a full or read-only disk is no error."""
+    arrays: list[NDArray] = []
+    content = json.dumps({"key": key, "solution": _encoded(solution, arrays)})
+    named: dict[str, Any] = {str(k): array for k, array in enumerate(arrays)}
+    try:
+        with whole_file(path) as part, part.open("wb") as file:
+            np.savez(file, content=np.array(content), **named)
+        _remove_unused(path.parent)
+    except (OSError, BadInput):
+        return
+
+
+def _remove_unused(folder: Path) -> None:
+    """Remove solutions that were not used for long, as those of older programs."""
+    for path in folder.glob("link-*.npz"):
+        if time.time() - path.stat().st_mtime > _UNUSED:
+            path.unlink()
+
+
+def _encoded(value: Any, arrays: list[NDArray]) -> Any:
+    """A value in terms of JSON; arrays are appended to a list and numbered."""
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {"array": str(len(arrays) - 1)}
+    if is_dataclass(value):
+        given = {
+            f.name: _encoded(getattr(value, f.name), arrays)
+            for f in fields(value)
+            if f.init
+        }
+        return {"kind": type(value).__name__, "given": given}
+    if isinstance(value, Mapping):
+        return {"table": {k: _encoded(v, arrays) for k, v in value.items()}}
+    if isinstance(value, tuple):
+        return {"tuple": [_encoded(v, arrays) for v in value]}
+    if isinstance(value, list):
+        return [_encoded(v, arrays) for v in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
+    """The value of :func:`_encoded`."""
+    if isinstance(value, list):
+        return [_decoded(v, arrays) for v in value]
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        return arrays[value["array"]]
+    if "tuple" in value:
+        return tuple(_decoded(value["tuple"], arrays))
+    if "table" in value:
+        return {k: _decoded(v, arrays) for k, v in value["table"].items()}
+    given = {k: _decoded(v, arrays) for k, v in value["given"].items()}
+    return _kinds()[value["kind"]](**given)
+
+
+@cache
+def _kinds() -> dict[str, Any]:
+    """Classes that a solution is made of."""
+    from stiffness.fem.adaptive_step import Level
+    from stiffness.fem.condensation import Condensed
+    from stiffness.fem.elements import Elements
+    from stiffness.fem.fea import MeshedLink
+    from stiffness.link import LinkStiffness
+    from stiffness.mesh.solid import Solid
+    from stiffness.surface.facets import Facets
+    from stiffness.surface.primitives import Cone, Plane, Sphere, Torus
+
+    kinds = (MeshSolution, MeshedLink, LinkStiffness, Level, Solid, Elements, Condensed,
+             Plane, Cone, Sphere, Torus, Facets)  # fmt: skip
+    return {kind.__name__: kind for kind in kinds}

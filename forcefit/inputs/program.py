@@ -1,0 +1,37 @@
+"""What program this is: a digest of its sources and of the libraries beneath them."""
+
+import hashlib
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import ModuleType
+
+
+def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> str:
+    """SHA-256 of packages' Python sources and of the versions of libraries.
+
+    Args:
+        packages: all ``.py`` files below their folders count.
+        libraries: names of distributions; one that is not installed counts as absent.
+
+    Returns:
+        The digest, the same wherever the packages are installed.
+    """
+    digest = hashlib.sha256()
+    for package in packages:
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            # line ends are the checkout's
+            source = path.read_bytes().replace(b"\r\n", b"\n")
+            name = path.relative_to(root.parent).as_posix()
+            digest.update(f"{name} {len(source)}\n".encode() + source)
+    digest.update("\n".join(f"{n} {_version(n)}" for n in libraries).encode())
+    return digest.hexdigest()
+
+
+def _version(name: str) -> str:
+    """Of a distribution, or that it is absent."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "absent"

@@ -1,0 +1,144 @@
+"""Questions with finite motions by numpy and Clarabel alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics import continuation_side_by_side
+from assembly.kinematics.posture import home_posture
+from assembly.linear import lanes
+from assembly.linear.energy import solve_assembly
+from assembly.model.robot import Clearance
+from assembly.platform_stiffness.arc_length import follow_load
+from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from assembly.platform_stiffness.vibration import natural_modes
+from assembly.robots import BUILT_IN
+from assembly.solvers import one_problem
+from assembly.solvers.conic import GAP
+from assembly.solvers.method import METHODS
+from stiffness.link import scaled
+from tests.robots_for_tests import coaxial_beams
+
+LOAD = [1.0, 0, 2, 10, 0, -50]
+LOADS = (0.0, 30.0, 60.0)
+
+
+def beams():
+    """Two beams forced together by more than their clearance, with a mass."""
+    gap = np.array([0, 0, 0, 1e-4, 0, 0])
+    robot = coaxial_beams(gap, clearance=Clearance(radial=2e-5))
+    frames = tuple(replace(frame, mass=1.0) for frame in robot.frames)
+    return home_posture(replace(robot, frames=frames))
+
+
+QUESTIONS = {
+    "exact": lambda at, method: solve_exact(at, LOAD, method=method),
+    "stiffness": lambda at, method: platform_stiffness(
+        at, "exact", LOAD, method=method
+    ),
+    "deflection": lambda at, method: load_deflection(at, 4, LOADS, method=method),
+    "deflection, finite": lambda at, method: load_deflection(
+        at, 4, LOADS, exact=True, method=method
+    ),
+    "path": lambda at, method: follow_load(at, 4, 0.0, 60.0, count=4, method=method),
+    "modes": lambda at, method: natural_modes(at, method=method),
+    "modes, finite": lambda at, method: natural_modes(
+        at, load=LOAD, exact=True, method=method
+    ),
+}
+
+
+@pytest.fixture
+def nothing_compiled(monkeypatch):
+    """Called, every function of the C++ is refused."""
+
+    class Refused:
+        def __getattr__(self, name):
+            raise AssertionError(f"a compiled function was called: {name}")
+
+    def refuse():
+        for module in (one_problem, lanes, continuation_side_by_side):
+            monkeypatch.setattr(module, "kernels", Refused())
+
+    return refuse
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_reference_calls_nothing_compiled(question, nothing_compiled):
+    ask, posture = QUESTIONS[question], beams()
+    compiled = ask(posture, "compiled")
+    nothing_compiled()
+    assert compiled.method == "compiled"
+    assert ask(posture, "reference").method == "reference"
+
+
+def test_compiled_answers_of_these_robots_need_what_is_refused(nothing_compiled):
+    """Else the test above would say nothing."""
+    posture = beams()
+    nothing_compiled()
+    for question in ("exact", "deflection", "deflection, finite", "modes, finite"):
+        with pytest.raises(AssertionError, match="a compiled function was called"):
+            QUESTIONS[question](posture, "compiled")
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_another_word_is_refused(question):
+    with pytest.raises(ValueError, match="is 'numpy', expected 'compiled' or 'ref"):
+        QUESTIONS[question](beams(), "numpy")
+
+
+@pytest.mark.parametrize("start", ["start", "near"])
+def test_reference_does_not_start_from_a_compiled_answer(start):
+    posture = beams()
+    compiled, reference = (
+        {
+            "start": solve_assembly(posture, LOAD, method=method),
+            "near": solve_exact(posture, LOAD, method=method),
+        }[start]
+        for method in METHODS
+    )
+    with pytest.raises(ValueError, match="start or near is a compiled answer, expec"):
+        solve_exact(posture, LOAD, method="reference", **{start: compiled})
+    found = solve_exact(posture, LOAD, method="reference", **{start: reference})
+    assert found.method == "reference"
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN))
+def test_both_methods_end_at_equilibria(name):
+    """Closed, within the cones, and in balance; of one energy if they are the same."""
+    posture = home_posture(BUILT_IN[name]())
+    one, other = (solve_exact(posture, LOAD, method=method) for method in METHODS)
+    for found in (one, other):
+        assert found.closure_residual() < 1e-10
+        assert found.stationarity < 1e-7
+        assert found.clearance_excess() < 1e-9
+    # the orthoglide has two minima 1.4e-8 rad apart, with other clearances touching
+    if name != "orthoglide":
+        assert one.energy == pytest.approx(other.energy, rel=GAP)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_both_methods_follow_a_load_through_a_contact(exact):
+    one, other = (
+        load_deflection(beams(), 4, LOADS, exact=exact, method=method)
+        for method in METHODS
+    )
+    assert one.pressed == other.pressed
+    np.testing.assert_allclose(one.energies, other.energies, rtol=GAP)
+    np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-6)
+
+
+def test_both_methods_find_the_same_modes_and_stiffness():
+    one, other = (
+        natural_modes(beams(), load=LOAD, exact=True, method=method)
+        for method in METHODS
+    )
+    np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-6)
+    K, same = (
+        platform_stiffness(beams(), "exact", LOAD, method=method).stiffness
+        for method in METHODS
+    )
+    assert np.abs(scaled(K - same, K)).max() < 1e-6
