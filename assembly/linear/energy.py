@@ -7,7 +7,7 @@ solved by the reference (:mod:`assembly.linear.reference`), and the answer says 
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +53,29 @@ _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
 # arrays of k points by what they are; "tight" is the energy without clearance
 _Rows = dict[str, NDArray]
+
+
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
+) -> Assembly[float]: ...  # fmt: skip
+
+
+@overload
+def solve_assembly(
+    posture: Sequence[Posture], load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    errors: ArrayLike | None = None, method: Method = "compiled",
+) -> Assembly[NDArray]: ...  # fmt: skip
+
+
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, *, errors: ArrayLike,
+    method: Method = "compiled",
+) -> Assembly[NDArray]: ...  # fmt: skip
 
 
 def solve_assembly(

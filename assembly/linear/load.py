@@ -115,11 +115,11 @@ def loads_on_frames(
     robot, T = posture.robot, posture.transforms
     n = len(robot.frames)
     lead = T.shape[:-3]
-    for whose, wrenches, own in (
+    for whose, wrenches, axes in (
         ("load", load, (6,)), ("bodies", bodies, (n, 6)), ("carried", carried, (n, 6)),
     ):  # fmt: skip
         if wrenches is not None:
-            lead = _with_leading(lead, whose, np.shape(wrenches), own)
+            lead = _with_leading(lead, whose, np.shape(wrenches), axes)
     given = np.zeros((*lead, 2, n, 6))
     own, after = given[..., 0, :, :], given[..., 1, :, :]
     if bodies is not None:

@@ -316,8 +316,8 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
     except (FreeMotion, SolverFailed):
         return None
     return {
-        "reading": "frozen", "rotation": bound.rotation_error[1],
-        "translation": bound.translation_error[1],
+        "reading": "frozen", "rotation": float(bound.rotation_error[1]),
+        "translation": float(bound.translation_error[1]),
     }  # fmt: skip
 
 
