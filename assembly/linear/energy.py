@@ -199,7 +199,10 @@ def _solve_one(
             return least_energy(posture, load, loads)
     else:
         return least_energy(posture, load, loads)
-    _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
+    multipliers, residual = rows["multipliers"], rows["residual"] + rounding
+    drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
+    if acting is None and not np.count_nonzero(multipliers):
+        rows["elastic"][:] = 0.0  # no wrenches mean no deformation but rounding
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -444,13 +447,12 @@ def _record(
         rows["status"][i], rows["reason"][i] = "solver failed", open_
 
 
-def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray | bool) -> None:
+def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
     """Set to zero, in place, energies, wrenches and springs that are only rounding."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
     # without loads no wrenches mean no deformation but rounding
-    if loaded is not True and np.count_nonzero(multipliers) < multipliers.size:
-        rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
+    rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:

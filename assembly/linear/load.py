@@ -146,6 +146,8 @@ def _with_leading(
     lead: tuple[int, ...], whose: str, shape: tuple[int, ...], own: tuple[int, ...]
 ) -> tuple[int, ...]:
     """Leading dimensions together with those of an array; ``own`` are its last."""
+    if shape == own:  # as nearly always
+        return lead
     try:
         if shape[-len(own) :] != own:
             raise ValueError
@@ -255,7 +257,7 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
     """
     table, R = _masses(posture.robot), posture.transforms[..., :3, :3]
     g = np.asarray(gravity, dtype=float)[..., None, :]
-    lead = np.broadcast_shapes(R.shape[:-1], g.shape)
+    lead = R.shape[:-1] if g.ndim == 2 else np.broadcast_shapes(R.shape[:-1], g.shape)
     W = np.einsum("...nji,...nj->...ni", R, np.broadcast_to(g, lead)) * table[:, 4:5]
     return np.concatenate([-np.cross(table[:, 5:], W) / 12, W / 2], axis=-1)
 
