@@ -1,7 +1,7 @@
 """MJCF written out: other files included, copies made, other models attached.
 
-MuJoCo could do this (``MjSpec``), but is an extra, and the second reader that this one is
-compared with.  Its places lack the file of an include, and its XML has six digits
+MuJoCo could do this (``MjSpec``), but is an extra, and the second reader that this one
+is compared with.  Its places lack the file of an include, and its XML has six digits
 (MuJoCo 3.17).
 
 Sources:
