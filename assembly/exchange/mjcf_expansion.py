@@ -1,5 +1,9 @@
 """MJCF written out: other files included, copies made, other models attached.
 
+MuJoCo could do this (``MjSpec``), but is an extra, and the second reader that this one
+is compared with.  Its places lack the file of an include, and its XML has six digits
+(MuJoCo 3.17).
+
 Sources:
     MuJoCo documentation, XML reference: ``include`` puts in the elements of a file;
     copy i of ``replicate`` stands i offsets and turns on, its names end in i with as

@@ -29,7 +29,13 @@ from forcefit.inputs.table import (
     quoted,
     read_toml,
 )
-from forcefit.inputs.writing import ROBOT_MARK, path_from, write_text
+from forcefit.inputs.writing import (
+    ROBOT,
+    ROBOT_MARK,
+    check_writable,
+    path_from,
+    write_text,
+)
 from stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
@@ -325,8 +331,10 @@ def write_robot(robot: Robot, path: Path | str) -> None:
             relative to its folder.
 
     Raises:
-        BadInput: the file cannot be written.
+        BadInput: the file cannot be written, or one is there that this did not write:
+            it may hold comments.
     """
+    check_writable(path, ROBOT)
     table = robot_table(robot, Path(path).parent)
     frames, closures = table.pop("frame"), table.pop("closure", [])
     effects, diagnosis = table.pop("effect", []), table.pop("diagnosis", {})

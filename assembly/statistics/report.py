@@ -11,7 +11,7 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.ranking import NOT_DISTINGUISHED, rank_text
 from assembly.statistics.summary import WORDS
 from assembly.statistics.tightening import ranked, tightening_tiles
-from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart
+from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
@@ -171,7 +171,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
             continue
         charts.append(_histogram(NAMES[key], one, values))
     note = f"Without variation: {', '.join(still)}." if still else ""
-    return f"<div class=grid>{''.join(charts)}</div>{paragraph(note)}"
+    return grid(*charts) + paragraph(note)
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:

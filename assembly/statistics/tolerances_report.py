@@ -8,7 +8,7 @@ import numpy as np
 from assembly.statistics.clearance_positions import play_means
 from assembly.statistics.plot import NAMES
 from assembly.statistics.quantities import UNITS
-from forcefit.page.charts import Axis, bars
+from forcefit.page.charts import Axis, bars, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
@@ -206,17 +206,17 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
                        (allocation["limits"][key], one["found"], one["proven"]))]
         for key, one in allocation["worst"].items()
     ]  # fmt: skip
-    charts = "".join(
+    charts = [
         # from zero: a bar's length on a logarithmic axis means nothing
         bars(some, Axis("tolerance, plus or minus", unit), "", np.nan)
         for unit in ("rad", "m")
         if (some := {one["name"]: one["tolerance"] for one in classes
                      if one["unit"] == unit})
-    )  # fmt: skip
+    ]  # fmt: skip
     share = Column(f"share {_GOVERNED[allocation['cost']]}")
     head: list[str | Column] = ["class", "tolerance, plus or minus", "loosest allowed"]
     pieces = [
-        f"<div class=grid>{charts}</div>",
+        grid(*charts),
         table([*head, Column("cost"), share], rows, "tolerances"),
         _price_paragraph(allocation),
     ]

@@ -19,7 +19,7 @@ from forcefit.commands.example import example
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
 from forcefit.inputs.errors import BadInput, one_line, quoted
-from forcefit.inputs.packages import naming_packages
+from forcefit.inputs.packages import naming_packages, need
 from forcefit.inputs.writing import write_json
 
 app = typer.Typer(
@@ -81,6 +81,7 @@ def study(
     from validation.study.study_file import read_study
 
     asked = read_study(file, output)
+    need("jinja2")
     with progress_bars() as update:
         results = run_study(asked, update)
         update("report", 0, 1)

@@ -27,8 +27,8 @@ _EXTRAS = {
 }
 # absent only where forcefit was installed without what it requires
 _REQUIRED = (
-    "clarabel", "cvxpy", "exudyn", "filelock", "numpy", "pytetwild", "pyvista",
-    "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
+    "clarabel", "cvxpy", "exudyn", "filelock", "jinja2", "numpy", "pytetwild",
+    "pyvista", "rich", "scipy", "threadpoolctl", "typer", "vtkmodules",
 )  # fmt: skip
 _DISTRIBUTIONS = {"yaml": "pyyaml", "vtkmodules": "vtk"}  # named otherwise
 

@@ -48,7 +48,7 @@ PIXELS = Kind(
     "a picture", (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"),
     (b"\x89png\r\n", b"\xff\xd8\xff", b"bm", b"ii*\0", b"mm\0*"), ("matplotlib",),
 )  # fmt: skip
-PAGE = Kind("an HTML page", (".html", ".htm"), (b"<!doctype html",))
+PAGE = Kind("an HTML page", (".html", ".htm"), (b"<!doctype html",), ("jinja2",))
 NETCDF = Kind(
     "a NetCDF file of forcefit", (".nc",), (b"\x89hdf\r\n\x1a\n",),
     ("xarray", "h5netcdf", "h5py"),

@@ -6,7 +6,6 @@ a robot, :mod:`assembly.report.scene`.
 """
 
 import html
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from forcefit.inputs.writing import plain
-from forcefit.page.tables import Value, inline
+from forcefit.page.markup import piece
+from forcefit.page.tables import Value
 from forcefit.page.units import shown_in
 
 BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#9aa3ab"
@@ -51,19 +51,6 @@ class Layer:
     title: str
     unit: str
     values: NDArray
-
-
-def embedded(data: Any, kind: str) -> str:
-    """Plain values inside a page, which no name in them can end."""
-    text = json.dumps(plain(data), allow_nan=False, separators=(",", ":"))
-    return f'<script type="application/json" class={kind}>{_safe(text)}</script>'
-
-
-def _safe(text: str) -> str:
-    """JSON without a character that HTML would take for a tag."""
-    for character, code in (("<", "003c"), (">", "003e"), ("&", "0026")):
-        text = text.replace(character, f"\\u{code}")
-    return text
 
 
 def label(name: str) -> str:
@@ -171,9 +158,8 @@ def value_map(
     """
     flat = {one.key: _constant(one) for one in layers}
     drawn = [one for one in layers if flat[one.key] is None]
-    notes = [
-        f"{html.escape(one.title)} is the same everywhere: "
-        f"{inline(Value(value, one.unit))}."
+    same = [
+        (one.title, Value(value, one.unit))
         for one in layers
         if (value := flat[one.key]) is not None and np.isfinite(value)
     ]
@@ -190,7 +176,7 @@ def value_map(
         ],
         "states": states,
     }  # fmt: skip
-    note = f"<p class=note>{' '.join(notes)}</p>" if notes else ""
+    note = piece("constants", same) if same else ""
     if not drawn:
         return note
     return _figure(spec, "map", caption + " A click opens a point's numbers.") + note
@@ -207,6 +193,11 @@ def scene(spec: Mapping[str, Any], caption: str) -> str:
         HTML.
     """
     return _figure(spec, "scene", caption)
+
+
+def grid(*charts: str) -> str:
+    """Charts side by side."""
+    return piece("grid", charts)
 
 
 def _constant(layer: Layer) -> float | None:
@@ -239,8 +230,4 @@ def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
 
 def _figure(spec: Mapping[str, Any], kind: str, caption: str) -> str:
     """A figure that ``page.js`` fills."""
-    return (
-        f"<figure class={kind}>{embedded(spec, 'spec')}<div class=controls></div>"
-        f"<div class=plot></div><div class=point></div>"
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-    )
+    return piece("figure", kind, plain(spec), caption)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from forcefit.page.markup import piece
 from forcefit.page.page import Page, Provenance, Tile, page, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.page.words import in_words, unit_of
@@ -275,7 +276,7 @@ def _listed(
     more = [_row(one) for one in changes[_LISTED:]]
     if more:
         count = f"{len(more)} more {what}"
-        yield f"<details><summary>{count}</summary>{table(head, more, count)}</details>"
+        yield piece("folded", count, table(head, more, count))
 
 
 def _row(change: Change) -> list[Cell]:

@@ -11,33 +11,23 @@ plotly.js draws; it is inside the page, compressed, and nothing is fetched.
 
 import base64
 import hashlib
-import html
 import json
 import platform
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from forcefit.inputs.errors import BadInput
-from forcefit.page.charts import embedded
-from forcefit.page.tables import Value, inline, table
+from forcefit.inputs.writing import plain
+from forcefit.page.markup import packaged, piece
+from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
-_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w]))")
 _DIGITS = 300  # of the longest integer that a float holds, nearly
-_BUTTONS = (
-    "<div class=bar><button type=button id=units>SI units</button>"
-    "<button type=button id=print>Print</button></div>"
-)
-_NO_SCRIPT = (
-    "<noscript><p class=note>Charts need JavaScript; the numbers do not.</p></noscript>"
-)
 
 
 @dataclass(frozen=True)
@@ -115,24 +105,13 @@ def page(content: Page) -> str:
     Returns:
         HTML; the results are inside it as JSON, SI, in full.
     """
-    style, script = (_part(name).decode() for name in ("page.css", "page.js"))
-    title = html.escape(content.title)
-    kind = {True: "good", None: "mixed", False: "bad"}[content.good]
-    parts = [
-        "<!doctype html><html lang=en><head><meta charset=utf-8>",
-        "<meta name=viewport content='width=device-width, initial-scale=1'>",
-        f"<title>{title}</title><style>{style}</style></head><body>{_BUTTONS}",
-        f"<h1>{title}</h1><p class=note>{html.escape(content.about)}</p>{_NO_SCRIPT}",
-        f"<p class='verdict {kind}'>{_unbroken(html.escape(content.verdict))}</p>",
-        f"<div class=tiles>{''.join(map(_tile, content.tiles))}</div>",
-        *content.body,
-        _assumed(content.assumed),
-        _provenance(content.provenance),
-        embedded(content.results, "results"),
-    ]
-    if any("class=spec>" in piece for piece in content.body):
-        parts.append(f"<script type='text/plain' id=plotly>{_plotly()}</script>")
-    return "\n".join([*parts, f"<script>{script}</script></body></html>\n"])
+    drawn = any("class=spec>" in one for one in content.body)
+    style, script = (packaged(name).decode() for name in ("page.css", "page.js"))
+    return piece(
+        "page", content, {True: "good", None: "mixed", False: "bad"}[content.good],
+        _provenance(content.provenance), plain(content.results), style, script,
+        _plotly() if drawn else "",
+    )  # fmt: skip
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
@@ -171,50 +150,22 @@ def _whole(text: str) -> int | float:
 
 def section(title: str, *pieces: str) -> str:
     """A heading and what stands below it."""
-    return f"<section><h2>{html.escape(title)}</h2>{''.join(pieces)}</section>"
+    return piece("section", title, pieces)
 
 
 def paragraph(*texts: str | Value) -> str:
     """A paragraph of texts and numbers."""
-    return f"<p>{_sentence(texts)}</p>"
-
-
-def _sentence(texts: Sequence[str | Value]) -> str:
-    """Texts, escaped, and numbers, which styles keep whole."""
-    return "".join(
-        inline(one) if isinstance(one, Value) else _unbroken(html.escape(one))
-        for one in texts
-    )
-
-
-def _tile(tile: Tile) -> str:
-    """A conclusion, its answer large."""
-    return (
-        f"<div class=tile><h3>{html.escape(tile.title)}</h3>"
-        f"<p class=answer>{_sentence(tile.answer)}</p>"
-        f"<p class=note>{_sentence(tile.note)}</p></div>"
-    )
-
-
-def _unbroken(text: str) -> str:
-    """A text whose lines do not end between a number and its unit."""
-    return _BEFORE_UNIT.sub("&nbsp;", text)
-
-
-def _assumed(sentences: Sequence[str]) -> str:
-    """What the numbers rest on."""
-    items = "".join(f"<li>{html.escape(one)}</li>" for one in sentences)
-    return section("What was assumed", f"<ul>{items}</ul>")
+    return piece("paragraph", texts)
 
 
 def _provenance(provenance: Provenance) -> str:
-    """Command, versions and digests."""
+    """A table of command, versions and digests."""
     rows = [["command", provenance.command]] if provenance.command else []
     rows += [[name, value] for name, value in provenance.settings.items()]
     rows += [["forcefit", _version("forcefit")], ["Python", platform.python_version()]]
     rows += [[n, known] for n in _PACKAGES if (known := _version(n)) != "absent"]
     rows += [[f"SHA-256 of {one.name}", _digest(one)] for one in provenance.files]
-    return section("Where the numbers come from", table(["what", "value"], rows))
+    return table(["what", "value"], rows)
 
 
 def _version(package: str) -> str:
@@ -242,9 +193,4 @@ def _plotly() -> str:
     Returns:
         base64 of a gzip file.
     """
-    return base64.b64encode(_part("plotly/plotly.min.js.gz")).decode()
-
-
-def _part(name: str) -> bytes:
-    """A file that comes with this chapter."""
-    return files("forcefit.page").joinpath(*name.split("/")).read_bytes()
+    return base64.b64encode(packaged("plotly/plotly.min.js.gz")).decode()

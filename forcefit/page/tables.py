@@ -1,16 +1,16 @@
 """Tables and numbers of a page: each number knows its SI value, for the switch."""
 
-import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from forcefit.page.markup import piece
 from forcefit.page.units import Shown, number_text, shown_in
 
-_SORTS = " scope=col tabindex=0"  # heads take the focus: Enter sorts, as a click does
 _LONG = (
     48  # characters of a text that may wrap in its cell; shorter ones and numbers not
 )
+Marked = tuple[dict[str, str], str]  # attributes and text of a cell
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,21 @@ class Value:
     value: float
     unit: str = ""
     digits: int = 4
+
+    @property
+    def text(self) -> str:
+        """The number in the unit of a drawing."""
+        shown = shown_in(self.unit, self.value)
+        return number_text(self.value * shown.factor, shown.shown, self.digits)
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """The SI value in full, its unit, and its text where another unit is shown."""
+        unit = shown_in(self.unit).unit
+        si = number_text(self.value, unit, self.digits)
+        marks = {"data-v": repr(float(self.value))}
+        marks |= {"data-u": self.unit} if unit else {}
+        return marks | ({"data-si": si} if si != self.text else {})
 
 
 @dataclass(frozen=True)
@@ -46,11 +61,6 @@ class Column:
 Cell = str | float | Value
 
 
-def inline(value: Value) -> str:
-    """A number within a sentence, as HTML."""
-    return f"<span{_two_texts(value)}>{html.escape(_texts(value)[0])}</span>"
-
-
 def table(
     head: Sequence[str | Column], rows: Sequence[Sequence[Cell]], name: str = "table"
 ) -> str:
@@ -65,21 +75,12 @@ def table(
         HTML; texts are escaped.
     """
     columns = [_shown_column(h, [row[k] for row in rows]) for k, h in enumerate(head)]
-    top = "".join(_head_cell(h, s) for h, s in zip(head, columns, strict=True))
-    body = "".join(
-        "<tr>"
-        + "".join(
-            _cell(cell, h, s) for cell, h, s in zip(row, head, columns, strict=True)
-        )
-        + "</tr>"
+    heads = [_head_cell(h, s) for h, s in zip(head, columns, strict=True)]
+    cells = [
+        [_cell(cell, h, s) for cell, h, s in zip(row, head, columns, strict=True)]
         for row in rows
-    )
-    label = html.escape(f"copy {name} as CSV")
-    return (
-        f"<div class=table><button class=copy type=button aria-label='{label}'>CSV"
-        f"</button><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
-        "</div>"
-    )
+    ]
+    return piece("table", name, heads, cells)
 
 
 def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
@@ -90,42 +91,23 @@ def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
     return shown_in(head.unit, max(sizes, default=0.0))
 
 
-def _head_cell(head: str | Column, shown: Shown) -> str:
+def _head_cell(head: str | Column, shown: Shown) -> Marked:
     """Title and unit of a column."""
     if isinstance(head, str):
-        return f"<th{_SORTS}>{html.escape(head)}</th>"
-    title = html.escape(head.title)
+        return {}, head
     if not shown.unit:
-        return f"<th{_SORTS}>{title}</th>"
-    si = html.escape(f"{head.title} [{shown.unit}]")
-    return f'<th{_SORTS} data-si="{si}">{title} [{html.escape(shown.shown)}]</th>'
+        return {}, head.title
+    si = f"{head.title} [{shown.unit}]"
+    return {"data-si": si}, f"{head.title} [{shown.shown}]"
 
 
-def _cell(cell: Cell, head: str | Column, shown: Shown) -> str:
+def _cell(cell: Cell, head: str | Column, shown: Shown) -> Marked:
     """A text, a number under a unit, or a number with its own."""
     if isinstance(cell, str):
-        kind = " class=long" if len(cell) > _LONG else ""
-        return f"<td{kind}>{html.escape(cell)}</td>"
+        return {"class": "long"} if len(cell) > _LONG else {}, cell
     if isinstance(cell, Value):
-        return f"<td{_two_texts(cell)}>{html.escape(_texts(cell)[0])}</td>"
+        return cell.attributes, cell.text
     digits = head.digits if isinstance(head, Column) else 6
+    si = {"data-si": number_text(cell, digits=digits)} if shown.unit else {}
     text = number_text(cell * shown.factor, digits=digits)
-    si = f' data-si="{number_text(cell, digits=digits)}"' if shown.unit else ""
-    return f'<td data-v="{float(cell)!r}"{si}>{text}</td>'
-
-
-def _texts(value: Value) -> tuple[str, str]:
-    """A number in the unit of a drawing, and in SI."""
-    shown = shown_in(value.unit, value.value)
-    return (
-        number_text(value.value * shown.factor, shown.shown, value.digits),
-        number_text(value.value, shown.unit, value.digits),
-    )
-
-
-def _two_texts(value: Value) -> str:
-    """Attributes that hold the SI value in full, its unit, and both as text."""
-    own, si = _texts(value)
-    unit = f' data-u="{html.escape(value.unit)}"' if shown_in(value.unit).unit else ""
-    other = f' data-si="{html.escape(si)}"' if si != own else ""
-    return f' data-v="{float(value.value)!r}"{unit}{other}'
+    return {"data-v": repr(float(cell))} | si, text

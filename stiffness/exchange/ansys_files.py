@@ -29,7 +29,10 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]
 
 
 def harwell_boeing(path: Path, text: str) -> csr_array:
-    """An assembled real matrix; of a symmetric one (RSA) one half is stored.
+    """Read an assembled real matrix; of a symmetric one (RSA) one half is stored.
+
+    SciPy's reader refuses what ``HBMAT`` writes: RSA, right-hand sides, and exponents
+    with a D (SciPy 1.17).
 
     Args:
         path: for messages.

@@ -3,7 +3,6 @@
 Functions take a diagnosis and return HTML of a page.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +14,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.predict import assemble_row
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
-from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, label, matrix
+from forcefit.page.charts import BLUE, GREY, RED, Axis, bars, chart, grid, label, matrix
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.separability import compare_signatures
 from validation.diagnosis.signatures import conditions_of
@@ -23,11 +22,6 @@ from validation.diagnosis.verdict import CLAIM, RIVAL
 
 _SIDES = ((0, 1, "from above"), (0, 2, "from the side"))
 _COLOURS = {"before": RED, "after": BLUE}
-
-
-def _grid(charts: Sequence[str]) -> str:
-    """Charts side by side."""
-    return f"<div class=grid>{''.join(charts)}</div>"
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
@@ -41,7 +35,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
             axis = Axis(f"{kind}: rms on held-out rows", unit)
             caption = "Rows that chose and fitted nothing."
             charts.append(bars(known, axis, caption, float("nan")))
-    return _grid(charts)
+    return grid(*charts)
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
@@ -83,7 +77,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
         axes = Axis("xyz"[i], "m"), Axis("xyz"[j], "m", {"scaleanchor": "x"})
         caption = f"Seen {side}, {larger:.0f} times larger; all rows but outliers."
         charts.append(chart(traces, *axes, caption))
-    return _grid(charts)
+    return grid(*charts)
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
@@ -113,7 +107,7 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
         log = Axis("residual / sigma", options={"type": "log"})
         caption = "Line at 1: noise as stated."
         charts.append(chart(traces, Axis(name, unit), log, caption))
-    return _grid(charts)
+    return grid(*charts)
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:

@@ -30,11 +30,19 @@ def test_no_file_of_another_kind_is_written(tmp_path):
     for name in ("arm.sdf", "arm.txt", "arm"):
         with pytest.raises(BadInput, match=r"expected \.toml or \.urdf or \.xml"):
             ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
-    foreign = tmp_path / "arm.urdf"
-    foreign.write_text("<robot/>")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("arm.urdf", "<robot/>"), ("arm.toml", "# mine\nname = 'arm'\n")]
+)
+def test_a_file_of_the_users_own_is_not_overwritten(tmp_path, name, text):
+    """It may hold comments, which a robot does not."""
+    (tmp_path / name).write_text(text)
     with pytest.raises(BadInput, match="not overwritten"):
-        ff.write_robot(BUILT_IN["arm6"](), foreign)
-    assert [path.name for path in tmp_path.iterdir()] == ["arm.urdf"]
+        ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == text
 
 
 def test_conversion_is_public(tmp_path):

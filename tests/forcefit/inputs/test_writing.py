@@ -97,7 +97,10 @@ def a_dataset(path):
 
 
 # what may stand where a picture is written
-WRITTEN = {".png": b"\x89PNG\r\n", ".svg": b"<?xml", ".pdf": b"%PDF-"}
+WRITTEN = {
+    ".png": b"\x89PNG\r\n", ".svg": b"<?xml", ".pdf": b"%PDF-",
+    ".toml": b"# Written by forcefit.\n",
+}  # fmt: skip
 WRITE = {
     "text.txt": lambda path: write_text("x" * 4000, path),
     "found.json": lambda path: write_json({"x": list(range(999))}, str(path)),

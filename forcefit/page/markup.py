@@ -1,0 +1,31 @@
+"""The markup of pages: macros of ``page.jinja``, which escape every text."""
+
+import re
+from functools import cache, partial
+from importlib.resources import files
+from typing import Any
+
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w]))")
+
+
+def piece(macro: str, *values: Any) -> str:
+    """A piece of a page as HTML: a macro of ``page.jinja`` with its arguments."""
+    return str(getattr(_template(), macro)(*values))
+
+
+def packaged(name: str) -> bytes:
+    """A file that comes with this chapter."""
+    return files("forcefit.page").joinpath(*name.split("/")).read_bytes()
+
+
+@cache
+def _template() -> Any:
+    """The macros; jinja2 is imported when the first page is written."""
+    from jinja2 import Environment, StrictUndefined
+
+    pages = Environment(autoescape=True, trim_blocks=True, undefined=StrictUndefined)
+    # no line ends between a number and its unit
+    pages.filters["unbroken"] = partial(_BEFORE_UNIT.sub, "&nbsp;")
+    compact = {"allow_nan": False, "separators": (",", ":")}
+    pages.policies["json.dumps_kwargs"] = compact
+    return pages.from_string(packaged("page.jinja").decode()).module
