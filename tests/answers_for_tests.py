@@ -42,10 +42,10 @@ from stiffness.fem.material import Material
 from stiffness.fem.stress import peak_stress, stress_influence
 from stiffness.fem.two_ends import two_ends
 from stiffness.link import LinkStiffness
+from tests.beam_questions_for_tests import BEAMS
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
+from tests.effect_questions_for_tests import EFFECTS
 from tests.further_questions_for_tests import FURTHER
-from tests.inner_questions_for_tests import INNER
-from tests.part_questions_for_tests import PARTS
 from tests.robot_questions_for_tests import ROBOTS
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.tolerances_for_tests import plan_for
@@ -233,10 +233,10 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
     "tolerances, all": partial(allocated, {"margin_free": 1.0}, 1.0),
     "tolerances, most": partial(allocated, {"energy": 1.0}, 0.9),
     "tube": partial(bar, {"radius": 0.1, "inner_radius": 0.06}, "rigid"),
-    **PARTS,
+    **BEAMS,
+    **EFFECTS,
     **ROBOTS,
     **FURTHER,
-    **INNER,
 }  # fmt: skip
 
 
