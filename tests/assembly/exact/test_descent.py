@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, null_space
 
-import assembly.exact.descent as descent
 from assembly.exact.dead_load import dead_loads, work_gradient
 from assembly.exact.descent import (
     NotConverged,
-    _independent,
-    _restored,
     _solve,
     advance,
     energy_of,
@@ -27,7 +24,6 @@ from assembly.kinematics.se3 import inverse
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Clearance, Frame, Robot
-from assembly.solvers.cones import into_cones
 from tests.assembly.exact.test_dead_load import heavy, some_loads
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns
@@ -149,24 +145,6 @@ def test_motions_of_the_basis_change_no_closure_but_those_left_to_clearances(
     assert local.rigid_right == pytest.approx(right, abs=1e-12)
 
 
-@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
-def test_rows_are_combined_into_as_many_as_are_independent(rng, unit):
-    rows = rng.normal(size=(2, 5))
-    some = np.vstack([rows, rows[0] - 2 * rows[1], 1e-14 * rng.normal(size=5)])
-    found, how = _independent(unit * some)
-    found = found / unit
-    assert found.shape == (2, 5)
-    assert how.T @ some == pytest.approx(found, abs=1e-13)
-    assert how.T @ how == pytest.approx(np.eye(2), abs=1e-13)
-    back = found.T @ np.linalg.lstsq(found.T, some.T)[0]
-    assert back.T == pytest.approx(some, abs=1e-12)
-    # rows of rounding alone, and none at all
-    for nothing in (1e-16 * some, np.zeros((3, 5)), np.zeros((0, 5)), np.zeros((3, 0))):
-        found, how = _independent(nothing)
-        assert found.shape == (0, nothing.shape[1])
-        assert how.shape == (len(nothing), 0)
-
-
 def test_small_wrenches_are_those_of_a_billionth_in_the_stiffest_spring():
     """Unknowns of springs are roots of energies: their screws squared are softness."""
     frames = (
@@ -210,17 +188,6 @@ def test_problems_are_named_by_robot_and_load():
     assert problem_name(at, loaded) == (
         "exact equilibrium of rod under [0 0 0 1.5 0 -2] N m, N"
     )
-
-
-def test_a_start_without_any_step_downhill_is_said_to_be_one(monkeypatch):
-    """Where no attempt is allowed, with how far it is open."""
-    monkeypatch.setattr(descent, "_ATTEMPTS", 0)
-    local, _, _ = expansion(0)
-    with pytest.raises(NotConverged) as caught:
-        advance(local, 1.0, 0.0, False)
-    assert str(caught.value).startswith("exact equilibrium of random under [")
-    assert ": no step lowers the energy; open by " in str(caught.value)
-    assert caught.value.status.startswith("no step lowers")
 
 
 def test_closures_that_no_clearance_within_its_bounds_closes_have_no_step():
@@ -297,24 +264,6 @@ def test_a_step_is_that_of_clarabel_on_all_unknowns(seed, rigid_legs):
     plays = step.placement.x[model.bounded]
     assert plays == pytest.approx(u.value, abs=1e-3)
     assert step.damping == damping
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_short_step_is_brought_back_onto_the_closures(seed):
-    """To 1e-13, by springs and free motions; plays stay as asked, in their cones."""
-    local, _, h = expansion(seed)
-    model, x = local.placement.model, local.placement.x
-    change = 1e-5 * h
-    after = _restored(local, change)
-    assert place(model, x + change).largest_gap > 1e-9
-    assert after.largest_gap <= 1e-13
-    asked = into_cones((x + change)[model.bounded], model.joints.group)
-    assert after.x[model.bounded] == pytest.approx(asked, abs=1e-14)
-    # from afar it may fail, but makes nothing worse
-    far = _restored(local, 30 * h)
-    inside = x + 30 * h
-    inside[model.bounded] = into_cones(inside[model.bounded], model.joints.group)
-    assert far.largest_gap <= place(model, inside).largest_gap
 
 
 def test_a_refused_step_is_damped_eight_times_as_much_a_good_one_a_tenth():

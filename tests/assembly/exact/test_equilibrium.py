@@ -17,7 +17,7 @@ from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Clearance, Frame, Robot
 from tests.assembly.exact.test_exact import only, pendulum, two_bars
 
 C = 2e-3  # [m] of plays
@@ -130,30 +130,6 @@ def test_where_all_plays_are_pressed_nothing_moves():
     assert active_clearances(local)[1] == pytest.approx([3 * C, 4 * C], rel=1e-12)
     assert tangent_space(local)[0].shape == (2, 0)
     assert least_curvature(local) == np.inf
-
-
-@pytest.mark.parametrize(("ratio", "pressed"), [(1e-8, True), (1e-10, False)])
-def test_a_play_that_touches_is_pressed_by_a_billionth_of_the_largest_force(
-    ratio, pressed
-):
-    """What touches without being pressed may leave, or is held if that is asked."""
-    local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 1e3 * ratio, 0, 1e3])
-    assert active_clearances(local)[0].tolist() == [True, pressed]
-    assert tangent_space(local)[0].shape[1] == (0 if pressed else 1)
-    assert tangent_space(local, hold_touching=True)[0].shape[1] == 0
-    inside = at(two_slides(), [1.0, 0.5], [0, 0, 0, 1e3 * ratio, 0, 1e3])
-    assert tangent_space(inside, hold_touching=True)[0].shape[1] == 1
-
-
-@pytest.mark.parametrize("stiffness", [None, 1e6])
-@pytest.mark.parametrize(("times", "pressed"), [(2.0, True), (0.5, False)])
-def test_a_force_of_an_angles_rounding_presses_nothing(times, pressed, stiffness):
-    """1e-5 of 1e-9 in the stiffest spring, here per reference length of 1 m."""
-    link = None if stiffness is None else MatrixLink(stiffness * np.eye(6))
-    springs = [0.0] * (0 if link is None else 6)
-    force = times * 1e-14 * (stiffness or 1.0)
-    local = at(two_slides(link), [*springs, 0.0, 1.0], [0, 0, 0, force, 0, 0])
-    assert active_clearances(local)[0].tolist() == [False, pressed]
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-3])

@@ -300,19 +300,6 @@ def test_nothing_is_reached_where_nothing_can_close():
         assert not follow(robot, start, held_at(robot, crank=0.0), guess).reached[0]
 
 
-@pytest.mark.parametrize(
-    ("gap", "accepted"),
-    [(0.0, True), (0.9e-5, True), (1.1e-5, False), (1e-3, False), (0.5, False)],
-)
-def test_what_no_joint_can_close_is_accepted_to_a_hundred_thousandth(gap, accepted):
-    """Of the reference length, 2 m: what rounding leaves in files may be so much."""
-    robot = Robot("gap", "far", (
-        Frame("a"), Frame("b", translation=[2 * gap, 0, 0]),
-        Frame("c", joint="revolute"), Frame("far", "c", [2.0, 0, 0]),
-    ), (("a", "b"),))  # fmt: skip
-    assert follow(robot, np.zeros(4), held_at(robot), True).reached[0] == accepted
-
-
 def test_what_a_target_leaves_open_is_still_followed():
     """Two drives of a five-bar and one coordinate asked: any elbow would do."""
     robot, pose = five_bar(), np.full((1, 6), np.nan)

@@ -15,7 +15,6 @@ from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import (
-    _each,
     at_postures,
     flexibility,
     pseudo_inverse,
@@ -206,12 +205,6 @@ def test_an_inverse_and_its_rank_are_the_same_in_any_unit(rng, unit):
     nothing, certain = pseudo_inverse(np.zeros((2, 0, 0)))
     assert nothing.shape == (2, 0, 0)
     assert certain.tolist() == [False, False]
-
-
-def test_every_frame_has_its_own_matrix(rng):
-    C, screws = rng.normal(size=(3, 6, 6)), rng.normal(size=(2, 18))
-    expected = [[C[i] @ row[6 * i : 6 * i + 6] for i in range(3)] for row in screws]
-    assert _each(C, screws) == pytest.approx(np.reshape(expected, (2, 18)))
 
 
 @pytest.mark.parametrize("error", [1e-4, 1e-6, 1e-8])

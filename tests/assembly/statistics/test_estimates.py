@@ -7,7 +7,6 @@ import pytest
 from scipy import stats
 
 from assembly.statistics.estimates import (
-    _modes,
     bracketed,
     mean,
     most_probable,
@@ -79,14 +78,6 @@ def test_the_most_probable_value_is_the_mode(law, mode, positive, rng):
 def test_sizes_that_crowd_at_zero_have_their_mode_there(rng):
     x = np.abs(rng.normal(size=50_000))
     assert most_probable(x, positive=True)["value"] < 0.15
-
-
-@pytest.mark.parametrize("place", [0, 1, 2, 500, 1021, 1022, 1023])
-def test_a_single_peak_is_the_mode_wherever_it_is(place):
-    """The kernel is reflected at both ends, where a peak of one bin stays largest."""
-    counts = np.zeros((1, 1024))
-    counts[0, place] = 7
-    assert _modes(counts, 0.4)[0] == pytest.approx(place, abs=0.01)
 
 
 @pytest.mark.parametrize("values", [[3.0, 3.0], [0.0, 0.0, 0.0], [-2.0] * 5])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.mesh.fit_to_patches import MeshFailed, _nearest_patch, fit_to_patches
+from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
 from stiffness.mesh.solid import (
     Solid,
     boundary_faces,
@@ -18,74 +18,10 @@ from stiffness.mesh.solid import (
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import Patches, find_patches
 from stiffness.surface.primitives import Plane
-from stiffness.surface.surface import Surface, check_surface
+from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
 X, Z = np.array([1.0, 0, 0]), np.array([0.0, 0, 1])
-CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0.4, 0]]) + [3.0, -2.0, -7.0]
-MIDDLE = CORNERS.mean(axis=0)
-# the middle, and 0.4 and 0.8 of the ways to the corners
-PLACES = np.array([
-    MIDDLE + share * (corner - MIDDLE)
-    for share in (0.4, 0.8)
-    for corner in CORNERS
-] + [MIDDLE])  # fmt: skip
-SHARES = np.array([0.4, 0.4, 0.4, 0.8, 0.8, 0.8, 0.0])
-
-
-def patch_of_a_face(heights, angles, unit=1.0):
-    """Of small squares at the places, below a face of length 1 and turned about y."""
-    corners = []
-    for place, height, angle in zip(PLACES, heights, angles, strict=True):
-        across = 0.005 * np.array([np.cos(angle), 0, -np.sin(angle)])
-        along = np.array([0, 0.005, 0])
-        middle = place - [0, 0, height]
-        corners += [middle + s * across + t * along
-                    for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
-    first = 4 * np.arange(len(PLACES))
-    triangles = np.concatenate([first[:, None] + [0, 1, 2], first[:, None] + [0, 2, 3]])
-    surface = Surface(unit * np.array(corners), triangles, "squares")
-    patches = Patches(np.tile(np.arange(len(PLACES)), 2), ())
-    face = np.array([[0, 1, 2]])
-    (patch,) = _nearest_patch(unit * CORNERS, face, surface, patches)
-    return patch
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("place", range(7))
-def test_a_face_is_the_patchs_that_is_parallel_wherever_below_it_that_is(place, unit):
-    """The others are turned by 60 degrees; half a length of distance weighs as much."""
-    angles = np.full(7, np.pi / 3)
-    angles[place] = 0.0
-    assert patch_of_a_face(np.zeros(7), angles, unit) == place
-    heights = np.zeros(7)
-    heights[place] = 0.04
-    assert patch_of_a_face(heights, angles, unit) == place
-
-
-def test_a_patch_seen_from_behind_is_another_ones():
-    """Across one another is half as far from parallel as opposite."""
-    angles = np.full(7, np.pi)
-    angles[2] = np.pi / 2
-    assert patch_of_a_face(np.zeros(7), angles) == 2
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_of_parallel_patches_a_face_is_the_nearest_and_middles_ones(unit):
-    """A place that is the share w of the way to a corner counts as 0.05 w of the face's
-    length further away: 0.02 and 0.04."""
-    flat = np.zeros(7)
-
-    def nearest(*heights):
-        by_share = dict(zip((0.0, 0.4, 0.8), heights, strict=True))
-        patch = patch_of_a_face([by_share[share] for share in SHARES], flat, unit)
-        return SHARES[patch]
-
-    assert nearest(0.0, 0.0, 0.0) == 0.0
-    assert nearest(0.015, 0.0, 0.0) == 0.0
-    assert nearest(0.025, 0.0, 0.0) == 0.4
-    assert nearest(0.05, 0.015, 0.0) == 0.4
-    assert nearest(0.05, 0.025, 0.0) == 0.8
 
 
 def test_nodes_are_grouped_by_the_patches_of_their_faces():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from stiffness.mesh.refine import (
-    _terminal_edges,
     chosen_by_all,
     edge_code,
     edges_of,
@@ -59,32 +58,6 @@ def test_an_edge_is_chosen_by_all_if_every_cell_around_it_chooses_it(rng):
     every = [(chosen[(of_cell == e).any(axis=1)] == e).all() for e in range(count)]
     assert 0 < sum(every) < count
     assert chosen_by_all(of_cell, chosen, count).tolist() == every
-
-
-def test_edges_split_first_are_at_the_ends_of_the_paths_from_a_wanted_cell(rng):
-    """From cell to cell across their longest edges, to one that is the longest of all
-    around it (Rivara)."""
-    solid = crooked(rng)
-    ends, of_cell = edges_of(solid.cells, len(solid.points))
-    length = np.linalg.norm(np.subtract(*solid.points[ends.T]), axis=1)
-    longest = [int(max(edges, key=lambda e: length[e])) for edges in of_cell]
-    for wanted in range(0, len(solid.cells), 5):
-        marked, waiting = set(), [longest[wanted]]
-        while waiting:
-            edge = waiting.pop()
-            if edge not in marked:
-                marked.add(edge)
-                around = np.flatnonzero((of_cell == edge).any(axis=1))
-                waiting += [longest[cell] for cell in around]
-        last = {
-            e
-            for e in marked
-            if all(longest[c] == e for c in np.flatnonzero((of_cell == e).any(axis=1)))
-        }
-        mask = np.arange(len(solid.cells)) == wanted
-        split = _terminal_edges(solid.points, ends, of_cell, mask)
-        assert set(np.flatnonzero(split)) == last
-        assert last
 
 
 def test_a_split_edge_has_its_middle_and_each_cell_there_two_halves(rng):

@@ -1,7 +1,6 @@
 """Which triangles lie on an interface, and which shapes a part's patches are."""
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from forcefit.inputs.table import BadInput
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches, interface_shape, triangles_on
-from stiffness.surface.primitives import Cone, Plane, Sphere, Torus
+from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.recognition import fitted_shape, ring
 from stiffness.surface.surface import Surface, check_surface
 from stiffness.surface.triangle_graph import TriangleGraph
@@ -225,49 +224,3 @@ def test_a_seed_grows_by_a_facet_to_each_side_and_over_no_sharp_edge(rings):
     normals = graph.normals[members]
     widest = np.arccos(np.clip(normals @ graph.normals[seed], -1, 1)).max()
     assert widest == pytest.approx(rings * 2 * np.pi / 16, abs=1e-6)
-
-
-def points_on(shape, count):
-    """Somewhere on each shape, in general position."""
-    rng = np.random.default_rng(4)
-    a, b = rng.uniform(0.2, 1.4, (2, count))
-    if shape is Plane:
-        return np.column_stack([a, b, 0 * a])
-    if shape is Cone:
-        return np.column_stack([
-            (2 + 0.3 * b) * np.cos(a),
-            (2 + 0.3 * b) * np.sin(a),
-            b,
-        ])
-    if shape is Sphere:
-        return np.column_stack([
-            np.cos(a) * np.cos(b),
-            np.sin(a) * np.cos(b),
-            np.sin(b),
-        ])
-    a, b = 2.4 * np.arange(count), 0.9 * np.arange(count)
-    r = 2 + 0.5 * np.cos(b)
-    return np.column_stack([r * np.cos(a), r * np.sin(a), 0.5 * np.sin(b)])
-
-
-@pytest.mark.parametrize(
-    ("shape", "least"), [(Plane, 3), (Cone, 10), (Sphere, 9), (Torus, 12)]
-)
-def test_a_shape_is_that_of_so_many_points_at_least(shape, least):
-    """Ten for a cone, nine for a sphere (a frustum has eight), twelve for a torus."""
-
-    def recognised(count):
-        points = points_on(shape, count)
-        normals = np.tile([0.0, 0, 1], (count, 1))
-        if shape is Cone:
-            normals = points * [1, 1, 0]
-            normals[:, 2] = -0.3 * np.linalg.norm(normals, axis=1)
-        graph = SimpleNamespace(
-            points=points, triangles=np.arange(count)[:, None].repeat(3, axis=1),
-            normals=normals, tolerance=1e-8,
-        )  # fmt: skip
-        return fitted_shape(graph, np.arange(count))
-
-    assert recognised(least - 1) is None
-    for count in (least, least + 1, 150):
-        assert isinstance(recognised(count), shape)
