@@ -200,24 +200,6 @@ def test_what_is_not_solved_side_by_side_the_reference_solves_with_its_own_error
     assert found.bound[-1] <= found.margin[-1]
 
 
-@pytest.mark.parametrize("kappa", [0.1, 0.5, 1.0])
-def test_two_lanes_have_the_bits_of_many(grid, kappa):
-    """Products and sums are rounded one by one, whatever the registers hold."""
-    robot, postures = grid
-    T, mismatch = stack(postures)
-    errors = kappa * robot.errors
-    many = assemble_at(robot, T, errors, mismatch)
-    margins = zone_margin(postures, "rigid", errors)
-    for i in range(0, len(T), 3):
-        some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
-        one = assemble_at(*some)
-        for name in ROWS:
-            assert np.array_equal(row(one, name)[0], row(many, name)[i]), name
-        one = zone_margin(postures[i : i + 1], "rigid", errors)
-        assert one.margin[0] == margins.margin[i]
-        assert one.bound[0] == margins.bound[i]
-
-
 @pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("load", [None, [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]])
 def test_draws_at_one_posture_have_the_bits_of_points(grid, rng, kappa, load):

@@ -259,16 +259,6 @@ def test_a_twisted_thin_plates_error_is_seen_on_one_mesh_and_on_two():
             assert 0.006 < true < told[2] < 6 * true
 
 
-def test_each_motion_has_its_own_factor():
-    """Made-up totals: one motion sank as indicated, another three times as much."""
-    K, e = np.eye(6), 0.01 * np.eye(6)
-    sank = np.diag([0.02, 0.02, 0.06, 0.02, 0.02, 0.02])
-    history = [(K + e + sank, 3 * e, 0 * e), (K + e, e, 0 * e)]
-    error, factor = estimated_error(history)
-    assert np.diag(error) == pytest.approx([0.013, 0.013, 0.039, 0.013, 0.013, 0.013])
-    assert factor == pytest.approx(3.9)
-
-
 def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
     """The same tetrahedra without parts: more than twice the error in bending."""
     solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))

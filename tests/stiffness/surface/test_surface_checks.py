@@ -129,23 +129,6 @@ def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
     assert surface.repairs == ("1 triangles without area dropped",)
 
 
-@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
-    """A second corner for one triangle of a cube: a slit that is closed or refused."""
-    size = unit * 0.1 * np.sqrt(3)
-    for gap, closed in ((0.9e-7 * size, True), (1.1e-7 * size, False)):
-        points = np.concatenate([unit * CUBE, [unit * CUBE[7] + [gap, 0, 0]]])
-        triangles = CUBE_TRIANGLES.copy()
-        triangles[3, triangles[3] == 7] = 8
-        if closed:
-            surface = check_surface(points, triangles, "cube")
-            assert surface.repairs == ("1 pairs of nearly equal vertices merged",)
-            assert len(surface.points) == 8
-        else:
-            with pytest.raises(BadInput, match="cube: the surface is open: 4 edges"):
-                check_surface(points, triangles, "cube")
-
-
 def test_a_crowd_of_vertices_is_refused_before_their_pairs_fill_the_memory(rng):
     """Two billion pairs of 1e-9 m would be 32 GB."""
     points = np.concatenate([CUBE, 1e-9 * rng.normal(size=(60_000, 3))])
