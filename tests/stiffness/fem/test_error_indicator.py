@@ -221,7 +221,8 @@ def test_stiffness_falls_and_two_meshes_tell_the_fall():
 
 PLATE = (0.060, 0.002, 0.100)  # m, width, thickness, length
 # its K by bricks of order 5 that shrink toward the edges (NGSolve, to 5e-4):
-# benchmarks/stiffness_random_references.py; the largest error of K is that of RZ
+# benchmarks/evidence/stiffness_random_references.py; the largest error of K is that of
+# RZ
 PLATE_RZ = 50.96  # N m/rad
 
 

@@ -318,7 +318,7 @@ def test_between_finite_elements_the_error_is_covered_too(length):
 
 SHIPPED = EXAMPLE.parent / "stiffness_library"
 # diagonal RX, RZ, TX, TZ of links between the entries that ship, by Fourier modes in
-# their half section (benchmarks/stiffness_round_references.py), good to 1e-6
+# their half section (benchmarks/evidence/stiffness_round_references.py), good to 1e-6
 BETWEEN = {
     ("round", 0.25): (137442.8, 26455.52, 6526643.0, 355428100.0),
     ("round", 0.37): (94455.39, 17875.35, 2061490.0, 239366500.0),

@@ -1,7 +1,7 @@
 """With clearances: how often the simulation converges, how long, and how near it is.
 
-Run ``python benchmarks/crosscheck_play.py [draws [robot ...]]``; 120 draws of each
-robot take several minutes and print a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_play.py [draws [robot ...]]``; 120 draws of
+each robot take several minutes and print a table of ``docs/crosscheck.md``.
 """
 
 import sys

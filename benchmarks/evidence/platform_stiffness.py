@@ -1,7 +1,7 @@
 """K_C of the paper's robot over its half workspace: time beside that of (22).
 
-``python -m benchmarks.platform_stiffness`` prints microseconds a posture, the least of
-several runs in turn, and how far K_C is from that of one posture at a time.
+``python -m benchmarks.evidence.platform_stiffness`` prints microseconds a posture, the
+least of several runs in turn, and how far K_C is from that of one posture at a time.
 """
 
 import time

@@ -1,10 +1,10 @@
 """K_C of three robots by every method, side by side.
 
-``python -m benchmarks.stiffness_methods`` prints 1 / C_ii at the platform's origin
-along each axis, and how far each method's compliance is from the first, entries over
-sqrt(C_ii C_jj): virtual joints, the same compiled, the displacement method over all
-bodies, the tangent of the exact equilibrium, differences of the least energy (22), load
-steps in Exudyn with links as springs and as beams, and Exudyn's linearised system.
+``python -m benchmarks.evidence.stiffness_methods`` prints 1 / C_ii at the platform's
+origin along each axis, and how far each method's compliance is from the first, entries
+over sqrt(C_ii C_jj): virtual joints, the same compiled, the displacement method over
+all bodies, the tangent of the exact equilibrium, differences of the least energy (22),
+load steps in Exudyn with links as springs and as beams, and Exudyn's linearised system.
 """
 
 from collections.abc import Iterator

@@ -1,7 +1,7 @@
 """Slopes, limits and what finite rotations leave, over poses and draws.
 
-Run ``python benchmarks/crosscheck_slopes.py [robot ...]``; it takes a minute or two and
-prints the tables of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_slopes.py [robot ...]``; it takes a minute
+or two and prints the tables of ``docs/crosscheck.md``.
 """
 
 import itertools

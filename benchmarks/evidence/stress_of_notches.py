@@ -1,6 +1,6 @@
 """Judge the estimated error of peak stresses on shouldered, grooved and bored shafts.
 
-``python benchmarks/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
+``python benchmarks/evidence/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
 
 Twenty parts drawn at random, each in tension, torsion or bending, solved and read as
 ``forcefit stiffness stress`` does, one radius away from the ends.  Their references

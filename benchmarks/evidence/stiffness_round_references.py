@@ -1,6 +1,6 @@
 """K_E of the round links of ``meshes/`` by Fourier modes in their half section.
 
-``python benchmarks/stiffness_round_references.py`` (``pip install ngsolve``)
+``python benchmarks/evidence/stiffness_round_references.py`` (``pip install ngsolve``)
 
 A body of revolution moves in modes of the angle about its axis: stretching and torsion
 in mode 0, bending and shear in mode 1.  Each is a problem in the plane (r, z), solved

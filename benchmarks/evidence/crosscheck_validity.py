@@ -1,8 +1,8 @@
 """Where the virtual-joint model's assumptions cost more than one per cent or 20 um.
 
-Run ``python benchmarks/crosscheck_validity.py``: five minutes.  It prints the tables of
-``docs/validity.md`` and writes its figures and ``validity.json`` to ``docs/``, or to a
-folder that is given.
+Run ``python benchmarks/evidence/crosscheck_validity.py``: five minutes.  It prints the
+tables of ``docs/validity.md`` and writes its figures and ``validity.json`` to
+``docs/``, or to a folder that is given.
 
 Errors are drawn up to a size in rad about, and a hundredth of it in m along, each axis,
 over 5 poses x 4 draws a robot.  Joints are tight but for disc and cone.
@@ -36,7 +36,7 @@ from validation.assumptions.validity import (
 )
 from validation.multibody.simulation import without_clearance
 
-FORKS = Path(__file__).parents[1] / "meshes" / "distal_forks.stl"
+FORKS = Path(__file__).parents[2] / "meshes" / "distal_forks.stl"
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
 BORES = ("bore=0,0,0/0,1,0/0.011", "bore=0,0,0.452/0,1,0/0.011")
 PAPER = 0.02  # [rad] the paper's errors
@@ -263,7 +263,7 @@ def print_table(rows: list[dict]) -> None:
 def main() -> None:
     """Everything, to the screen and to a folder."""
     folder = Path(
-        sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs"
+        sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[2] / "docs"
     )
     rows: list[dict] = []
     for name in POSES:

@@ -1,6 +1,7 @@
 """K_E of the L-bracket and the link with forks from a half and an eighth of them.
 
-``python benchmarks/stiffness_part_references.py [link ...]`` (``pip install ngsolve``)
+``python benchmarks/evidence/stiffness_part_references.py [link ...]`` (``pip install
+ngsolve``)
 
 Mirror symmetry splits the six motions of the tip into groups that are symmetric or
 antisymmetric in each plane, so that a part of the solid is enough: a half of the

@@ -1,6 +1,7 @@
 """What K_E costs beside NGSolve and CalculiX, at errors against one reference.
 
-``python benchmarks/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on the path)
+``python benchmarks/evidence/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on
+the path)
 
 Every case is a process of its own; its processor time (children and imports counted)
 and its largest memory are the machine's own account of it.  Wall times mean something
@@ -66,7 +67,7 @@ def given(name):
     from stiffness.surface.interface import parse_interface
     from stiffness.surface.surface import read_surface
 
-    surface = read_surface(HERE.parent / "meshes" / f"{name}.stl")
+    surface = read_surface(HERE.parents[1] / "meshes" / f"{name}.stl")
     faces = [parse_interface(text) for text in INTERFACES[name]]
     centers = [interface_center(surface, face, "face") for face in faces]
     return surface, faces, np.array(centers)

@@ -1,6 +1,6 @@
 """K_C of random robots by several methods.
 
-``python -m benchmarks.stiffness_random_robots``
+``python -m benchmarks.evidence.stiffness_random_robots``
 
 100 random robots of one to three legs, with play, errors and loads, each at home and at
 two more poses to which its drives take it; random robots are drawn until so many can

@@ -1,7 +1,7 @@
 """The published solids of the Princeton beam done again: 500 x 12 x 4 bricks.
 
-``python -m benchmarks.princeton_bricks`` (two minutes); ``.. 90 75`` also bends the
-bricks themselves under these angles, with large rotations, ten minutes each.
+``python -m benchmarks.evidence.princeton_bricks`` (two minutes); ``.. 90 75`` also
+bends the bricks themselves under these angles, with large rotations, ten minutes each.
 
 The published rows were computed with that many bricks in Ansys; of eight nodes and
 B-bar (mean dilatation) they are too stiff across the thickness, where four of them
@@ -27,7 +27,7 @@ from scipy.sparse.linalg import splu
 
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink
-from benchmarks.princeton_solids import (
+from benchmarks.evidence.princeton_solids import (
     ANGLES,
     HEIGHT,
     LENGTH,

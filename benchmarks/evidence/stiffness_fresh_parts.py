@@ -1,8 +1,9 @@
 """Judge the error estimate of K_E on filleted, layered and thin parts drawn at random.
 
-``python benchmarks/stiffness_fresh_parts.py FOLDER [--parts 0:40]``, after
-``python benchmarks/stiffness_fresh_references.py FOLDER``, which writes the STEP files
-and needs NGSolve; K of its references is kept in the JSON file of this one's name.
+``python benchmarks/evidence/stiffness_fresh_parts.py FOLDER [--parts 0:40]``, after
+``python benchmarks/evidence/stiffness_fresh_references.py FOLDER``, which writes the
+STEP files and needs NGSolve; K of its references is kept in the JSON file of this one's
+name.
 
 Each part is solved from its STEP file as ``forcefit stiffness fea`` does, at the
 default accuracy.  Printed: unknowns, meshes, the true error and the uncertainty of the

@@ -1,6 +1,6 @@
 """Diagnosis of random robots of which three points are measured at once.
 
-    python -m benchmarks.diagnosis_points [--first 710000] [--count 10]
+    python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
         [--hidden library|outside] [--common 1.0] [--device 5e-6]
 
 Case k is drawn from seed k: a robot (``random_robots``), 128 rows of 64 configurations,

@@ -1,6 +1,6 @@
 """Rows that a planned campaign saves against rows drawn at random.
 
-    python benchmarks/plan_rows.py OUT.json --count 50 [--first 0]
+    python benchmarks/evidence/plan_rows.py OUT.json --count 50 [--first 0]
 
 Case k, drawn from seed k: a robot, one effect of the library, so large that it shows by
 STRENGTH sigma (rms of the readings of random rows).  Campaigns of more and more rows

@@ -1,7 +1,7 @@
 """The paper's robot with its distal links as solids of finite elements.
 
-Run ``python benchmarks/crosscheck_solids.py``; a minute or two, most of it condensing
-the mesh.  It prints a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_solids.py``; a minute or two, most of it
+condensing the mesh.  It prints a table of ``docs/crosscheck.md``.
 """
 
 import time
@@ -14,7 +14,7 @@ from assembly.kinematics.posture import place_robot
 from assembly.model.robot import MeshLink
 from validation.crosscheck.crosscheck import crosscheck
 
-SURFACE = Path(__file__).parents[1] / "meshes" / "distal_plain.stl"
+SURFACE = Path(__file__).parents[2] / "meshes" / "distal_plain.stl"
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Judge the error estimate of K_E on parts drawn at random, against other solvers.
 
-``python benchmarks/stiffness_random_parts.py [--set test] [--parts 0:33]``
+``python benchmarks/evidence/stiffness_random_parts.py [--set test] [--parts 0:33]``
 (``pip install ngsolve`` for parts whose reference is not in the JSON file beside this)
 
 Eleven kinds of parts in turn: plate, bar, box, channel, L-bracket, fork, rod, tube,

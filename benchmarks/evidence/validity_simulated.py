@@ -1,8 +1,8 @@
 """The costs of ``crosscheck_validity.py`` once more, by the multibody simulation.
 
-Run ``python benchmarks/validity_simulated.py``: some two minutes; it prints the last
-table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts at nine
-nodes of each beam, a pin presses against two bushes as two contacts.
+Run ``python benchmarks/evidence/validity_simulated.py``: some two minutes; it prints
+the last table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts
+at nine nodes of each beam, a pin presses against two bushes as two contacts.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
 """How large a report is, and how long a browser takes to open it.
 
-    python benchmarks/report_opening.py my_study/report.html
+    python benchmarks/evidence/report_opening.py my_study/report.html
 
 Headless Chromium by selenium, which draws without a graphics card: a desktop is faster.
 Times are from the start of loading: the headline readable, the first screen drawn, all

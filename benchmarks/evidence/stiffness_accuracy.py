@@ -1,6 +1,6 @@
 """Print the true and the estimated error of K_E, mesh by mesh.
 
-``python benchmarks/stiffness_accuracy.py [link ...] [--kind rigid]``
+``python benchmarks/evidence/stiffness_accuracy.py [link ...] [--kind rigid]``
 
 Of the meshes' own K, the upper end of the interval whose middle is returned.  Each
 link of ``meshes/`` is refined until 430 k unknowns or seven meshes; below them
@@ -29,7 +29,7 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.surface import read_surface
 
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
-MESHES = Path(__file__).parents[1] / "meshes"
+MESHES = Path(__file__).parents[2] / "meshes"
 BORE = "bore=0,0,{}/0,1,0/0.011"
 LINKS = {
     "distal_plain": ("z=0", "z=0.452"),

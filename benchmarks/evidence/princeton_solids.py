@@ -1,6 +1,6 @@
 """The Princeton beam as a solid of finite elements with large rotations.
 
-``python -m benchmarks.princeton_solids`` (half an hour)
+``python -m benchmarks.evidence.princeton_solids`` (half an hour)
 
 An arbiter between the published beams and the published solids, which differ by up to
 3.5 %: a box of bricks of high order, Saint Venant's and Kirchhoff's material, total

@@ -1,6 +1,7 @@
 """A simulated machine corrected: its error at the machine before and after.
 
-    python benchmarks/compensation.py OUT.json --count 20 [--first 0] [--robots arm6]
+    python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
+        [--robots arm6]
 
 Case k, drawn from seed k: a robot of six drives, or a Delta (positions alone), with one
 or two hidden effects of the library or outside it, each 5 times the noise.  It is

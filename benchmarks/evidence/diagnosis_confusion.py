@@ -1,7 +1,7 @@
 """Confusion matrix of the diagnosis over random campaigns with hidden effects.
 
-    python benchmarks/diagnosis_confusion.py FOLDER --count 200      # make, diagnose
-    python benchmarks/diagnosis_confusion.py FOLDER --score          # what is there
+    python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
+    python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
 
 Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
 one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or

@@ -1,6 +1,6 @@
 """Judge the estimated error of peak stresses by Peterson's charts.
 
-``python -m benchmarks.stress_of_peterson [--parts 0:10] [--accuracy 0.02]``
+``python -m benchmarks.evidence.stress_of_peterson [--parts 0:10] [--accuracy 0.02]``
 
 Ten parts drawn at random, of kinds whose factors are printed: shoulder fillets in
 tension, bending and torsion, circumferential grooves in torsion, plates with a hole in
@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.stress_of_notches import COMPONENTS, Part, surface_of
+from benchmarks.evidence.stress_of_notches import COMPONENTS, Part, surface_of
 from stiffness.fem.fea import FemOptions, solve_link
 from stiffness.fem.material import Material
 from stiffness.fem.stress import stress_influence

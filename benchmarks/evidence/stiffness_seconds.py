@@ -1,6 +1,6 @@
 """How long K_E of a part takes at most: random parts with surfaces of many triangles.
 
-    python -m benchmarks.stiffness_seconds OUT.json [--count 50] [--seed 3]
+    python -m benchmarks.evidence.stiffness_seconds OUT.json [--count 50] [--seed 3]
         [--accuracy 0.005]
 
 Parts as in ``stiffness_random_parts.py``, of another seed, each triangle of their
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.stiffness_random_parts import YOUNG, draw_part, surface_of
+from benchmarks.evidence.stiffness_random_parts import YOUNG, draw_part, surface_of
 from forcefit.inputs.writing import write_json
 from stiffness.fem.fea import FemOptions, solve_link
 from stiffness.fem.material import Material

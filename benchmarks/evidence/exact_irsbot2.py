@@ -1,6 +1,6 @@
 """The exact equilibrium of the paper's robot at its full errors, over the workspace.
 
-Run as ``python -m benchmarks.exact_irsbot2 [STEP_MM]``; prints the tables of
+Run as ``python -m benchmarks.evidence.exact_irsbot2 [STEP_MM]``; prints the tables of
 ``docs/exact.md``: convergence, what the answers leave open, what the linear model gets
 wrong, and times.  The draws are those of the reference reconstruction (``literal``: all
 components positive, ``signed``: random signs).

@@ -1,6 +1,7 @@
 """K_E of the links of ``meshes/`` by NGSolve, whole and from their exact geometry.
 
-``python benchmarks/stiffness_references.py [link ...]`` (``pip install ngsolve``)
+``python benchmarks/evidence/stiffness_references.py [link ...]`` (``pip install
+ngsolve``)
 
 The solids are built once more from the dimensions in ``meshes/make.py``, meshed by
 Netgen with thin layers of elements along the singular edges of the interfaces, curved,

@@ -1,6 +1,6 @@
 """K_E of the parts of ``stiffness_fresh_parts.py`` by NGSolve, and their STEP files.
 
-``python benchmarks/stiffness_fresh_references.py FOLDER [--parts 0:40]``
+``python benchmarks/evidence/stiffness_fresh_references.py FOLDER [--parts 0:40]``
 (``pip install ngsolve``; nothing else of this package is needed)
 
 Each part is written to FOLDER as a STEP file in millimetres.  K is that of a half or a
