@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many, place_robot, together
+from assembly.kinematics.posture import home_posture, place_many, place_robot
 from assembly.linear import energy
 from assembly.linear.certificate import (
     bound_screw,
     unproved,
     unproved_screw,
 )
-from assembly.linear.energy import CannotAssemble, solve_assembly, together_at
+from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
@@ -23,7 +23,6 @@ from tests.robots_for_tests import (
     coaxial_beams,
     irsbot2_with,
     random_robot,
-    row,
 )
 
 
@@ -79,7 +78,6 @@ def spoilt(solve):
 @pytest.mark.slow
 def test_what_no_solver_proves_is_not_certified(monkeypatch):
     """The edge of the zone with Newton's method taken away and the others spoilt."""
-    from assembly.linear import energy
     from assembly.report.results import solution_of, solution_text
     from assembly.solvers import conic
 
@@ -295,30 +293,6 @@ def test_within_the_zone_a_gap_counts_beside_the_energy_without_clearance():
     assert answer.stored < 1e-6 * answer.energy_without_clearance
     scale = 1e-4 * answer.energy_without_clearance
     assert answer.relative_gap() * scale == pytest.approx(answer.duality_gap())
-
-
-def test_points_solved_one_by_one_are_what_each_is():
-    """Bounds are energies less their gaps; a clearance beyond its cone by a half."""
-    robot = load_robot("five_bar")
-    errors = np.zeros((len(robot.frames), 6))
-    errors[:, 3:] = 1e-3
-    posture = home_posture(robot.with_errors(errors))
-    loads = [np.zeros(6), np.array([0, 0, 0, 3.0, -2.0, 0])]
-    both = [solve_assembly(posture, load) for load in loads]
-    found = together_at(together([posture] * 2), both)
-    for name, values in (
-        ("energy", [a.energy for a in both]),
-        ("duality_gap", [a.energy - (a.energy - a.duality_gap()) for a in both]),
-        ("platform_screw", [a.platform_screw for a in both]),
-        ("multipliers", [a.multipliers for a in both]),
-        ("clearances", [a.clearances for a in both]),
-        ("closure_residual", [a.closure_residual() for a in both]),
-    ):
-        assert np.array_equal(row(found, name), values), name
-    assert found.certified.all()
-    assert found[1] is both[1]
-    two = np.array([[0.6, 0.8, 0.1], [0.9, 1.2, 0.0]])
-    assert energy._excess_of(two, np.array([0, 2, 3])) == pytest.approx([0.0, 0.5])
 
 
 def test_each_half_of_the_screw_is_proved_to_its_own_size():

@@ -15,7 +15,6 @@ from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import (
-    at_postures,
     flexibility,
     pseudo_inverse,
 )
@@ -177,19 +176,6 @@ def test_built_in_screws_push_back_with_the_energy_they_store(seed):
     assert -x @ A @ x / 2 == pytest.approx(energy, rel=1e-6)
     force = solved(built_in, np.zeros(6)).joint_wrenches[0] @ columns
     assert force == pytest.approx(A @ x, abs=1e-7 * np.abs(A).max())
-
-
-@pytest.mark.parametrize("own", [
-    [], [0], [2, 0, 1], [1, 1, 1, 1], [0, 2, 0, 2, 2], [3, 3, 0],
-    [0] * 9 + [1, 2, 3],
-], ids=str)  # fmt: skip
-def test_rows_are_multiplied_with_their_postures_matrices(rng, own):
-    """Row by row, in any order; of four postures some may have no row."""
-    matrices, posture = rng.normal(size=(4, 3, 5)), np.array(own, dtype=int)
-    vectors = rng.normal(size=(len(own), 5))
-    found = at_postures(posture)(matrices, vectors)
-    expected = [matrices[i] @ v for i, v in zip(own, vectors, strict=True)]
-    assert found == pytest.approx(np.reshape(expected, (-1, 3)), rel=1e-13)
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
