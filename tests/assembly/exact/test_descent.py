@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, null_space
 
+import assembly.exact.descent as descent
 from assembly.exact.dead_load import dead_loads, work_gradient
 from assembly.exact.descent import (
     NotConverged,
@@ -205,3 +206,14 @@ def test_a_step_is_that_of_clarabel_on_all_unknowns(seed, rigid_legs):
     plays = step.placement.x[model.bounded]
     assert plays == pytest.approx(u.value, abs=1e-3)
     assert step.damping == damping
+
+
+def test_a_start_without_any_step_downhill_is_said_to_be_one(monkeypatch):
+    """Where no attempt is allowed, with how far it is open."""
+    monkeypatch.setattr(descent, "_ATTEMPTS", 0)
+    local, _, _ = expansion(0)
+    with pytest.raises(NotConverged) as caught:
+        advance(local, 1.0, 0.0, False)
+    assert str(caught.value).startswith("exact equilibrium of random under [")
+    assert ": no step lowers the energy; open by " in str(caught.value)
+    assert caught.value.status.startswith("no step lowers")

@@ -85,3 +85,11 @@ def test_unless_another_is_wanted_the_machines_best_solver_is_used(monkeypatch, 
     for wish in (None, "PARDISO", "SuperLU"):
         np.testing.assert_allclose(solve(twice, loads, wish), 0.5)
     assert len(asked) == (2 if best == "PARDISO" else 1)
+
+
+def test_where_mkl_is_not_installed_there_is_no_library(monkeypatch):
+    def absent(name):
+        raise sparse_solver.PackageNotFoundError(name)
+
+    monkeypatch.setattr(sparse_solver, "files", absent)
+    assert _mkl() is None
