@@ -42,10 +42,10 @@ from stiffness.fem.material import Material
 from stiffness.fem.stress import peak_stress, stress_influence
 from stiffness.fem.two_ends import two_ends
 from stiffness.link import LinkStiffness
+from tests.beam_questions_for_tests import BEAMS
 from tests.built_in_robots_for_tests import CLOSE, LOAD, WORKSPACE
+from tests.effect_questions_for_tests import EFFECTS
 from tests.further_questions_for_tests import FURTHER
-from tests.inner_questions_for_tests import INNER
-from tests.part_questions_for_tests import PARTS
 from tests.robot_questions_for_tests import ROBOTS
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.tolerances_for_tests import plan_for
@@ -59,6 +59,8 @@ LEFT_OUT = (
     "excess", "stationarity", "mismatch", "linearisation_error", "cuts",
     "behind",  # eigenvectors are of either sign, and a rank that numbers decide
 )  # fmt: skip
+# fields of results that repeat what was asked, or what is worked out on the way
+NO_ANSWERS = {"robot", "linearisation", "joints", "plan", "sources"}
 STEADY = 3e-8  # relative change of an answer so moved that is none
 SMALLEST = 1e-8  # in SI: what is smaller is compared with it
 PRINTED = "--print"  # the answers, instead of storing them
@@ -98,14 +100,14 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
     if value is None or isinstance(value, str) or id(value) in above:
         return
     above = above | {id(value)}
+    left_out: set[str] = set()
     if dataclasses.is_dataclass(value):
         value = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        left_out = NO_ANSWERS
     if isinstance(value, Mapping):
         for name, one in value.items():
-            # equal joints of another robot come from a cache with that robot
-            cached = name == "robot" and place.endswith("/joints")
-            left_out = any(word in str(name) for word in LEFT_OUT)
-            if not (cached or left_out):
+            passing = any(word in str(name) for word in LEFT_OUT)
+            if name not in left_out and not passing:
                 # what is named by its number or its frame is gathered
                 own = name if str(name).isidentifier() else ""
                 _gather(one, f"{place}/{own}", to, above)
@@ -233,10 +235,10 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
     "tolerances, all": partial(allocated, {"margin_free": 1.0}, 1.0),
     "tolerances, most": partial(allocated, {"energy": 1.0}, 0.9),
     "tube": partial(bar, {"radius": 0.1, "inner_radius": 0.06}, "rigid"),
-    **PARTS,
+    **BEAMS,
+    **EFFECTS,
     **ROBOTS,
     **FURTHER,
-    **INNER,
 }  # fmt: skip
 
 

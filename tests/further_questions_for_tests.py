@@ -1,6 +1,6 @@
 """Questions about what is seldom needed, for ``answers_for_tests.py``: meshes that are
 refined, surfaces that are repaired, motions that are finite, poses that clearances
-leave free, whatever a campaign's residual varies with."""
+leave free."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,24 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.places import drives
-from assembly.effects.units import units_of
 from assembly.kinematics.posture import Posture, place_many_joints, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.load import loads_with_weight
 from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.pose_error import reachable_screws
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.predict import predict, with_finite_motions
 from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import flexibility
-from assembly.model.robot import Robot
 from assembly.report.error_body import error_body
 from assembly.robots import load_robot
 from assembly.statistics.stiffness_spread import draw_stiffnesses
-from assembly.statistics.uniform_clearance import diagnose as diagnose_chains
 from stiffness.fem.fea import FemOptions, solve_bar
 from stiffness.fem.material import Material
 from stiffness.surface.decimate import coarser_surface
@@ -35,12 +29,7 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import triangles_on
 from stiffness.surface.surface import check_surface
 from tests.built_in_robots_for_tests import LOAD, WORKSPACE
-from tests.part_questions_for_tests import FUNCTIONS
-from tests.robots_for_tests import random_robot
 from tests.solids_for_tests import cylinder
-from validation.campaign.campaign_file import read_campaign
-from validation.diagnosis.lack_of_fit import trends
-from validation.diagnosis.signatures import conditions_of
 
 TESTS = Path(__file__).parent
 
@@ -113,27 +102,6 @@ def finite(name: str, nudge: float) -> Any:
     }
 
 
-def finite_effects(name: str, nudge: float) -> Any:
-    """What effects add to finite motions of two rows of a campaign."""
-    campaign = read_campaign(TESTS / "campaigns" / name)
-    campaign = replace(campaign, loads=campaign.loads * (1 + nudge))
-    conditions = replace(conditions_of(campaign).take(np.arange(2)), exact=True)
-    found = {}
-    for key, effect in LIBRARY.items():
-        robot = conditions.robot
-        places = effect.frames(robot)[:1] if effect.frames else ("",)
-        values = {
-            f"{place}.{u.name}" if place and u.name else place or u.name:
-            float(np.clip(u.start + 0.7 * u.scale, u.lower, u.upper))
-            for place in places
-            for u in effect.unknowns(robot)
-        }  # fmt: skip
-        changed = apply_effects(conditions, {key: effect.public(robot, values)})
-        if not effect.clearance:
-            found[key] = predict(changed).deviation
-    return found
-
-
 def left_free(name: str, nudge: float) -> Any:
     """The nearest pose, bodies of pose errors, stiffnesses of a few draws."""
     where = {key: (2 * low + high) / 3 for key, (low, high) in WORKSPACE[name].items()}
@@ -157,60 +125,10 @@ def left_free(name: str, nudge: float) -> Any:
     return found
 
 
-def flexible(nudge: float) -> Any:
-    """Random robots without clearance, solved by one inverse."""
-    found = []
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        robot = random_robot(rng, 2 + seed % 2, link_share=1.0)
-        robot = Robot(
-            robot.name, robot.platform,
-            tuple(replace(f, clearance=None) for f in robot.frames), robot.closures,
-        )  # fmt: skip
-        here = place_robot(robot)
-        both = replace(
-            here, coordinates=np.array([here.coordinates] * 2),
-            transforms=np.array([here.transforms] * 2),
-        )  # fmt: skip
-        loads = rng.normal(size=(2, 6)) * (1 + nudge)
-        forces = loads_with_weight(both, loads, np.array([[0.5, 0, -9.81]]))
-        errors = rng.normal(size=(2, 6 * len(robot.frames))) * 1e-4
-        model = flexibility(both)
-        found.append(model.solve([0, 1], errors, forces))
-    return found
-
-
-def varying(name: str, nudge: float) -> Any:
-    """What readings vary with, before anything explains them."""
-    campaign = read_campaign(TESTS / "campaigns" / name)
-    campaign = replace(campaign, measured=campaign.measured * (1 + nudge))
-    conditions = conditions_of(campaign)
-    residual = campaign.measured - predict(conditions).deviation
-    return trends(campaign, conditions, residual)
-
-
-def units(nudge: float) -> Any:
-    """Units of the parameters of functions; worth of chains that are correlated."""
-    robot = load_robot("3rrr")
-    rng = np.random.default_rng(2)
-    chains = rng.normal(size=(4, 100)) * (1 + nudge)
-    chains[1:] += 0.4 * chains[:-1]
-    return {
-        "units": [units_of(robot, function) for function in FUNCTIONS],
-        "chains": [diagnose_chains(chains), diagnose_chains(np.cumsum(chains, axis=1))],
-    }
-
-
 FURTHER: dict[str, Callable[[float], Any]] = {
     "refined": refined,
     "repaired": repaired,
     **{f"finite {n}": partial(finite, n) for n in ("five_bar", "hexapod", "arm6")},
-    **{f"finite effects, {n}": partial(finite_effects, n)
-       for n in ("encoder_offset", "base_compliance_drift")},
     **{f"left free, {n}": partial(left_free, n)
        for n in ("five_bar", "hexapod", "delta")},
-    "flexible": flexible,
-    **{f"varying, {n}": partial(varying, n)
-       for n in ("self_weight", "base_compliance_drift", "thermal_expansion")},
-    "units": units,
 }  # fmt: skip

@@ -12,15 +12,6 @@ from numpy.typing import NDArray
 from assembly.kinematics.nominal import motion_screws, size_of
 from assembly.kinematics.pieces import cut_beams
 from assembly.kinematics.posture import place_many, place_many_joints, place_robot
-from assembly.kinematics.se3 import (
-    bracket,
-    bracket_form,
-    exponential,
-    left_jacobian,
-    logarithm,
-    second_form,
-    turn_jacobian,
-)
 from assembly.kinematics.singularity import find_singularities
 from assembly.linear.certificate import bound_screw
 from assembly.linear.energy import solve_assembly
@@ -136,23 +127,6 @@ def placed(name: str, nudge: float) -> Any:
     }  # fmt: skip
 
 
-def screws(nudge: float) -> Any:
-    """Exponentials, logarithms and their derivatives, of small and of large turns."""
-    sizes = (1e-9, 1e-4, 0.03, 0.7, 2.9, 3.14)
-    one = np.array([0.3, -0.5, 0.81, 0.2, -0.4, 0.1]) * (1 + nudge)
-    wrench = np.array([1.0, -2.0, 0.5, 3.0, 0.2, -1.0])
-    some = [size * one for size in sizes]
-    return {
-        "exponential": [exponential(s) for s in some],
-        "logarithm": [logarithm(exponential(s)) for s in some],
-        "turn": [turn_jacobian(s[:3]) for s in some],
-        "left": [left_jacobian(s) for s in some],
-        "second": [second_form(s, wrench) for s in some],
-        "bracket": bracket(one),
-        "form": bracket_form(wrench),
-    }
-
-
 def in_a_row(play: float) -> Robot:
     """Two springy bars from two walls that meet in a joint with clearance."""
     link = MatrixLink(np.diag([2e3, 2e3, 2e3, 1e6, 2e6, 1e6]))
@@ -207,7 +181,6 @@ ROBOTS: dict[str, Callable[[float], Any]] = {
     **{f"of any kind, {seed}": partial(of_any_kind, seed) for seed in range(4)},
     **{f"at once, {n}": partial(at_once, n) for n in ("hexapod", "3rrr", "five_bar")},
     **{f"placed, {n}": partial(placed, n) for n in WORKSPACE},
-    "screws": screws,
     **{f"tolerances, {m}": partial(by_play, m) for m in CLEARANCE_MODELS},
     "shown": shown,
 }

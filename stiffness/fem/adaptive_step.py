@@ -45,7 +45,7 @@ from stiffness.mesh.regions import is_jagged
 from stiffness.mesh.solid import Solid
 
 # effectivity index of a first mesh: 0.6 to 1.1 on the training parts of
-# benchmarks/stiffness_random_parts.py
+# benchmarks/evidence/stiffness_random_parts.py
 DEFAULT_EFFECTIVITY = 2.0
 SAFETY_FACTOR = 1.3
 

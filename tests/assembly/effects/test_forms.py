@@ -97,15 +97,6 @@ def test_no_names_are_no_columns():
         assert columns(form, [], at=0.0).shape == (len(X), 0)
 
 
-def test_variables_that_forms_may_have():
-    """As docs/robot_files.md says: what remembers by itself has one, a reversal two."""
-    assert {name: form.most for name, form in FORMS.items()} == {
-        "powers": 2, "waves": 2, "spline": 2, "lag": 1, "creep": 1, "step": 1,
-        "slow_wave": 1, "reversal": 2, "slip": 1, "scaled_waves": 2,
-        "reversal_waves": 2, "knee": 1,
-    }  # fmt: skip
-
-
 def test_a_knee_has_one_slope_up_to_a_load_and_another_beyond_it():
     """A spring of 2 rad/(N m) up to 3 N m, of 0.5 beyond; and a jump of 0.1."""
     load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])

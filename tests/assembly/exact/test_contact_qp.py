@@ -8,11 +8,8 @@ from scipy.optimize import minimize
 
 from assembly.exact.contact_qp import (
     ClearanceProblem,
-    _active_step,
-    _newton,
     boundary_normals,
     clearance_step,
-    cone_multipliers,
 )
 
 GROUP = np.array([0, 0, 1, 2, 2, 2])  # cones of two, one and three clearances
@@ -130,77 +127,6 @@ def active_problem(rng, rows, units=1.0):
     return p, u, np.array([True, False, True])
 
 
-@pytest.mark.parametrize("rows", [0, 1, 2])
-@pytest.mark.parametrize("units", [1e-12, 1.0, 1e6])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_step_along_boundaries_balances_and_stays_on_them(seed, rows, units):
-    """S v + g + C f - H' n = 0 with C' v and H v as far as boundaries and rows are."""
-    rng = np.random.default_rng(seed)
-    p, u, active = active_problem(rng, rows, units)
-    u = u * np.array([1.02, 1.0, 0.98])[GROUP]
-    gradient = 0.05 * p.S @ rng.normal(size=6)
-    change, forces, rigid = _active_step(p, p.S, gradient, u, active)
-    C = boundary_normals(u, active, GROUP)
-    assert C.T @ change == pytest.approx((1 - sizes(u)[[0, 2]] ** 2) / 2, abs=1e-12)
-    assert p.rows @ (u + change) == pytest.approx(p.right, abs=1e-12)
-    left = gradient + p.S @ change + C @ forces - p.rows.T @ rigid
-    assert np.abs(left).max() < 1e-10 * np.abs(p.S).max()
-
-
-def test_a_step_along_a_soft_boundary_is_shortened():
-    """No more than 0.3 of the boundary's size, by curvature that is added."""
-    rng = np.random.default_rng(0)
-    p, u, active = active_problem(rng, 0)
-    across = np.zeros(6)
-    across[:2] = -u[1], u[0]
-    for softness in (1e-2, 1e-7):
-        soft = p.S - (1 - softness) * np.outer(p.S @ across, p.S @ across) / (
-            across @ p.S @ across
-        )
-        push = 1e-6 * across
-        change, *_ = _active_step(p, soft, push, u, active)
-        assert sizes(change)[[0, 2]].max() <= 0.3
-        assert change @ across < 0
-    # softer still nothing that is added suffices
-    assert _active_step(p, soft, 1e3 * across, u, active) is None
-
-
-@pytest.mark.parametrize("units", [1e-12, 1.0, 1e6])
-@pytest.mark.parametrize(("least", "minimum"), [(-1e-8, False), (-1e-10, True)])
-def test_a_saddle_has_no_step_even_where_nothing_pulls(least, minimum, units):
-    """Less than a billionth of the largest curvature is rounding."""
-    Q = np.linalg.qr(np.random.default_rng(4).normal(size=(6, 6)))[0]
-    S = units * Q @ np.diag([3.0, 2.0, 1.0, 1.0, 0.5, 3.0 * least]) @ Q.T
-    nothing, inside = np.zeros((0, 6)), np.full(6, 0.1)
-    p = ClearanceProblem(S, np.zeros(6), inside, GROUP, nothing, np.zeros(0))
-    step = _active_step(p, S, np.zeros(6), inside, np.zeros(3, dtype=bool))
-    assert (step is not None) == minimum
-
-
-def test_where_boundaries_or_curvature_leave_no_minimum_there_is_no_step():
-    rng = np.random.default_rng(1)
-    p, u, active = active_problem(rng, 2)
-    g = 0.05 * p.S @ rng.normal(size=6)
-    assert _active_step(p, p.S, g, u, active) is not None
-    assert _active_step(p, -p.S, g, u, active) is None
-    # rows that boundaries hold already, and more of both than unknowns
-    same = ClearanceProblem(
-        p.S, p.s, p.start, GROUP, boundary_normals(u, active, GROUP).T[:1], p.right[:1]
-    )
-    assert _active_step(same, p.S, g, u, active) is None
-    many = ClearanceProblem(
-        p.S, p.s, p.start, GROUP, rng.normal(size=(5, 6)), np.zeros(5)
-    )
-    assert _active_step(many, p.S, g, u, active) is None
-    # as many of both as unknowns: one point, whatever the curvature
-    rows = rng.normal(size=(4, 6))
-    full = ClearanceProblem(p.S, p.s, u, GROUP, rows, rows @ u)
-    change, forces, rigid = _active_step(full, -p.S, g, u, active)
-    assert np.abs(change).max() < 1e-12
-    C = boundary_normals(u, active, GROUP)
-    assert g + C @ forces == pytest.approx(rows.T @ rigid, rel=1e-9)
-
-
 @pytest.mark.parametrize("rows", [0, 2])
 @pytest.mark.parametrize("seed", range(3))
 def test_multipliers_at_a_start_are_those_that_balance_it(seed, rows):
@@ -220,17 +146,6 @@ def test_multipliers_at_a_start_are_those_that_balance_it(seed, rows):
         force, _ = ClearanceProblem(p.S, s, u, GROUP, p.rows, p.right).multipliers
         assert force[0] == 0.0
         assert force[2] == pytest.approx(2.0, rel=1e-9)
-
-
-@pytest.mark.parametrize(("off", "active"), [(0.9e-5, True), (1.1e-5, False)])
-def test_a_cone_carries_a_force_within_a_hundred_thousandth_of_its_bound(off, active):
-    u = np.array([0.6, 0.8, -1.0, 0.0, 0.6, 0.8])
-    u *= np.array([1 - off, 1.0, 0.5])[GROUP]
-    gradient = -u * np.array([3.0, -2.0, 5.0])[GROUP]
-    force = cone_multipliers(u, gradient, GROUP)
-    assert force == pytest.approx([3.0 * (1 - off) ** 2 * active, 0.0, 0.0], rel=1e-9)
-    p = ClearanceProblem(np.eye(6), gradient, u, GROUP, np.zeros((0, 6)), np.zeros(0))
-    assert (p.multipliers[0] > 0).tolist() == [active, False, False]
 
 
 @pytest.mark.parametrize("near", [True, False])
@@ -264,41 +179,3 @@ def test_of_one_interval_the_step_is_the_least_of_a_parabola(push):
         step, rigid = clearance_step(p, near)
         assert step == pytest.approx([min(push, 0.8)], abs=1e-7)
         assert len(rigid) == 0
-
-
-@pytest.mark.parametrize("units", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize(("share", "refused"), [(0.6, False), (0.45, True)])
-def test_newtons_end_is_taken_where_the_energy_does_not_rise(share, refused, units):
-    """Rows that leave one end v: s.v + v.S v / 2 with s = -share S v."""
-    rng = np.random.default_rng(3)
-    p, v = problem(rng, 0, units=units), 0.05 * rng.normal(size=6)
-    forced = ClearanceProblem(
-        p.S, -share * p.S @ v, p.start, GROUP, np.eye(6), p.start + v
-    )
-    found = _newton(forced)
-    assert (found is None) == refused
-    if found is not None:
-        assert found[0] == pytest.approx(v, abs=1e-12)
-    assert clearance_step(forced, True)[0] == pytest.approx(v, abs=1e-6)
-
-
-def test_newtons_end_is_on_the_boundaries_to_rounding():
-    """However long its last step was, which leaves a circle by half of its square."""
-    ends = 0
-    for seed in range(60):
-        rng = np.random.default_rng(seed)
-        p = problem(rng, 0, push=10.0)
-        u = p.start + clearance_step(p, near=False)[0]
-        # on the boundaries met, and off along them
-        turned = u + 1e-3 * rng.normal(size=6)
-        on = sizes(u) > 0.999
-        turned = turned / np.where(on, sizes(turned), 1.0)[GROUP]
-        moved = ClearanceProblem(
-            p.S, p.s + p.S @ (turned - p.start), turned, GROUP, p.rows, p.right
-        )
-        found = _newton(moved)
-        if found is not None:
-            ends += 1
-            at_end = sizes(turned + found[0])
-            assert np.abs(at_end[at_end > 0.999] - 1).max(initial=0.0) < 4e-15
-    assert ends

@@ -8,74 +8,13 @@ import pytest
 from assembly.exact.dead_load import (
     dead_loads,
     dead_loads_of_rows,
-    largest_wrench,
-    load_magnitudes,
-    work_gradient,
     wrenches_on_frames,
 )
-from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
-from assembly.linear.closure import virtual_joints
-from assembly.model.robot import Frame
-from tests.assembly.exact.test_dead_load import heavy, on_a_hinge, some_loads
+from tests.assembly.exact.test_dead_load import heavy
 from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import random_robot, with_bodies
-
-
-def arm_of_one_body():
-    """A hinge at the base and a body of 2 m to the tip, which is the platform."""
-    arm = Frame("arm", "hinge", [2.0, 0, 0])
-    posture = on_a_hinge(10.0, arm)
-    model = FiniteRobot(posture, virtual_joints(posture.robot))
-    return posture, place(model, np.zeros(1))
-
-
-def test_the_size_of_loads_is_the_largest_moment_about_the_platform():
-    """Forces times the reference length of 2 m, of the platform or of any body."""
-    posture, here = arm_of_one_body()
-    assert largest_wrench(here, dead_loads(posture)) == 0.0
-    on_tip = dead_loads(posture, [1.0, -7.0, 0, 3.0, 0, 0])
-    assert largest_wrench(here, on_tip) == pytest.approx(7.0)
-    on_tip = dead_loads(posture, [1.0, -5.0, 0, 3.0, 0, 0])
-    assert largest_wrench(here, on_tip) == pytest.approx(6.0)
-    # on the body at the hinge, 2 m from the platform
-    bodies = np.zeros((2, 6))
-    bodies[1] = [0, 0, 1.0, 0, -4.0, 0]
-    assert largest_wrench(here, dead_loads(posture, bodies=bodies)) == pytest.approx(8)
-    both = dead_loads(posture, [0, 0, 9.0, 0, 0, 0], bodies)
-    assert largest_wrench(here, both) == pytest.approx(9.0)
-
-
-def test_magnitudes_of_loads_add_up_where_loads_cancel():
-    """A moment of 6 N m against 3 N at 2 m: nothing, of twice 6 N m."""
-    posture, here = arm_of_one_body()
-    bodies = np.zeros((2, 6))
-    bodies[1, 4] = 3.0
-    loads = dead_loads(posture, [0, 0, -6.0, 0, 0, 0], bodies)
-    unit = 1 / np.sqrt(10.0)  # rad per unknown
-    assert work_gradient(here, loads) == pytest.approx([0.0], abs=1e-12)
-    assert load_magnitudes(here, loads) == pytest.approx([12.0 * unit], rel=1e-12)
-    # of one load alone they are its generalised force
-    for one in (dead_loads(posture, bodies=bodies), dead_loads(posture, loads.load)):
-        sizes = np.abs(work_gradient(here, one))
-        assert load_magnitudes(here, one) == pytest.approx(sizes, rel=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_loads_are_no_larger_than_their_magnitudes(seed):
-    rng = np.random.default_rng(seed)
-    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
-    model, x, _ = moved_unknowns(posture, rng, 0.1)
-    there = place(model, x)
-    loads = dead_loads(posture, *some_loads(posture, rng))
-    sizes = load_magnitudes(there, loads)
-    size = sizes.max()
-    assert (np.abs(work_gradient(there, loads)) <= sizes + 1e-12 * size).all()
-    opposite = replace(
-        loads, load=-loads.load, bodies=-loads.bodies, carried=-loads.carried
-    )
-    assert load_magnitudes(there, opposite) == pytest.approx(sizes, rel=1e-12)
 
 
 def test_what_a_frame_holds_is_all_that_hangs_on_it():

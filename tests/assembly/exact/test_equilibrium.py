@@ -17,7 +17,7 @@ from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.linear.closure import virtual_joints
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Clearance, Frame, Robot
 from tests.assembly.exact.test_exact import only, pendulum, two_bars
 
 C = 2e-3  # [m] of plays
@@ -132,30 +132,6 @@ def test_where_all_plays_are_pressed_nothing_moves():
     assert least_curvature(local) == np.inf
 
 
-@pytest.mark.parametrize(("ratio", "pressed"), [(1e-8, True), (1e-10, False)])
-def test_a_play_that_touches_is_pressed_by_a_billionth_of_the_largest_force(
-    ratio, pressed
-):
-    """What touches without being pressed may leave, or is held if that is asked."""
-    local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 1e3 * ratio, 0, 1e3])
-    assert active_clearances(local)[0].tolist() == [True, pressed]
-    assert tangent_space(local)[0].shape[1] == (0 if pressed else 1)
-    assert tangent_space(local, hold_touching=True)[0].shape[1] == 0
-    inside = at(two_slides(), [1.0, 0.5], [0, 0, 0, 1e3 * ratio, 0, 1e3])
-    assert tangent_space(inside, hold_touching=True)[0].shape[1] == 1
-
-
-@pytest.mark.parametrize("stiffness", [None, 1e6])
-@pytest.mark.parametrize(("times", "pressed"), [(2.0, True), (0.5, False)])
-def test_a_force_of_an_angles_rounding_presses_nothing(times, pressed, stiffness):
-    """1e-5 of 1e-9 in the stiffest spring, here per reference length of 1 m."""
-    link = None if stiffness is None else MatrixLink(stiffness * np.eye(6))
-    springs = [0.0] * (0 if link is None else 6)
-    force = times * 1e-14 * (stiffness or 1.0)
-    local = at(two_slides(link), [*springs, 0.0, 1.0], [0, 0, 0, force, 0, 0])
-    assert active_clearances(local)[0].tolist() == [False, pressed]
-
-
 @pytest.mark.parametrize("units", [1.0, 1e-3])
 def test_modes_are_orthonormal_in_their_units_and_do_not_mix(rng, units):
     """Whatever the basis of the motions."""
@@ -172,14 +148,6 @@ def test_modes_are_orthonormal_in_their_units_and_do_not_mix(rng, units):
     other = rng.normal(size=(3, 3))
     again, _ = curvature_modes(D @ other, other.T @ H @ other, scales)
     assert again == pytest.approx(values, abs=1e-9 * size)
-
-
-def test_a_solution_is_what_the_search_says_it_is():
-    """Its imbalance is that of the expansion it carries, of 1e-7 at most."""
-    answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 2.0, 3.0, -1.0, 0])
-    assert answer.stationarity == imbalance(answer.expansion)
-    assert answer.stationarity < 1e-9
-    assert answer.least_curvature == least_curvature(answer.expansion)
 
 
 def test_a_bound_presses_with_the_energy_that_a_larger_play_would_save():

@@ -25,7 +25,7 @@ from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
-from benchmarks.princeton_solids import in_pieces, root_link
+from benchmarks.evidence.princeton_solids import in_pieces, root_link
 from stiffness.screws import screw_map
 from validation.multibody.simulation import SimulationModel, simulate_assembly
 
@@ -136,7 +136,7 @@ def test_the_princeton_beam_bends_as_ansys_beams_do(force):
     assert linear / across[-1] - 1 == pytest.approx(off, abs=0.006)
 
 
-# [m] of a solid with large rotations: python -m benchmarks.princeton_solids
+# [m] of a solid with large rotations: python -m benchmarks.evidence.princeton_solids
 SOLID = {
     (8.896, 15): (0.0106000, 0.0419811), (8.896, 45): (0.0088268, 0.1087360),
     (13.345, 45): (0.0151716, 0.1561285), (13.345, 75): (0.0062418, 0.1956991),

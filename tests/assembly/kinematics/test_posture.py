@@ -8,14 +8,12 @@ import pytest
 from assembly.kinematics.nominal import Target, follow, motion_screws, size_of
 from assembly.kinematics.posture import (
     Posture,
-    content_of,
     home_posture,
     joint_target,
     place_many_joints,
     place_robot,
     pose_target,
 )
-from assembly.kinematics.track import Track
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
@@ -81,23 +79,6 @@ def test_postures_that_repeat_are_told_apart_once():
     assert np.array_equal(distinct.transforms[which], many.transforms)
 
 
-def test_a_content_is_its_numbers_whatever_array_holds_them(rng):
-    many = many_of(*turned(0.4, 0.9))
-    x = rng.normal(size=(2, 3))
-    key = content_of(many, (x,), "a")
-    same = content_of(replace(many, transforms=many.transforms.copy()), (x.copy(),),
-                      "a")  # fmt: skip
-    assert same == key
-    assert hash(same) == hash(key)
-    assert same.postures is not key.postures
-    moved = replace(many, transforms=many.transforms + 1e-15)
-    for other in (
-        content_of(many, (x + 1e-15,), "a"), content_of(many, (x,), "b"),
-        content_of(many, (x.reshape(3, 2),), "a"), content_of(moved, (x,), "a"),
-    ):  # fmt: skip
-        assert other != key
-
-
 def test_joints_that_are_not_named_keep_their_home(rng):
     """Of drives; passive joints are free."""
     robot = load_robot("five_bar")
@@ -133,17 +114,6 @@ def test_the_reference_length_is_that_of_the_longest_body():
     assert size_of(four_bar()) == pytest.approx(GROUND)
     assert size_of(load_robot("irsbot2")) > 0
     assert size_of(Robot("point", "a", (Frame("a"),))) == 1.0
-
-
-def test_a_track_is_as_open_as_its_worst_closure():
-    track = Track(
-        np.zeros((2, 1)), np.zeros((2, 1, 4, 4)), np.array([1.0, 0.5]),
-        np.array([[1e-3, 2e-3], [4e-3, 3e-3]]),
-    )  # fmt: skip
-    assert track.mismatch.tolist() == [2e-3, 4e-3]
-    assert track.reached.tolist() == [True, False]
-    none = replace(track, closure_mismatch=np.zeros((2, 0)))
-    assert none.mismatch.tolist() == [0.0, 0.0]
 
 
 def test_the_posture_reports_the_worst_closure_that_rounding_leaves():

@@ -15,13 +15,11 @@ from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import BUILT_IN
 from tests.robots_for_tests import (
     NUMBERS,
-    ROWS,
     assemble_at,
     coaxial_beams,
     irsbot2_with,
     proved,
     random_robot,
-    row,
     stack,
 )
 
@@ -83,16 +81,6 @@ def test_multipliers_are_the_closure_wrenches_of_the_single_answer(grid):
         assert bound >= one.energy * (1 - 2e-8)
 
 
-def test_the_split_of_a_batch_changes_no_bit(grid):
-    robot, postures = grid
-    T, mismatch = stack(postures)
-    whole = assemble_at(robot, T, 0.2 * robot.errors, mismatch)
-    for part in (slice(0, 1), slice(1, 8), slice(8, None)):
-        some = assemble_at(robot, T[part], 0.2 * robot.errors, mismatch[part])
-        for name in ROWS:
-            assert np.array_equal(row(some, name), row(whole, name)[part]), name
-
-
 def test_errors_of_their_own_for_every_point(grid, rng):
     """Many draws at one pose: each is the answer of the robot with those errors."""
     robot, postures = grid
@@ -111,7 +99,7 @@ def test_errors_of_their_own_for_every_point(grid, rng):
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-@pytest.mark.parametrize("size", [1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("size", [1e-6, 1e-3])
 def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
     home = home_posture(BUILT_IN[name]())
     robot = home.robot

@@ -24,32 +24,6 @@ from tests.robots_for_tests import (
 )
 
 
-def test_random_robots_springs_hold_their_energies_and_those_are_the_references():
-    """Whatever the ranks of a robot; what is left to the reference is left for all."""
-    solved = 0
-    for seed in range(150):
-        rng = np.random.default_rng(seed)
-        robot = random_robot(rng, legs=1 + seed % 3, joints=1 + seed // 3 % 3)
-        home = home_posture(robot)
-        joints, structure = structure_of(robot)
-        errors = np.array([robot.errors, 0.3 * robot.errors, -robot.errors])
-        T = np.repeat(home.transforms[None], 3, axis=0)
-        lanes, off = energy._empty(joints, 3), np.full(3, home.mismatch)
-        assemble_side_by_side(structure, T, errors, off, None, lanes)
-        certified = np.flatnonzero(lanes["outcome"] < energy._LEFT).tolist()
-        solved += len(certified)
-        for i in certified:
-            # the deformation of every spring holds the energy
-            stored = 0.5 * np.sum(lanes["elastic"][i] ** 2)
-            assert stored == pytest.approx(lanes["energy"][i], rel=1e-10, abs=1e-25)
-            if seed % 4 == i:
-                own = replace(home, robot=robot.with_errors(errors[i]))
-                least = solve_assembly(own, method="reference").energy
-                allowed = 2e-8 * least + 2e-12 * lanes["tight"][i] + 1e-30
-                assert abs(lanes["energy"][i] - least) <= allowed
-    assert solved > 150
-
-
 def test_multipliers_prove_the_bound_on_the_problem_as_it_is_written(grid):
     """By the complementary energy in numpy, which shares nothing with the lanes."""
     robot, postures = grid
@@ -198,24 +172,6 @@ def test_what_is_not_solved_side_by_side_the_reference_solves_with_its_own_error
     assert np.array_equal(found.margin[:-1], expected.margin[:-1])
     assert found.margin[-1] == pytest.approx(expected.margin[-1], rel=1e-7)
     assert found.bound[-1] <= found.margin[-1]
-
-
-@pytest.mark.parametrize("kappa", [0.1, 0.5, 1.0])
-def test_two_lanes_have_the_bits_of_many(grid, kappa):
-    """Products and sums are rounded one by one, whatever the registers hold."""
-    robot, postures = grid
-    T, mismatch = stack(postures)
-    errors = kappa * robot.errors
-    many = assemble_at(robot, T, errors, mismatch)
-    margins = zone_margin(postures, "rigid", errors)
-    for i in range(0, len(T), 3):
-        some = robot, T[i : i + 1], errors, mismatch[i : i + 1]
-        one = assemble_at(*some)
-        for name in ROWS:
-            assert np.array_equal(row(one, name)[0], row(many, name)[i]), name
-        one = zone_margin(postures[i : i + 1], "rigid", errors)
-        assert one.margin[0] == margins.margin[i]
-        assert one.bound[0] == margins.bound[i]
 
 
 @pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])

@@ -6,16 +6,13 @@ import pytest
 from assembly.kinematics.posture import home_posture, together
 from assembly.linear import moving_clearances
 from assembly.linear.energy import solve_assembly
-from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
+from assembly.linear.lanes import REFERENCE
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.robot_structure import structure_of
-from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import coaxial_beams, random_robot
+from tests.robots_for_tests import random_robot
 
 HALVES = ("rotation", "translation")
 READINGS = ("frozen", "free")
-RADIUS = 1e-3
 
 
 @pytest.mark.parametrize("reading", READINGS)
@@ -101,51 +98,3 @@ def test_what_is_not_bounded_side_by_side_the_reference_bounds(grid, monkeypatch
             solve_assembly(postures[i], method="reference"), "free", method="reference"
         )
         assert found.rotation_error[i] == pytest.approx(one.rotation_error, abs=2e-6)
-
-
-def judged(force, reach):
-    """A pin in a hole pressed with a force [N] at so much of its radius; energy 1 J.
-
-    Whether it is clear if the pin is held, and whether nothing then moves.
-    """
-    robot = coaxial_beams([0.0] * 6, clearance=Clearance(radial=RADIUS))
-    moving, posture = structure_of(robot, "rigid")[1], home_posture(robot)
-    structure = structure_of(robot)[1]
-    assert structure.starts.tolist() == moving.starts.tolist() == [0, 2]
-    # multipliers of the scaled closures: of x, what the cone's columns feel is this
-    row = np.zeros((1, 6 * len(robot.closures)))
-    row[0, 3] = force * structure.size
-    clearances = np.array([[0.6, 0.8]]) * reach
-    loads = row, clearances, np.ones(1), np.ones(1), np.zeros(1, np.int64)
-    motions = np.zeros((1, len(moving.free_bound)))
-    centres = np.zeros((1, 6)), clearances, motions
-    supports, outcome = np.zeros((2, 1), np.int64)
-    out = *np.zeros((2, 1, 2)), *np.zeros((2, 1, 6)), supports, outcome
-    asked = np.zeros(3), np.full(2, 1e-9)
-    T = posture.transforms[None].copy()
-    off = np.zeros(1)
-    bounds_side_by_side(moving, T, off, centres, structure, loads, asked, out)
-    decided = outcome[0] == COMPILED
-    return decided, decided and supports[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("force", "reach", "expected"),
-    [
-        # load force x radius over energy, slack 1 - reach; apart by a hundred
-        (1.0, 1.0, (True, True)),
-        (1.0, 1.0 - 0.9e-5, (True, True)),
-        (1.0, 1.0 - 1.1e-5, (False, False)),
-        (1.0, 1.0 - 0.9e-3, (False, False)),
-        (1.0, 1.0 - 1.1e-3, (False, False)),
-        (1.0, 0.85, (True, False)),
-        (0.0, 0.0, (True, False)),
-        (0.0, 1.0, (True, False)),
-        # both are rounding: nothing holds it, and that is no doubt
-        (0.5e-6, 1.0 - 0.5e-9, (True, False)),
-        (1.0, np.nan, (False, False)),
-        (np.nan, 0.5, (False, False)),
-    ],
-)
-def test_held_free_or_in_doubt_by_a_factor_of_a_hundred(force, reach, expected):
-    assert judged(force, reach) == expected

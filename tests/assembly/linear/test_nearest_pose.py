@@ -11,9 +11,6 @@ import pytest
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.nearest_pose import (
-    _FreeClearances,
-    _heights,
-    _moves,
     nearest_pose,
 )
 from assembly.linear.reference.as_printed import energy_as_printed
@@ -268,25 +265,6 @@ def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
     assert "clearances leave the pose free in 24 of 24 rows" in said
     assert "in a closed chain the nearest to nominal" in said
     assert json.loads(target.read_text())["open"] == [f"r{k}" for k in range(24)]
-
-
-def shift_along_x(start, rows=()):
-    """One interval that moves the platform by up to 1e-3 m along x."""
-    return _FreeClearances(
-        unloaded=np.ones(1, dtype=bool), deviation=np.zeros(6),
-        map=1e-3 * np.eye(6)[:, 3:4], rows=np.reshape(rows, (-1, 1)),
-        start=np.array([start]), group=np.zeros(1, dtype=int),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("start", [0.25, -0.6, 0.0])
-def test_how_far_an_interval_goes_both_ways(start):
-    """From its start to either bound; not at all where a closure holds it."""
-    x = np.eye(6)[3]
-    ways = list(_heights(shift_along_x(start), x, "compiled"))
-    assert ways == pytest.approx([1e-3 * (1 - start), 1e-3 * (1 + start)], abs=1e-9)
-    assert _moves(shift_along_x(start), "compiled")
-    assert not _moves(shift_along_x(start, [1.0]), "compiled")
 
 
 def test_nearest_is_counted_at_the_platforms_origin_where_no_point_is_given():

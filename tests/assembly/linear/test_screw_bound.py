@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.certificate import _extents, _room, bound_screw, unproved
+from assembly.linear.certificate import bound_screw, unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import ReachableSet
 from assembly.model.robot import Clearance, Frame, MatrixLink
 from assembly.robots import load_robot
-from assembly.solvers.cones import cone_sizes
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 
@@ -173,35 +171,6 @@ def test_a_residual_adds_to_what_rounding_leaves_open():
     # half the sum of y_1 and y_2, and half of what they part
     expected = np.sqrt(3) * (np.sqrt(4 - 1) + 1) * r
     assert bound_screw(apart).translation == pytest.approx(expected, rel=1e-4)
-
-
-@pytest.mark.parametrize("share", [1e-2, 1e-3])
-def test_room_of_an_interval_and_of_a_disc(share):
-    """Within g of the bound: the last share of the interval, the chord of the disc."""
-    play = Clearance(radial=1e-5, axial=2e-5)
-    gap = [0, 0, 0, 1e-4, 1e-4, 1e-4]
-    assembly = solve_assembly(home_posture(coaxial_beams(gap, clearance=play)))
-    joints = assembly.joints
-    loads = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), joints.group)
-    for cone, load in enumerate(loads):
-        room = _room(assembly, joints, share * load)[3][joints.group == cone]
-        # of all points of the disc whose height is within the share of the bound
-        chord = 2 * np.sqrt(2 * share - share**2)
-        expected = share if len(room) == 1 else chord
-        expected = expected if expected < 0.1 else 1.0
-        assert room == pytest.approx(expected, rel=share)
-        assert (room >= expected).all()
-
-
-def test_a_set_extends_to_its_farther_side():
-    """An interval of 1e-3 m that starts at a quarter: 1.25e-3 m."""
-    reachable = ReachableSet(
-        np.zeros(6), 1e-3 * np.eye(6)[:, 3:4], np.zeros((0, 1)), np.array([0.25]),
-        np.zeros(1, dtype=int),
-    )  # fmt: skip
-    assert _extents(reachable) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
-    other = replace(reachable, start=np.array([-0.25]))
-    assert _extents(other) == pytest.approx([0, 0, 0, 1.25e-3, 0, 0], abs=1e-9)
 
 
 def test_play_outside_the_loop_is_open_and_no_error():

@@ -122,16 +122,3 @@ def test_play_at_rest_is_a_share_of_its_bounds_and_no_play_is_none():
     assert not fractions(robot, np.ones((4, 6)))[bounds == 0].any()
     with pytest.raises(ValueError, match="no rest positions of the clearances"):
         with_clearances_at_rest(replace(given, rest=None))
-
-
-@pytest.mark.parametrize(("moment", "centred"), [(0.9e-9, True), (1.1e-9, False)])
-def test_a_joint_that_carries_a_billionth_is_unloaded(moment, centred):
-    """Of the largest moment there is, whichever joint that is at, in any row."""
-    robot = Robot("chain", "tip", (
-        Frame("foot", clearance=Clearance(tilt=1e-4)), Frame("tip", "foot"),
-    ))  # fmt: skip
-    one, other = at_home(robot, [1.0, 0, 0, 0, 0, 0]), [moment, 0, 0, 0, 0, 0]
-    both = replace(one.take([0, 0]), load=np.array([[1.0, 0, 0, 0, 0, 0], other]))
-    settled, undetermined = with_clearances_taken_up(both)
-    assert undetermined.tolist() == [False, centred]
-    assert settled.errors[:, 0, 0] == pytest.approx([1e-4, 0.0 if centred else 1e-4])

@@ -15,8 +15,6 @@ from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import (
-    _each,
-    at_postures,
     flexibility,
     pseudo_inverse,
 )
@@ -180,19 +178,6 @@ def test_built_in_screws_push_back_with_the_energy_they_store(seed):
     assert force == pytest.approx(A @ x, abs=1e-7 * np.abs(A).max())
 
 
-@pytest.mark.parametrize("own", [
-    [], [0], [2, 0, 1], [1, 1, 1, 1], [0, 2, 0, 2, 2], [3, 3, 0],
-    [0] * 9 + [1, 2, 3],
-], ids=str)  # fmt: skip
-def test_rows_are_multiplied_with_their_postures_matrices(rng, own):
-    """Row by row, in any order; of four postures some may have no row."""
-    matrices, posture = rng.normal(size=(4, 3, 5)), np.array(own, dtype=int)
-    vectors = rng.normal(size=(len(own), 5))
-    found = at_postures(posture)(matrices, vectors)
-    expected = [matrices[i] @ v for i, v in zip(own, vectors, strict=True)]
-    assert found == pytest.approx(np.reshape(expected, (-1, 3)), rel=1e-13)
-
-
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_an_inverse_and_its_rank_are_the_same_in_any_unit(rng, unit):
     """Eigenvalues 2, -1 and 1e-11 or 1e-15: ambiguous, or zero."""
@@ -206,12 +191,6 @@ def test_an_inverse_and_its_rank_are_the_same_in_any_unit(rng, unit):
     nothing, certain = pseudo_inverse(np.zeros((2, 0, 0)))
     assert nothing.shape == (2, 0, 0)
     assert certain.tolist() == [False, False]
-
-
-def test_every_frame_has_its_own_matrix(rng):
-    C, screws = rng.normal(size=(3, 6, 6)), rng.normal(size=(2, 18))
-    expected = [[C[i] @ row[6 * i : 6 * i + 6] for i in range(3)] for row in screws]
-    assert _each(C, screws) == pytest.approx(np.reshape(expected, (2, 18)))
 
 
 @pytest.mark.parametrize("error", [1e-4, 1e-6, 1e-8])

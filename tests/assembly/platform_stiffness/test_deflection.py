@@ -172,23 +172,6 @@ def test_a_shallow_arch_snaps_through_at_its_limit_point():
     assert curve.deflection[-2] < -2 * rise < curve.deflection[1]
 
 
-def test_contacts_that_change_with_rounding_end_within_a_step():
-    """A clearance that changes 1000 times in a step is followed eight times."""
-    asked = []
-
-    def at(load, near=None):
-        asked.append(load)
-        equilibrium = SimpleNamespace(platform_screw=np.zeros(6))
-        tangent = SimpleNamespace(stable=True, length=1.0, compliance=np.eye(6))
-        pressed = frozenset({"pin radial"} if int(1000 * load) % 2 else ())
-        return deflection._Point(load, equilibrium, tangent, pressed)
-
-    events = deflection._events(at(0.0), at(0.9995), at, 5)
-    assert {event.kind for event in events} <= {"contact", "release"}
-    assert 1 <= len(events) <= 8
-    assert len(asked) <= 2 + 8 * 14
-
-
 def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
     """Pinned at both ends, the platform on a slide along it: pi^2 E I / L^2.
 
@@ -213,3 +196,20 @@ def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
     assert (
         event.what == "buckles: inside the links, the platform stays; most in top link"
     )
+
+
+def test_contacts_that_change_with_rounding_end_within_a_step():
+    """A clearance that changes 1000 times in a step is followed eight times."""
+    asked = []
+
+    def at(load, near=None):
+        asked.append(load)
+        equilibrium = SimpleNamespace(platform_screw=np.zeros(6))
+        tangent = SimpleNamespace(stable=True, length=1.0, compliance=np.eye(6))
+        pressed = frozenset({"pin radial"} if int(1000 * load) % 2 else ())
+        return deflection._Point(load, equilibrium, tangent, pressed)
+
+    events = deflection._events(at(0.0), at(0.9995), at, 5)
+    assert {event.kind for event in events} <= {"contact", "release"}
+    assert 1 <= len(events) <= 8
+    assert len(asked) <= 2 + 8 * 14

@@ -15,7 +15,7 @@ from assembly.platform_stiffness.matrices import Part
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
 from assembly.robots.hexapod import HexapodParameters, hexapod, points
-from benchmarks.stiffness_random_robots import by_differences
+from benchmarks.evidence.stiffness_random_robots import by_differences
 from stiffness.screws import screw_map
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 

@@ -1,23 +1,15 @@
 """Least energies and factors: optimality written out, proofs, and which is kept."""
 
-from types import SimpleNamespace
-
-import clarabel
 import numpy as np
 import pytest
 
-from assembly.solvers import conic, one_problem
+from assembly.solvers import conic
 from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import (
-    GAP,
-    GAP_WITHOUT_CLEARANCE,
     ConeProgramme,
-    ConicSolution,
     _certified,
     _certify,
     _compiled,
-    _proved,
-    _proves_no_point,
     least_factor,
     minimise_energy,
 )
@@ -84,75 +76,6 @@ def test_every_solver_of_the_chain_proves_the_same(rng):
         assert own.gap <= 1e-10
 
 
-def solution_of(u, n, status="Solved"):
-    return lambda *p: (u, n, status)
-
-
-def test_the_smallest_gap_is_kept_and_a_proof_ends_the_search(rng, monkeypatch):
-    p = programme(rng)
-    u, n, _ = _compiled(*p)
-    asked = []
-
-    def fails(*p):
-        asked.append("failed")
-        return None, n, "NumericalError"
-
-    def refused(*p):
-        raise AssertionError
-
-    good = solution_of(u, n)
-    monkeypatch.setitem(conic._SOLVERS, "compiled", (fails, good, refused))
-    assert minimise_energy(*p).gap <= 1e-10
-    assert asked == ["failed"]
-    # without a proof all are asked, and the best one counts wherever it comes
-    monkeypatch.setattr(conic, "_proved", lambda *_: False)
-    poor, worse = solution_of(0.9 * u, 0.9 * n), solution_of(0.5 * u, 0.0 * n)
-    monkeypatch.setattr(conic, "_certified", lambda p, u, n, _: [
-        _certify(p, u, p.G @ u + p.h, n)
-    ])  # fmt: skip
-    for order in ((worse, good, poor), (good, poor), (poor, worse, good)):
-        monkeypatch.setitem(conic._SOLVERS, "compiled", order)
-        np.testing.assert_allclose(minimise_energy(*p).clearances, u, atol=1e-9)
-    monkeypatch.setitem(conic._SOLVERS, "compiled", (fails, fails))
-    with pytest.raises(conic.SolverFailed, match="NumericalError"):
-        minimise_energy(*p)
-
-
-def test_a_proof_is_a_tenth_of_the_gap_that_counts():
-    h = np.array([3.0, 4.0])
-    for value in (0.0, -2.0, 7.0):
-        most = (GAP * abs(value) + GAP_WITHOUT_CLEARANCE * 12.5) / 10
-        for share, proved in ((0.9, True), (1.1, False)):
-            none = np.zeros(0)
-            least = ConicSolution(none, none, none, share * most, 0.0)
-            least = ConicSolution(none, none, none, value, value - least.value)
-            # what value itself cannot resolve
-            if value == 0.0 or most > 1e-9:
-                assert _proved(least, h) is proved
-
-
-@pytest.mark.parametrize("where", ["u", "n", "rows"])
-def test_a_compiled_solution_that_is_none_or_leaves_rows_open_is_refused(
-    rng, monkeypatch, where
-):
-    p = programme(rng, rows=2)
-    u, n, _ = _compiled(*p)
-    assert u is not None
-    given = u.copy(), n.copy()
-    if where == "rows":
-        given[0][:] += 1e-9 * p.H[0]
-    else:
-        given["un".index(where)][0] = np.nan
-    monkeypatch.setattr(one_problem, "interior_point", lambda *_: given)
-    assert _compiled(*p)[0] is None
-    # rows count without a sign, and there need be none
-    given = u - 1e-9 * p.H[0], n
-    assert _compiled(*p)[0] is None
-    free = p._replace(H=np.zeros((0, 5)), k=np.zeros(0))
-    given = u, np.zeros(0)
-    assert _compiled(*free)[0] is u
-
-
 @pytest.mark.parametrize(
     ("push", "rows"), [(0.2, 0), (1.0, 0), (5.0, 0), (1.0, 1), (5.0, 1)]
 )
@@ -169,29 +92,6 @@ def test_newton_proves_what_a_poor_guess_does_not(rng, push, rows):
     slope = p.G.T @ refined.springs - p.d - p.H.T @ refined.rigid_multipliers
     force = -np.bincount(GROUP, slope * refined.clearances)
     np.testing.assert_allclose(slope, -force[GROUP] * refined.clearances, atol=1e-4)
-
-
-def test_newton_is_for_discs_and_intervals_and_its_ends_are_looked_at(rng, monkeypatch):
-    p = programme(rng)
-    u, n, _ = _compiled(*p)
-    ball = p._replace(group=np.array([0, 0, 0, 1, 1]))
-    assert len(list(_certified(ball, 0.1 * u, n, "compiled"))) == 1
-    seen, change = [], [0.0, 0.0]
-
-    def newton(problem, starts, limits, at, y):
-        seen.append(limits)
-        at[:], y[:] = u + change[0], np.r_[p.G @ u + p.h, -n] + change[1]
-        return True
-
-    monkeypatch.setattr(one_problem, "newton", newton)
-    for change[:], candidates in (
-        ((0.0, 0.0), 2), ((np.nan, 0.0), 1), ((0.0, np.nan), 1),
-        ((1e-9 * p.H[0], 0.0), 1), ((-1e-9 * p.H[0], 0.0), 1),
-    ):  # fmt: skip
-        assert len(list(_certified(p, 0.1 * u, n, "compiled"))) == candidates
-    limits = seen[0]  # the same part of both parts of the gap that counts
-    least = GAP_WITHOUT_CLEARANCE * np.sum(p.h**2) / 2
-    assert limits.relative / GAP == pytest.approx(limits.absolute / least, rel=1e-12)
 
 
 def test_without_loads_any_multiple_of_multipliers_proves_as_much(rng):
@@ -264,36 +164,3 @@ def test_no_factor_helps_where_what_it_scales_does_not_reach(reach):
     right = np.array([3.0 * 0.9, 50.0 * 0.9 + 0.01])
     t, _, _ = least_factor(B, right, np.array([0, 1]), np.array([False, True]))
     assert t == pytest.approx(0.5, rel=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("status", "x", "usable"),
-    [
-        ("Solved", 0.5, True),
-        ("InsufficientProgress", 0.5, True),
-        ("Solved", np.nan, False),
-        ("NumericalError", 0.5, False),
-    ],
-)
-@pytest.mark.parametrize("z", [0.0, np.nan])
-def test_clarabels_end_is_used_where_it_is_a_number(monkeypatch, status, x, usable, z):
-    end = SimpleNamespace(status=status, x=[x], z=[z])
-    solver = SimpleNamespace(solve=lambda: end)
-    monkeypatch.setattr(clarabel, "DefaultSolver", lambda *_: solver)
-    cones = conic._Cones(equal=1, group=np.zeros(1, np.int64))
-    found, dual, said = conic._clarabel(None, None, None, None, cones, 0.0)
-    assert (found is not None) == (usable and z == 0.0)
-    assert said == status
-    assert len(dual) == 1
-
-
-def test_a_proof_that_no_point_exists_is_above_its_rounding():
-    """|u| <= 1 does not reach 1 + 4e-13; the terms' rounding is 2e-13."""
-    H, group = np.array([[0.6, 0.8]]), np.zeros(2, np.int64)
-    for n, beyond, proves in (
-        (1.0, 0.0, False), (1.0, 1e-13, False), (1.0, 2e-13, False),
-        (1.0, 4e-13, True), (100.0, 2e-13, False), (100.0, 4e-13, True),
-        (0.01, 2e-13, False), (0.01, 4e-13, True), (-1.0, 4e-13, False),
-    ):  # fmt: skip
-        given = np.array([n]), H, np.array([1.0 + beyond]), group, np.ones(1)
-        assert _proves_no_point(*given) is proves

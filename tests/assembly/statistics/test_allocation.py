@@ -5,12 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
-from assembly.model.robot import Clearance, Frame, Robot
-from assembly.statistics.allocation import _scaled_tolerances, _typical_energy
-from assembly.statistics.requirement import SCALING, TRAINING, Plan, Requirement
-from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import plan_for
+from assembly.statistics.allocation import _scaled_tolerances
+from assembly.statistics.requirement import SCALING, TRAINING, Plan
 
 
 class Dozen:
@@ -77,35 +73,3 @@ def test_with_a_yield_other_draws_scale_than_those_that_shaped_the_tolerances():
         failed = np.abs(draws @ np.repeat(t, 6)) > 1 + 1e-9
         # 0.8 of 600 draws, less what 95 % of chance leave open
         assert 0.8 <= 1 - failed.mean() <= 0.85
-
-
-@pytest.mark.parametrize("cheaper", [0, 1])
-def test_the_cheaper_of_both_tolerances_is_taken(cheaper, monkeypatch):
-    """Proportions scaled alike may cost less, after all, with other draws."""
-    shapes = [np.array([1.0, 2.0]), np.array([1.0, 1.0])][:: 1 if cheaper == 0 else -1]
-    monkeypatch.setattr(
-        "assembly.statistics.allocation.least_cost",
-        lambda requirement, samples, t, progress: (shapes[0], samples),
-    )
-    found, alike = _scaled_tolerances(Sum(0.8, 150), shapes[1], silent)
-    np.testing.assert_allclose(found / found[0], [1.0, 2.0])
-    np.testing.assert_allclose(alike / alike[0], shapes[1])
-
-
-def test_a_typical_energy_is_the_median_at_the_loosest_tolerances():
-    """k (e1 - e2)^2 / 4 of two springs; at least 1e-12 J where nothing is pressed."""
-    k, places = 1e6, [("one", 3), ("two", 3)]
-    postures = [home_posture(coaxial_beams(np.zeros(6), (s, s))) for s in (k, 9 * k)]
-    plan = plan_for(postures[0].robot, places, [1, 1], {"force": 1.0})
-    errors = plan.draws_of(TRAINING, 200) * plan.most
-    energies = k * (errors[:, 0] - errors[:, 1]) ** 2 / 4
-    found = _typical_energy(Requirement(postures, plan))
-    assert found == pytest.approx(np.median(energies), rel=1e-6)
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=1e-4)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    arm = Robot("arm", "tip", frames)
-    loose = plan_for(arm, [("tip", 3)], [1], {"translation": 1e-3},
-                     clearance_model="least")  # fmt: skip
-    assert _typical_energy(Requirement([home_posture(arm)], loose)) == 1e-12

@@ -85,17 +85,6 @@ def test_a_trajectory_is_reflected_at_discs_and_sides_as_by_mirrors(seed, rng):
         assert max(sizes(starts, u)) <= 1 + 1e-9
 
 
-def test_screws_are_kept_after_every_so_many_trajectories(rng):
-    to_screw = rng.normal(size=(6, 3))
-    asked = {"starts": [0, 2, 3], "M": np.eye(3), "u": np.zeros(3)}
-    u, all_, _ = walked(**asked, kept=12, to_screw=to_screw)
-    same, some, _ = walked(**asked, every=3, kept=4, to_screw=to_screw)
-    np.testing.assert_array_equal(some, all_[2::3])
-    np.testing.assert_array_equal(u, same)
-    np.testing.assert_allclose(all_[-1], to_screw @ u, rtol=1e-12)
-    assert len(np.unique(all_[:, 0])) == 12
-
-
 def test_a_cone_that_does_not_move_is_no_bound(rng):
     """Even where it stands on its bound: the others decide how far a chain starts."""
     starts, centre = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
@@ -115,18 +104,3 @@ def test_a_point_outside_by_rounding_turns_back():
     for seed in range(6):
         u, _, _ = walked(starts, [[0.5]], outside, seed=seed)
         assert abs(u[0]) <= 1 + 2e-15
-
-
-def test_chains_start_at_nine_tenths_of_the_way_to_the_boundary(rng):
-    starts, centre = np.array([0, 2, 3]), np.array([0.3, -0.2, 0.1])
-    walks, M = np.empty((6, 3)), 0.2 * rng.normal(size=(3, 3))
-    positions = Positions(M, starts, np.zeros((6, 3)))
-    positions.start_chains(centre, draw_generator(4, 0, 9), walks)
-    for point in walks:
-        assert max(sizes(starts, centre + (point - centre) / 0.9)) == pytest.approx(1.0)
-    numbers = draw_generator(4, 0, 9)
-    for point in walks:
-        direction = M @ numbers.standard_normal(3)
-        along = (point - centre) / direction
-        np.testing.assert_allclose(along, along[0], rtol=1e-9)
-        assert along[0] > 0

@@ -20,7 +20,6 @@ from assembly.statistics.clearance_positions import (
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.uniform_clearance import (
-    _ellipsoid,
     diagnose,
     sample_uniform_position,
 )
@@ -301,24 +300,6 @@ def test_slow_chains_are_worth_as_much_as_their_correlation_says(rng):
     r_hat, effective = diagnose(x)
     assert 1.0 <= r_hat < 1.01 or r_hat == pytest.approx(1.0, abs=1e-3)
     assert effective == pytest.approx(x.size * (1 - a) / (1 + a), rel=0.15)
-
-
-@pytest.mark.parametrize("start", [[0.0, 0.0], [0.9, 0.0], [1.0, 0.0], [-0.6, 0.79]])
-def test_the_ellipsoid_of_a_disc_is_a_circle_about_its_middle(start):
-    """-log(1 - |u|^2) has the Hessian 2 I at 0: axes of length 1 / sqrt 2."""
-    u, M = _ellipsoid(np.eye(2), np.array([0, 2]), np.array(start))
-    np.testing.assert_allclose(u, 0.0, atol=1e-3)
-    np.testing.assert_allclose(M @ M.T, np.eye(2) / 2, atol=1e-5)
-
-
-def test_a_set_without_interior_has_no_ellipsoid():
-    """u0 + u1 = 2 with |u0|, |u1| <= 1 is one point."""
-    along = np.array([[1.0], [-1.0]]) / np.sqrt(2)
-    assert _ellipsoid(along, np.arange(3), np.ones(2)) is None
-    near = _ellipsoid(along, np.arange(3), np.full(2, 0.999))
-    np.testing.assert_allclose(near[0], 0.999, atol=1e-5)
-    # 1 - (0.999 +- s / sqrt 2)^2 = 0 ends it at s = 0.001 sqrt 2
-    assert 0 < np.linalg.norm(near[1]) <= 0.001 * np.sqrt(2)
 
 
 def test_contact_play_knows_no_unit_of_length():

@@ -7,8 +7,7 @@ import pytest
 
 from assembly.statistics import cutting_planes
 from assembly.statistics.cutting_planes import cheapest_within, cut_planes
-from assembly.statistics.requirement import TRAINING, Plan
-from assembly.statistics.worst_case import random_corners
+from assembly.statistics.requirement import Plan
 from forcefit.inputs.table import BadInput
 
 COSTS = np.array([1.0, 4.0, 2.0])
@@ -95,55 +94,6 @@ def corner(value, slopes=(1.0, 2.0, 3.0), signs=(1.0, -1.0, 1.0)):
 
 
 T = np.array([0.1, 0.2, 0.3])
-
-
-def test_a_corner_beyond_a_limit_gives_the_plane_of_its_slopes():
-    """m(t') = m + g.(t' - t) <= limit, g the slopes towards the corner; a.t' <= 1.
-
-    A thousandth beyond the limit is none; each posture has a plane of its own.
-    """
-    corners = {("margin", 0): corner(2.001), ("margin", 1): corner(2.003),
-               ("energy", 0): corner(5.5), ("energy", 1): corner(4.0)}  # fmt: skip
-    found = Found({"margin": 2.0, "energy": 5.0}, 2, corners, seed=6)
-    planes = list(cutting_planes._violated(found, T))
-    g = np.array([1.0, -2.0, 3.0])
-    expected = [g / (limit - value + g @ T) for limit, value in ((2, 2.003), (5, 5.5))]
-    np.testing.assert_allclose(planes, expected, rtol=1e-12)
-    assert [one[:2] for one in found.asked] == list(corners)
-    np.testing.assert_array_equal(found.asked[0][3], random_corners(24, 3, 6))
-
-
-def test_the_plane_of_a_yield_is_that_of_the_mean_of_the_worst_draws():
-    """Of 12 draws a yield of 0.75 leaves 3: those of the largest response anywhere.
-
-    The first posture's is 10 at draw 0 and 9.5 at draw 3, the second's 7 at draw 4; the
-    slopes are 100 and -200, of the draw's one class, times its error.
-    """
-
-    def first(values):
-        size = np.zeros(12)
-        size[[0, 3]] = 10.0, 9.5
-        return size, np.full((12, 3), 100.0)
-
-    def second(values):
-        np.testing.assert_allclose(np.abs(values[:3].diagonal()), T * [1, 1, 0.5])
-        size = np.full(12, 1.0)
-        size[[3, 4]] = [9.0, 7.0]
-        return size, np.full((12, 3), -200.0)
-
-    responses = {("energy", 0): first, ("energy", 1): second}
-    found = Found({"energy": 5.0}, 2, responses=responses, asked_yield=0.75, draws=12)
-    (plane,) = cutting_planes._violated(found, T)
-    assert found.asked == [(0, 12, 1, TRAINING)]
-    # draws 0 and 3 are of the first class, by 100; draw 4 of the second, by -200 x -1
-    mean, slopes = (10 + 9.5 + 7) / 3, np.array([200.0, 200.0, 0.0]) / 3
-    np.testing.assert_allclose(plane, slopes / (5 - mean + slopes @ T), rtol=1e-12)
-    loose = Found({"energy": 9.0}, 2, responses=responses, asked_yield=0.75, draws=12)
-    assert list(cutting_planes._violated(loose, T)) == []
-    # one draw at least counts
-    few = Found({"energy": 9.0}, 2, responses=responses, asked_yield=0.99, draws=12)
-    (plane,) = cutting_planes._violated(few, T)
-    assert plane[0] == pytest.approx(100.0 / (9 - 10 + 100.0 * T[0]))
 
 
 @pytest.mark.parametrize("value", [2.0 + 1.6, 2.0 + 1.7])

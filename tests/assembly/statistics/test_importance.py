@@ -163,42 +163,6 @@ def test_intervals_are_as_wide_as_their_confidence(rng):
         assert widths[1] / widths[0] == pytest.approx(1.960 / 0.674, rel=0.1)
 
 
-def test_where_a_few_draws_fail_the_indices_are_those_of_all_others():
-    """Of A two draws fail: they are left out of all sums, about the mean of what is."""
-    A, B = three(0, 100), three(1, 100)
-    design = SaltelliDesign(A, B, THREE)
-    f = np.exp(design.rows(0, len(design)) @ [1.0, 0.5, 0.2])
-    f[[3, 7]] = np.nan
-    found = sobol_indices(design, f[:, None])
-    assert found.failed[0] == pytest.approx([0.02] * 3)
-    mean = np.nanmean(f[:200])
-    kept = np.delete(np.arange(100), [3, 7])
-    a, b, *mixed = f.reshape(5, 100)[:, kept]
-    size = np.r_[a, b].var()
-    for k, one in enumerate(mixed):
-        first = ((b - mean) * (one - a)).mean() / size
-        total = ((one - a) ** 2).mean() / (2 * size)
-        assert found.first[0, k, 0] == pytest.approx(first, rel=1e-9)
-        assert found.total[0, k, 0] == pytest.approx(total, rel=1e-9)
-
-
-def test_indices_of_a_function_are_those_of_its_design():
-    """Streams 2 and 3 are its draws; every row is evaluated once, in order."""
-    seen = []
-
-    def evaluate(x):
-        seen.append(x)
-        return np.exp(x @ [1.0, 0.5, 0.2])[:, None]
-
-    found = sobol_importance(evaluate, three, THREE, 50, 0.5)
-    design = SaltelliDesign(three(2, 50), three(3, 50), THREE)
-    (rows,) = seen
-    np.testing.assert_array_equal(rows, design.rows(0, 250))
-    expected = sobol_indices(design, evaluate(rows), 0.5)
-    np.testing.assert_allclose(found.first, expected.first, rtol=1e-12)
-    np.testing.assert_allclose(found.total, expected.total, rtol=1e-12)
-
-
 def test_where_many_draws_fail_there_are_no_indices_and_a_reason():
     found = sobol_importance(lambda x: failing(x, 0.3), three, THREE, 500)
     assert np.isnan(found.first).all()
@@ -299,28 +263,6 @@ def test_groups_by_kind_join_the_legs():
     assert [len(c) for _, c in source_groups(sources, "frame")] == [2] * 4
     with pytest.raises(ValueError, match="by is 'leg'"):
         source_groups(sources, "leg")
-
-
-def test_indices_are_those_of_all_draws_within_their_intervals():
-    """V(E(f | a)) / V(f) and its total by the estimators of Saltelli and Jansen."""
-    A, B = three(0, 400), three(1, 400)
-    design = SaltelliDesign(A, B, THREE)
-    f = np.exp(design.rows(0, len(design)) @ [1.0, 0.5, 0.2])
-    found = sobol_indices(design, f[:, None], level=0.9)
-    a, b, mixed = f[:400], f[400:800], f[800:].reshape(3, 400)
-    # the mean is that of A and B, and so is the variance
-    mean, size = np.r_[a, b].mean(), np.r_[a, b].var()
-    first = ((b - mean) * (mixed - a)).mean(axis=1) / size
-    total = ((mixed - a) ** 2).mean(axis=1) / (2 * size)
-    np.testing.assert_allclose(found.first[0, :, 0], first, rtol=1e-9)
-    np.testing.assert_allclose(found.total[0, :, 0], total, rtol=1e-9)
-    assert found.variance[0] == pytest.approx(size)
-    for _, low, high in (*found.first[0], *found.total[0]):
-        assert low < high
-    wider = sobol_indices(design, f[:, None]).total[0]
-    assert (wider[:, 2] > found.total[0, :, 2]).all()
-    assert (found.total[0, :, 1] < total).all()
-    assert (found.total[0, :, 2] > total).all()
 
 
 def test_intervals_are_of_95_per_cent_unless_asked_otherwise(stiff):

@@ -9,7 +9,6 @@ from assembly.kinematics.posture import home_posture
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.statistics.experiment import Experiment
-from assembly.statistics.importance import STREAMS
 from assembly.statistics.importance_table import (
     ImportanceOptions,
     importance_clearance_model,
@@ -97,18 +96,6 @@ def test_a_group_of_like_errors_gains_by_their_common_spread():
     part, gain = (data[k].sel(component="translation").values for k in ("part", "gain"))
     assert part[1] == pytest.approx(5e-4 / np.sqrt(3), rel=0.1)
     assert gain[1] == pytest.approx(1.0, rel=1e-12)
-
-
-def test_the_design_draws_from_streams_of_its_own():
-    experiment = arm(seed=8)
-    design = importance_design(experiment, ImportanceOptions(20, "source"))
-    for part, stream in zip((design.A, design.B), STREAMS, strict=True):
-        expected = experiment.sources.draw(0, 20, 8, stream)
-        np.testing.assert_array_equal(part, expected)
-    assert len(design) == 20 * 5
-    draws = experiment.sources.draw(0, 20, 8)
-    assert not np.isclose(design.A, draws).any()
-    assert not np.isclose(design.B, draws).any()
 
 
 def test_rows_of_a_design_are_those_of_its_errors_without_random_play():

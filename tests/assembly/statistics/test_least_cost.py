@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.statistics import least_cost as module
 from assembly.statistics.least_cost import least_cost
 from assembly.statistics.requirement import Plan
 from assembly.statistics.scaling import Samples
@@ -115,79 +114,3 @@ def test_logarithms_share_a_sum_by_the_costs_themselves():
     requirement = Sums([[2.0, 3.0, 5.0]], cost="logarithm")
     t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
     np.testing.assert_allclose(t, COSTS / 5 / [2.0, 8.0], rtol=0.03)
-
-
-def test_a_saving_is_a_share_of_the_price_and_of_a_logarithms_costs():
-    before, after = np.array([1.0, 2.0]), np.array([2.0, 4.0])
-    reciprocal, logarithm = (Sums([[1.0] * 3], cost=c).plan for c in
-                             ("reciprocal", "logarithm"))  # fmt: skip
-    assert module._saving(reciprocal, before, after) == pytest.approx(0.5)
-    assert module._saving(logarithm, before, after) == pytest.approx(np.log(2))
-    assert module._saving(reciprocal, after, before) == pytest.approx(-1.0)
-
-
-@pytest.mark.parametrize("power", [1.0, 2.0])
-def test_the_planes_of_samples_touch_their_limit_where_they_meet_it(power):
-    """u = (w.|s| t)^n: plane 1 + n (w.t' / w.t - 1) at u = 1, and the same slope else.
-
-    Samples of less than 0.8 of a limit have none, the worst of all always has one.
-    """
-    requirement = Sums([[2.0, 3.0, 5.0], [1.0, 1.0, 1.0]], power=power)
-    t = np.array([0.1, 0.1])
-    samples = Samples(np.array([[1.0, 1, 1], [1, 0.5, 0.9], [0.1, 0.1, 0.1]]), 0)
-    planes = module._planes(requirement, samples, t)
-    sums = requirement.weights @ np.abs(samples.values * t[GROUP]).T  # 1 and 0.3, ..
-    used = sums**power
-    # sums of 1, 0.8, 0.1 and 0.3, 0.24, 0.03: the first alone, or with the second
-    np.testing.assert_allclose(used[0], np.array([1.0, 0.8, 0.1]) ** power)
-    expected = []
-    for draw in [0, 1][: 2 if used[0, 1] > 0.8 else 1]:
-        parts = requirement.weights[0] * samples.values[draw]
-        w = np.array([parts[0], parts[1] + parts[2]])
-        slope = power * (w @ t) ** (power - 1) * w
-        expected.append(slope / (1 - used[0, draw] + slope @ t))
-    np.testing.assert_allclose(planes, expected, rtol=1e-9)
-    for plane in planes[:1]:
-        assert plane @ t == pytest.approx(1.0)
-    small = module._planes(requirement, samples, 0.01 * t)
-    assert len(small) == 1
-
-
-def test_no_more_than_two_hundred_samples_have_planes(rng):
-    samples = Samples(rng.uniform(0.9, 1.0, size=(300, 3)), 0)
-    t = np.array([0.1, 0.1])
-    requirement = Sums([[2.0, 3.0, 5.0]])
-    planes = np.array(module._planes(requirement, samples, t))
-    assert planes.shape == (200, 2)
-    # those of the largest sums
-    sums = samples.values @ [2.0, 3.0, 5.0]
-    worst = samples.values[np.argsort(sums)[::-1][:200]]
-    np.testing.assert_allclose(planes[:, 0], 2.0 * worst[:, 0], rtol=1e-9)
-
-
-@pytest.mark.parametrize(("draws", "near"), [(100, 16), (600, 30), (4000, 64)])
-def test_the_plane_of_a_yield_is_the_mean_of_those_nearest_to_a_limit(draws, near, rng):
-    """Relative slopes of the draws whose worst use of a limit is nearest to 1."""
-    weights = np.array([[2.0, 3.0, 5.0], [6.0, 1.0, 1.0]])
-    requirement = Sums(weights, asked_yield=0.9)
-    t, values = np.array([0.12, 0.15]), rng.uniform(-1, 1, size=(draws, 3))
-    values[0] = 0.0  # uses nothing, and has no slope
-    (plane,) = module._planes(requirement, Samples(values, 10), t)
-    parts = weights[:, None] * np.abs(values * t[GROUP])  # (cases, draws, errors)
-    used = parts.sum(axis=2)
-    worst = used.max(axis=0)
-    with np.errstate(divide="ignore"):
-        order = np.argsort(np.abs(np.log(worst)))[:near]
-    relative = np.array([parts[used[:, d].argmax(), d] / worst[d] for d in order])
-    mean = np.array([relative[:, 0].mean(), relative[:, 1:].sum(axis=1).mean()]) / t
-    np.testing.assert_allclose(plane, mean, rtol=1e-9)
-    assert plane @ t == pytest.approx(1.0)
-
-
-def test_draws_that_use_nothing_leave_the_mean_to_the_others():
-    """Sixteen are nearest, of which four use anything: a quarter of their mean."""
-    values = np.zeros((16, 3))
-    values[:4, 0] = 1.0
-    requirement = Sums([[2.0, 3.0, 5.0]], asked_yield=0.9)
-    (plane,) = module._planes(requirement, Samples(values, 1), np.array([0.5, 0.5]))
-    np.testing.assert_allclose(plane, [2.0, 0.0])

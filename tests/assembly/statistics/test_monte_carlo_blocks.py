@@ -1,9 +1,7 @@
 """Blocks of a run, what identifies it, its data set: an arm that follows its errors."""
 
-import time
 from contextlib import ExitStack
 from dataclasses import replace
-from threading import Barrier
 
 import numpy as np
 import pytest
@@ -48,24 +46,6 @@ def counted(method, spans):
         return method(self, first, count)
 
     return noting
-
-
-def test_every_thread_has_a_block_and_few_wait():
-    """Four meet in the middle of their blocks; begun are four for each, no more."""
-    meeting, begun = Barrier(4, timeout=20), []
-
-    def solve(block):
-        begun.append(block)
-        if 1 <= block <= 8:
-            meeting.wait()
-        return np.array([block])
-
-    blocks = monte_carlo._solved(solve, list(range(100)), 4)
-    first = [next(blocks)[0] for _ in range(2)]
-    assert first[0] == 0
-    time.sleep(0.05)
-    assert len(begun) <= 1 + 16
-    assert sorted([*first, *(block for block, _ in blocks)]) == list(range(100))
 
 
 @pytest.fixture(scope="module")

@@ -214,31 +214,3 @@ def test_an_error_that_nothing_takes_up_is_named(limit, places, named):
         f"limit {limit}: no clearance or spring takes up an error {named}; leave "
         "it out, or limit the energy of a robot that is elastic there"
     )
-
-
-def test_only_limits_that_always_hold_are_convex():
-    posture = home_posture(springs(1e6))
-    for limits, asked, convex in (
-        ({"margin": 1.0, "energy": 1.0}, 1.0, True),
-        ({"margin": 1.0, "energy": 1.0}, 0.9, False),
-        ({"margin": 1.0, "force": 1.0}, 1.0, False),
-    ):
-        plan = plan_for(posture.robot, ENDS, [1, 1], limits, asked_yield=asked)
-        assert Requirement([posture], plan).is_convex == convex
-
-
-def test_classes_spread_their_tolerance_and_gather_their_slopes():
-    robot = springs(1e6)
-    plan = replace(
-        plan_for(robot, [("one", 3), ("two", 3), ("one", 4)], [1] * 3, {}),
-        group=np.array([1, 0, 1]), names=("a", "b", "c"),
-    )  # fmt: skip
-    np.testing.assert_array_equal(plan.spread(np.array([5.0, 7, 9])), [7, 5, 7])
-    np.testing.assert_array_equal(plan.gather(np.array([1.0, 2, 4])), [2, 5, 0])
-    assert not plan.limits_pose
-    assert replace(plan, limits={"rotation": 1.0}).limits_pose
-    first = plan.draws_of(10, 4)
-    np.testing.assert_array_equal(first, plan.sources.draw(0, 4, plan.seed, 10))
-    np.testing.assert_array_equal(plan.draws_of(10, 2), first[:2])
-    assert not np.isclose(plan.draws_of(11, 4), first).any()
-    assert not np.isclose(replace(plan, seed=2).draws_of(10, 4), first).any()

@@ -5,14 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.statistics import scaling
 from assembly.statistics.scaling import (
     Samples,
     draw_samples,
     scale_uniformly,
-    with_worst_corners,
 )
-from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
 
@@ -125,63 +122,3 @@ def test_draws_too_few_to_show_a_yield_are_refused():
         "more draws"
     )
     assert draw_samples(requirement, 7, 3).allowed == 0
-
-
-def test_what_must_always_hold_is_sampled_at_corners():
-    plan = SimpleNamespace(asked_yield=1.0, draws=40, sources=range(6), seed=3)
-    requirement = SimpleNamespace(plan=plan)
-    samples = draw_samples(requirement, 5, 4)
-    assert samples.allowed == 0
-    np.testing.assert_array_equal(samples.values, random_corners(40, 6, 8))
-    assert set(np.unique(samples.values)) == {-1.0, 1.0}
-
-
-def test_worst_corners_join_the_samples_once():
-    """The search starts from the first twelve and the last twelve samples."""
-    values = random_corners(60, 7, 2)
-    worst = {
-        ("a", 0): values[30], ("a", 1): np.ones(7), ("b", 0): np.ones(7),
-        ("b", 1): -np.ones(7),
-    }  # fmt: skip
-    asked = []
-
-    def worst_corner(key, i, t, corners):
-        asked.append((t, corners))
-        return SimpleNamespace(signs=worst[key, i])
-
-    requirement = SimpleNamespace(cases=list(worst), worst_corner=worst_corner)
-    values = values[~(np.abs(values.sum(axis=1)) == 7)]
-    found = with_worst_corners(requirement, Samples(values, 2), np.array([1.0, 2.0]))
-    assert CORNERS == 24
-    for t, corners in asked:
-        np.testing.assert_array_equal(t, [1.0, 2.0])
-        np.testing.assert_array_equal(corners, np.vstack([values[:12], values[-12:]]))
-    np.testing.assert_array_equal(found.values[: len(values)], values)
-    added = found.values[len(values) :]
-    np.testing.assert_array_equal(added, [-np.ones(7), np.ones(7)])
-    assert found.allowed == 2
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "utilisation", "expected"),
-    [
-        (0.0, 8.0, np.inf, 4.0),
-        (0.0, 8.0, 0.0, 4.0),
-        (3.0, np.inf, 0.0, 6.0),
-        (2.0, 8.0, np.inf, 4.0),
-        # a guess outside of the interval is none
-        (2.0, 8.0, 1e-3, 4.0),
-        (2.0, 8.0, 1e3, 4.0),
-        # quadratic: half as far for a quarter
-        (0.0, 8.0, 4.0, 2.0 * (1 - 5e-5) ** 0.5),
-        (2.0, 32.0, 0.25, 8.0 * (1 - 5e-5) ** 0.5),
-        # no more than fifty times either way at once
-        (0.0, 8.0, 1e4, 4.0 * 0.02),
-        (4.0, np.inf, 1e-4, 4.0 * 50),
-    ],
-)
-def test_the_next_factor_is_a_power_law_s_or_the_middle(
-    low, high, utilisation, expected
-):
-    found = scaling._next_factor(low, high, 4.0, utilisation, 2.0, 1e-4)
-    assert found == pytest.approx(expected, rel=1e-12)

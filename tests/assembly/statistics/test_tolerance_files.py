@@ -312,14 +312,6 @@ def test_a_table_names_frames_and_components_of_one_kind(table, message, write_f
         read_plan(write_file(f"[[tolerance]]\n{table}\n"), load_robot("irsbot2"))
 
 
-def test_angles_end_with_rz_and_lengths_begin_with_tx(write_file):
-    """Each with the unit of its loosest tolerance."""
-    for part, most in (("RZ", 0.1), ("TX", 0.01)):
-        plan = read_plan(write_file(ONE.replace("TX", part)), load_robot("irsbot2"))
-        assert plan.most[0] == most
-        assert plan.names == (f"leg1.link_a.{part}",)
-
-
 def test_a_plan_without_tables_is_refused(write_file):
     with pytest.raises(BadInput, match=r"missing; expected tables \[\[tolerance\]\]"):
         read_plan(write_file("yield = 0.9\n"), load_robot("irsbot2"))

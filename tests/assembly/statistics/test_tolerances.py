@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +23,6 @@ from assembly.statistics.tolerances import (
     identity_of,
 )
 from assembly.statistics.worst_case import (
-    _worst_without_clearance,
     bound_energy,
     bound_margin,
     random_corners,
@@ -316,12 +314,3 @@ def test_with_the_worst_play_fresh_draws_stay_within_the_limit(paper):
     # a yield of 0.9: fewer than 124 of 150 happen once in 300 such tests
     assert fits >= 124
     assert largest > 0.8 * limit
-
-
-def test_without_clearance_the_worst_corner_has_all_terms_of_one_sign():
-    """(h s)^2 with h = (1, 0, -2) t: s1 = -s3, and s2, which does nothing, stays."""
-    prepared = SimpleNamespace(misfit=np.array([[0, 1.0, 0, -1.0, 0, 0, 0.0]]))
-    sources = SimpleNamespace(frame=np.array([0, 0, 1]), component=np.array([1, 2, -3]))
-    corners = np.array([[1, -1, 1], [1, 1, 1], [-1, 1, -1.0]])
-    found = _worst_without_clearance(prepared, sources, np.array([1, 1, 2.0]), corners)
-    np.testing.assert_array_equal(found, [[-1, -1, 1], [-1, 1, 1], [1, 1, -1]])

@@ -6,7 +6,6 @@ import pytest
 from assembly.model.error_distributions import draw_generator
 from assembly.statistics.uniform_clearance import (
     _ellipsoid,
-    _largest,
     diagnose,
     is_mixed,
     sample_uniform_position,
@@ -139,15 +138,6 @@ def test_at_the_centre_the_barrier_is_flat_and_bends_as_the_ellipsoid(thin, part
         assert (ahead + back) / 2 - there == pytest.approx(0.02**2 / 2, rel=0.02)
 
 
-def test_the_ellipsoid_of_a_disc_and_a_side_is_each_ones():
-    """A disc beside a side: both have the Hessian 2 I, whichever comes first."""
-    for starts in ([0, 2, 3], [0, 1, 3]):
-        start = np.array([0.5, 0.5, -0.5])
-        u, M = _ellipsoid(np.eye(3), np.array(starts), start)
-        np.testing.assert_allclose(u, 0.0, atol=2e-3)
-        np.testing.assert_allclose(M @ M.T, np.eye(3) / 2, atol=1e-4)
-
-
 @pytest.mark.parametrize("gap", [0.0, 1e-5, 1e-3, 1.0])
 @pytest.mark.parametrize("end", [0.0, 1.0])
 def test_a_segment_in_a_corner_has_an_inside_unless_it_is_a_point(gap, end):
@@ -158,12 +148,6 @@ def test_a_segment_in_a_corner_has_an_inside_unless_it_is_a_point(gap, end):
     assert (found is None) == (gap == 0.0)
     if found is not None:
         np.testing.assert_allclose(found[0], 1 - gap / 2, atol=2e-3 * gap)
-
-
-def test_the_largest_size_is_that_of_a_cone():
-    """3-4-5, and a side of 2: the squares of each are added, not of all."""
-    assert _largest(np.array([0, 2]), np.array([3.0, 4.0, -2.0])) == pytest.approx(5.0)
-    assert _largest(np.array([0, 1]), np.array([-3.0, 1.0, 1.0])) == pytest.approx(3.0)
 
 
 def test_a_point_that_may_not_move_is_mixed_and_stays():

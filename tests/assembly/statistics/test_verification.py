@@ -1,15 +1,12 @@
 """Proofs of springs in a row, and verdicts on draws that are counted by hand."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Clearance
-from assembly.statistics import verification
-from assembly.statistics.requirement import FRESH, Requirement
-from assembly.statistics.verification import prove_worst, verify, verify_yield
+from assembly.statistics.requirement import Requirement
+from assembly.statistics.verification import prove_worst, verify_yield
 from tests.robots_for_tests import coaxial_beams
 from tests.tolerances_for_tests import PLAY, plan_for
 
@@ -144,48 +141,3 @@ def test_the_verdict_is_that_of_the_interval(failing, asked, verdict):
     share[2, :failing] = 2.0
     found = verify_yield(Given(share, share, asked), TWO, 100, silent)
     assert found["verdict"] == verdict
-
-
-def test_contradicted_tolerances_are_scaled_until_as_few_of_those_draws_fail(
-    monkeypatch,
-):
-    """Of 100 draws the asked yield of 0.75 lets 25 fail; every look draws anew."""
-    asked = []
-
-    def scaled(requirement, samples, t):
-        asked.append((samples.values[:, 0].tolist(), samples.allowed))
-        return t / 2
-
-    def looked(requirement, t, fresh, progress, stream, level):
-        verdicts = {2.0: "contradicted", 1.0: "contradicted", 0.5: "shown"}
-        return {"verdict": verdicts[float(t[0])], "stream": stream, "level": level}
-
-    monkeypatch.setattr(verification, "scale_uniformly", scaled)
-    monkeypatch.setattr(verification, "verify_yield", looked)
-    given = Given(np.zeros((4, 1)), np.zeros((4, 1)), 0.75)
-    t, last = verify(given, TWO, 100, silent)
-    assert (t, last["verdict"]) == (0.5, "shown")
-    assert (last["look"], last["stream"]) == (3, FRESH + 2)
-    assert asked == [(list(range(100)), 25)] * 2
-    assert given.streams == [(FRESH, 100), (FRESH + 1, 100)]
-    # four looks share 5 %
-    assert last["level"] == last["confidence_of_a_look"] == pytest.approx(0.9875)
-
-
-def test_other_corners_are_tried_than_those_the_tolerances_were_made_with():
-    """A search that began where the tolerances' did would find no other worst."""
-    tried = []
-
-    def worst_corner(key, i, t, corners):
-        tried.append(corners)
-        return SimpleNamespace(value=1.0)
-
-    plan = SimpleNamespace(spread=lambda t: t, seed=4, limits={"force": 1.0})
-    requirement = SimpleNamespace(
-        plan=plan, prepared={"force": [None]}, convex={}, worst_corner=worst_corner
-    )
-    worst, scale = prove_worst(requirement, np.ones(5), silent)
-    (corners,) = tried
-    np.testing.assert_array_equal(corners, verification.random_corners(24, 5, 5))
-    assert worst["force"][0] == 1.0
-    assert np.isnan(scale)

@@ -1,19 +1,16 @@
 """Worst cases of errors within tolerances against sums and squares known by hand."""
 
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from assembly.statistics import worst_case
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import (
-    _reach,
     bound_energy,
     bound_margin,
     random_corners,
@@ -187,36 +184,9 @@ def test_one_start_finds_the_worst_of_all_corners(key):
         np.testing.assert_allclose(corner.slopes, slopes[row], rtol=1e-4, atol=1e-3)
 
 
-def test_a_search_goes_on_from_every_corner_to_the_one_its_slopes_point_to(monkeypatch):
-    """A function of which no slope is known where it is largest, nor a value there."""
-    asked = []
-
-    def given(prepared, sources, values, key, model, contact_length):
-        asked.append(values.copy())
-        size = values.sum(axis=1)
-        slopes = np.tile([1.0, 0.0, np.nan], (len(values), 1))
-        return np.where(size > 5, np.nan, size), slopes
-
-    monkeypatch.setattr(worst_case, "respond", given)
-    start = np.array([[-1.0, 1, 1], [-1, 1, -1], [1, 1, 1], [1, -1, -1]])
-    t = np.array([1.0, 2.0, 3.0])
-    found = worst_corner(SimpleNamespace(), range(3), t, start)
-    # the first sign turns, the second has no slope, the third's is not known
-    assert [len(some) for some in asked] == [4, 2]
-    np.testing.assert_array_equal(asked[1], np.array([[1, 1, -1], [1, 1, 1.0]]) * t)
-    assert found.value == 4.0
-    np.testing.assert_array_equal(found.signs, [-1, 1, 1])
-
-
 def test_corners_are_signs_of_either_kind():
     corners = random_corners(500, 3, 2)
     assert set(np.unique(corners)) == {-1.0, 1.0}
     assert np.abs(corners.mean(axis=0)).max() < 0.2
     np.testing.assert_array_equal(corners, random_corners(500, 3, 2))
     assert not np.array_equal(corners, random_corners(500, 3, 3))
-
-
-def test_affine_play_reaches_the_sum_of_its_columns_sizes():
-    """Cones of two and of one column: 5 + 13 and 1 + 2."""
-    V = np.array([[3.0, -5.0], [4.0, 12.0], [-1.0, 2.0]])
-    np.testing.assert_allclose(_reach(V, np.array([0, 2, 3])), [18.0, 3.0])

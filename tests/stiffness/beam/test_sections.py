@@ -81,12 +81,6 @@ def test_the_size_of_a_bar_is_its_radius_in_any_unit():
             assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
 
 
-def test_a_wall_may_be_nearly_half_of_the_section():
-    """What is left of a 1 x 1 box with a wall of 0.45 is a hole of 0.1 x 0.1."""
-    assert box_section(1.0, 1.0, 0.45, NU).area == pytest.approx(0.99, rel=1e-12)
-    assert i_section(1.0, 1.0, 0.5, 0.45, NU).area == pytest.approx(0.95, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     "section",
     [

@@ -86,18 +86,6 @@ def test_every_layout_holds_the_textbook_s_beam_and_its_mass(write, tmp_path):
     assert link.mass == pytest.approx(mass, rel=1e-9)
 
 
-def test_damping_alone_is_no_stiffness_and_stiffness_is_no_mass(tmp_path):
-    path = tmp_path / "k.pch"
-    path.write_text(large_fields(textbook_beam(), "K4AAX"))
-    with pytest.raises(BadInput, match=r"K4AAX \(structural damping\), expected one"):
-        read_matrix(path)
-    path.write_text(large_fields(textbook_beam(), "KAAX"))
-    with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):
-        read_matrix(path, "mass")
-    path.write_text(large_fields(textbook_beam(), "MINE"))  # a user's own name
-    assert read_matrix(path, "mass").matrix.shape == (12, 12)
-
-
 @pytest.mark.parametrize(
     ("name", "write"),
     [
@@ -121,33 +109,52 @@ def test_one_node_retained_of_a_held_body_is_the_tip(name, write, tmp_path):
     assert_same(import_link(path, unit="mm").stiffness, expected_stiffness(), 1e-9)
 
 
-def test_a_dmig_line_that_ends_within_a_term_is_refused(tmp_path):
-    path = tmp_path / "k.dmig"
-    path.write_text("DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n")
-    with pytest.raises(BadInput, match="'1 2' at a line's end, expected node"):
-        read_matrix(path)
-
-
 DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
     f"DMIG,KAAX,7,{k},,7,{k},1.0E+06\n" for k in range(1, 7)
 )
+WRONG = [
+    (
+        "DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n",
+        "'1 2' at a line's end, expected node",
+    ),
+    # of two values of one entry the last one won
+    (
+        DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"),
+        r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06",
+    ),
+    # an imaginary part was dropped without a word
+    (
+        DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"),
+        r"row 7 3: .* imaginary part '5.0E\+04'",
+    ),
+    (
+        large_fields(textbook_beam(), "K4AAX"),
+        r"K4AAX \(structural damping\), expected one",
+    ),
+]
 
 
-def test_dmig_entry_of_two_values_is_refused_by_its_place(tmp_path):
-    """The last one won; two matrices of one name in a file are the usual way."""
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_wrong_dmig_is_refused(text, message, tmp_path):
     path = tmp_path / "k.dmig"
-    path.write_text(DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"))
-    with pytest.raises(BadInput, match=r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06"):
+    path.write_text(text)
+    with pytest.raises(BadInput, match=message):
         read_matrix(path)
-    path.write_text(DIAGONAL + DIAGONAL)
-    assert read_matrix(path).matrix.shape == (6, 6)
 
 
-def test_complex_dmig_is_refused(tmp_path):
-    """Its imaginary part was dropped without a word."""
+def test_stiffness_is_no_mass_but_a_name_of_ones_own_may_be(tmp_path):
+    path = tmp_path / "k.pch"
+    path.write_text(large_fields(textbook_beam(), "KAAX"))
+    with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):
+        read_matrix(path, "mass")
+    path.write_text(large_fields(textbook_beam(), "MINE"))
+    assert read_matrix(path, "mass").matrix.shape == (12, 12)
+
+
+@pytest.mark.parametrize(
+    "text", [DIAGONAL + DIAGONAL, DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,0.0")]
+)
+def test_dmig_that_repeats_itself_or_is_real_is_read(text, tmp_path):
     path = tmp_path / "k.dmig"
-    path.write_text(DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"))
-    with pytest.raises(BadInput, match=r"row 7 3: .* imaginary part '5.0E\+04'"):
-        read_matrix(path)
-    path.write_text(DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,0.0"))
+    path.write_text(text)
     assert read_matrix(path).matrix.shape == (6, 6)

@@ -1,19 +1,13 @@
 """Whole links from their surfaces, to an asked accuracy within a budget."""
 
-import itertools
-import time
-
 import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.fem import fea, sparse_solver
-from stiffness.fem.adaptive_step import solve_level
+from stiffness.fem import fea
 from stiffness.fem.fea import (
     Budget,
     FemOptions,
-    _affordable_mesh,
-    _wanted_growth,
     interface_center,
     solve_bar,
     solve_link,
@@ -23,9 +17,7 @@ from stiffness.fem.material import Material
 from stiffness.link import scaled
 from stiffness.mesh.cut_face import CutFace
 from stiffness.mesh.fit_to_patches import MeshFailed
-from stiffness.mesh.straight_bar import straight_bar
 from stiffness.surface.interface import parse_interface
-from stiffness.surface.patches import find_patches
 from stiffness.surface.primitives import Plane
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
@@ -144,99 +136,6 @@ def test_within_a_budget_of_unknowns_the_mesh_still_becomes_finer():
     assert 0 < gap <= 1.01 * both
 
 
-@pytest.mark.parametrize(
-    ("rate", "believed"), [(1.0, 1.0), (1.5, 1.5), (0.4, 1.0), (3.0, 2.0)]
-)
-def test_a_mesh_grows_as_its_error_fell(rate, believed):
-    """Errors ~ N^-rate, of the worst motion; rates from 1 to 2 are believed."""
-    K = np.diag([1e3, 2e3, 3e3, 4e3, 5e3, 6e3])
-    errors = [np.diag(np.diag(K) * [1e-3, 1, 1e-3, 1e-3, 1e-3, 1e-3] * 2.0**-fall)
-              for fall in (0.0, rate)]  # fmt: skip
-    errors[1][0, 0] = errors[0][0, 0]  # another motion's error does not matter
-    history = [(K, error, error) for error in errors]
-    grown = [_wanted_growth(history, [50, 100], excess) for excess in (1.5, 3.0)]
-    assert grown[1] / grown[0] == pytest.approx(2 ** (1 / believed))
-    assert 1.5 < grown[0] ** believed < 1.2 * 1.5  # a little more than is needed
-
-
-def test_a_mesh_grows_by_a_fifth_at_least_and_sixfold_at_most():
-    one = [(np.eye(6), np.eye(6), np.eye(6))]
-    assert _wanted_growth(one, [10], 1.0) == 1.2
-    assert _wanted_growth(one, [10], 1e9) == 6.0
-    # a first mesh: between the linear and the smooth rate
-    assert 2.0 < _wanted_growth(one, [10], 3.0) < 3.0
-
-
-def test_a_refined_mesh_is_as_large_as_wanted_or_as_can_be_paid():
-    level = solve_level(
-        straight_bar({"width": 0.2, "height": 0.2}), [Material(E, NU)],
-        np.array([[0.0, 0, 0], [0, 0, 1]]), "rigid",
-    )  # fmt: skip
-    count = len(level.solid.cells)
-    each = level.solution.unknowns / count
-    now = time.monotonic()
-    for growth in (1.5, 3.0):
-        solid = _affordable_mesh(level, growth, Budget(), now)
-        assert 0.6 * growth < len(solid.cells) / count < 1.4 * growth
-    # just too small for what is wanted: a share of what it adds
-    budget = Budget(unknowns=int(each * len(solid.cells)) - 1)
-    smaller = _affordable_mesh(level, 3.0, budget, now)
-    assert count < len(smaller.cells) < len(solid.cells)
-    assert len(smaller.cells) > 1.5 * count
-    exact = Budget(unknowns=int(each * len(solid.cells)))
-    assert len(_affordable_mesh(level, 3.0, exact, now).cells) == len(solid.cells)
-    assert _affordable_mesh(level, 3.0, Budget(unknowns=1), now) is None
-    late = now - Budget().seconds
-    assert _affordable_mesh(level, 3.0, Budget(), late) is None
-
-
-@pytest.mark.parametrize("thickness", [0.0005, 0.001, 0.02])
-def test_a_first_mesh_follows_the_surface_as_closely_as_its_walls_are_thin(
-    thickness, monkeypatch
-):
-    """To an eighth of a wall of 2 V / A; 0.2 % of the part is always close enough."""
-    a, b = 0.06, 0.1
-    points = np.array(list(itertools.product((0, a), (0, thickness), (0, b))))
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
-             [1, 5, 7, 3]]  # fmt: skip
-    triangles = [[s[i] for i in turn] for s in sides for turn in ([0, 1, 2], [0, 2, 3])]
-    plate, asked = check_surface(points, np.array(triangles), "plate"), {}
-    monkeypatch.setattr(fea, "mesh_solid", lambda *_, **given: asked.update(given))
-    fea.first_mesh(plate, *map(parse_interface, ("z=0", "z=0.1")), Budget())
-    V, A = a * b * thickness, 2 * (a * b + (a + b) * thickness)
-    diagonal = np.sqrt(a**2 + b**2 + thickness**2)
-    expected = min(2e-3, 2 * V / A / 8 / diagonal)
-    assert asked["envelope"] == pytest.approx(expected, rel=1e-9)
-    assert asked["edge"] == pytest.approx(diagonal / 10, rel=1e-9)
-
-
-def test_expected_costs_are_those_measured_and_grow_faster_than_the_mesh(monkeypatch):
-    """3.8 GB and 20 s for 400 thousand unknowns; ten times as long by SuperLU."""
-    monkeypatch.setattr(sparse_solver, "solver_name", lambda: "PARDISO")
-    memory, seconds = sparse_solver.expected_cost(400_000)
-    assert (memory, seconds) == (3.8e9, 20.0)
-    twice = sparse_solver.expected_cost(800_000)
-    assert 2 < twice[0] / memory < 2.5
-    assert 2.5 < twice[1] / seconds < 3
-    monkeypatch.setattr(sparse_solver, "solver_name", lambda: "SuperLU")
-    assert sparse_solver.expected_cost(400_000) == (3 * memory, 10 * seconds)
-
-
-def test_the_mesher_leaves_time_for_the_solver(monkeypatch):
-    """Of 100 s it gets 60; of what is left after a failure 60 % again."""
-    limits, now = [], itertools.count(0.0, 10.0)
-    monkeypatch.setattr(fea.time, "monotonic", lambda: next(now))
-
-    def fail(*_, time_limit, **__):
-        limits.append(time_limit)
-        raise MeshFailed("no mesh")
-
-    monkeypatch.setattr(fea, "mesh_solid", fail)
-    with pytest.raises(MeshFailed):
-        fea.first_mesh(bar_surface(), *PLANES, Budget(seconds=100.0))
-    np.testing.assert_allclose(limits, 0.6 * (100 - 10 * np.array([1, 3, 5])))
-
-
 def test_a_first_mesh_that_costs_more_than_the_budget_is_refused():
     """400 000 unknowns take 20 s: after 290 of 300 s, or beyond a million unknowns."""
     fea._refuse_cost(400_000, Budget(seconds=300.0), 270.0)
@@ -252,25 +151,6 @@ def test_a_first_mesh_on_a_busy_machine_is_refused_before_the_budget_is_used_up(
     with pytest.raises(MeshFailed, match="400000 unknowns, about 1.. s and"):
         fea._refuse_cost(400_000, Budget(seconds=300.0), 200.0, pace)
     assert fea._pace_so_far(elapsed=30.0, busy=60.0) == 1.0  # two threads
-
-
-def test_patches_are_found_once_for_all_tries_of_the_mesher(monkeypatch):
-    """They take seconds for a part with many; each try had found them again."""
-    found = []
-
-    def find(*arguments):
-        found.append(arguments)
-        return find_patches(*arguments)
-
-    def fail(*_, **__):
-        raise MeshFailed("no mesh")
-
-    monkeypatch.setattr(fea, "find_patches", find)
-    monkeypatch.setattr("stiffness.mesh.mesh.find_patches", find)
-    monkeypatch.setattr("stiffness.mesh.mesh._tetrahedralize", fail)
-    with pytest.raises(MeshFailed):
-        fea.first_mesh(bar_surface(), *PLANES, Budget(), cache="absent")
-    assert len(found) == 1
 
 
 def test_a_mesher_that_fails_is_asked_for_finer_meshes_while_there_is_time(monkeypatch):

@@ -12,7 +12,6 @@ from stiffness.fem.elements import isoparametric, lame
 from stiffness.fem.error_indicator import VOIGT
 from stiffness.fem.stress import (
     StressInfluence,
-    _interface_radius,
     _nodal_stresses,
     peak_stress,
     stress_influence,
@@ -81,20 +80,6 @@ def test_at_a_seam_each_material_has_its_own_stress():
     np.testing.assert_allclose(found[away, 5, 5], other[away])
     found[:, 5, 5] = 0.0
     np.testing.assert_allclose(found, 0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("shift", [0.0, 3.0])
-def test_an_interface_is_as_large_as_from_its_middle_to_its_furthest_node(shift):
-    """Of a rectangle half its diagonal, wherever it lies and however it is meshed."""
-    solid = box_solid((3, 1, 1), (0.3, 0.4, 1.0))
-    stretched = solid.points.copy()
-    stretched[:, 0] = 0.3 * (stretched[:, 0] / 0.3) ** 2
-    stretched += [shift, -2 * shift, shift]
-    mesh = isoparametric(
-        type(solid)(stretched, solid.cells, solid.faces, solid.patch, (None,) * 3), 2
-    )
-    for patch in (0, 1):
-        assert _interface_radius(mesh, patch) == pytest.approx(0.25, rel=1e-9)
 
 
 def box_of_stress(tip_scale=1.0):

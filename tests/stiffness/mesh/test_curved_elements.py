@@ -6,7 +6,6 @@ import pytest
 from stiffness.fem.elements import integration, isoparametric, lame, triangle_areas
 from stiffness.fem.error_indicator import geometry_errors
 from stiffness.mesh.curved_elements import (
-    _straightened,
     curved_elements,
     patches_of_cells,
     refine_inverted,
@@ -199,57 +198,3 @@ def test_a_cells_faces_are_of_the_boundarys_patches_or_inside():
         for cell in corners
     ]
     assert patches_of_cells(solid.faces, solid.patch, corners).tolist() == expected
-
-
-@pytest.mark.parametrize("order", [2, 3])
-@pytest.mark.parametrize(
-    ("bulge", "kept"),
-    [
-        (1.35, 1.0), (1.36, 0.5), (2.7, 0.5), (2.72, 0.25), (10.8, 0.125),
-        (10.9, 0.0625), (21.7, 0.0625), (21.8, 0.0), (-27.1, 1.0), (-27.2, 0.5),
-    ],
-)  # fmt: skip
-@pytest.mark.parametrize("hand", [1, -1])
-def test_a_bulge_is_halved_until_no_corner_is_a_twentieth_of_another(
-    order, bulge, kept, hand
-):
-    """z grows by b (L0 L1 + L1 L2 + L2 L0) on a base of which the apex is 1 high above
-    (0.3, 0.3): the determinant is 1 - b (0.6 L0 + 0.7 (L1 + L2)), least and largest at
-    corners: b up to 0.95 / 0.7, inward up to 19 / 0.7.  Four
-    halves at most."""
-    L = lattice(order) / order
-    straight = L @ np.array([
-        [0.0, 0, 0],
-        [1, 0, 0],
-        [0, hand, 0],
-        [0.3, 0.3 * hand, 1],
-    ])
-    curved = straight.copy()
-    curved[:, 2] += bulge * (L[:, 0] * L[:, 1] + L[:, 1] * L[:, 2] + L[:, 2] * L[:, 0])
-    cells = np.arange(len(L))[None]
-    nodes, inverted = _straightened(straight, curved, cells, order)
-    expected = straight + kept * (curved - straight)
-    np.testing.assert_allclose(nodes, expected, atol=1e-12)
-    assert inverted.tolist() == [kept < 1]
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("order", [2, 3])
-def test_a_node_is_moved_by_a_twentieth_of_the_part_at_most(order, unit):
-    """The tip's plane is off by a share of the part's size; corners stay."""
-    size = unit * np.sqrt(14)
-    for share, moved in ((0.0, False), (0.045, True), (-0.045, True), (0.055, False)):
-        box = box_solid((1, 1, 1), unit * np.array([1.0, 2.0, 3.0]))
-        tip = Plane(np.array([0, 0, 3 * unit + share * size]), np.array([0, 0, 1.0]))
-        shapes = (box.shapes[0], tip, None)
-        solid = Solid(box.points, box.cells, box.faces, box.patch, shapes)
-        bent = curved_elements(solid, order)
-        np.testing.assert_array_equal(bent.nodes[:8], box.points)
-        top = bent.nodes[8:, 2].max() - 3 * unit
-        low = bent.nodes[8:, 2].min()
-        assert low == pytest.approx(0, abs=1e-9 * unit)
-        assert bent.curved.any() == moved
-        if moved and order == 2 and share > 0:
-            assert top == pytest.approx(share * size, rel=1e-9)
-        elif not moved:
-            assert top == pytest.approx(0, abs=1e-9 * unit)

@@ -167,14 +167,6 @@ def test_the_layer_takes_its_share_of_each_edge():
     assert (np.bincount(parts.parent)[far] == 1).all()
 
 
-def test_a_layer_of_another_share_is_as_thin():
-    held = (0,)
-    solid = split_joining_edges(box_solid((2, 2, 2), (0.2, 0.2, 0.2)), held)
-    new = layered(solid, held, share=0.1).places
-    edges = np.unique(np.round(new, 12))
-    np.testing.assert_allclose(edges, [0, 0.1, 0.9, 1])
-
-
 # --- nested spaces -------------------------------------------------------------------
 
 
@@ -262,11 +254,3 @@ def test_a_clamped_base_is_split_until_no_edge_joins_two_of_its_sides(base, tria
     check_chordless(solid, (0,))
     assert solid.volumes().sum() == pytest.approx(whole.volumes().sum(), rel=1e-12)
     assert len(solid.cells) > len(whole.cells)
-
-
-def test_what_touches_more_than_an_edge_of_the_singular_ones_stays_whole():
-    """A clamped triangle that was not split before; its neighbours' corners too."""
-    solid = pyramid([(-1, -1), (1, -1), (0, 1)], [(0, 1, 2)])
-    parts = layered(solid, (0,))
-    np.testing.assert_array_equal(parts.corners, np.sort(solid.cells, axis=1))
-    np.testing.assert_array_equal(parts.places, [np.eye(4)])

@@ -7,105 +7,18 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from stiffness.mesh.fit_to_patches import MeshFailed, _nearest_patch, fit_to_patches
+from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
 from stiffness.mesh.solid import (
-    Solid,
     boundary_faces,
-    moved_onto_shapes,
-    node_patches,
     on_shapes,
 )
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import Patches, find_patches
 from stiffness.surface.primitives import Plane
-from stiffness.surface.surface import Surface, check_surface
+from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
 X, Z = np.array([1.0, 0, 0]), np.array([0.0, 0, 1])
-CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 0.4, 0]]) + [3.0, -2.0, -7.0]
-MIDDLE = CORNERS.mean(axis=0)
-# the middle, and 0.4 and 0.8 of the ways to the corners
-PLACES = np.array([
-    MIDDLE + share * (corner - MIDDLE)
-    for share in (0.4, 0.8)
-    for corner in CORNERS
-] + [MIDDLE])  # fmt: skip
-SHARES = np.array([0.4, 0.4, 0.4, 0.8, 0.8, 0.8, 0.0])
-
-
-def patch_of_a_face(heights, angles, unit=1.0):
-    """Of small squares at the places, below a face of length 1 and turned about y."""
-    corners = []
-    for place, height, angle in zip(PLACES, heights, angles, strict=True):
-        across = 0.005 * np.array([np.cos(angle), 0, -np.sin(angle)])
-        along = np.array([0, 0.005, 0])
-        middle = place - [0, 0, height]
-        corners += [middle + s * across + t * along
-                    for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
-    first = 4 * np.arange(len(PLACES))
-    triangles = np.concatenate([first[:, None] + [0, 1, 2], first[:, None] + [0, 2, 3]])
-    surface = Surface(unit * np.array(corners), triangles, "squares")
-    patches = Patches(np.tile(np.arange(len(PLACES)), 2), ())
-    face = np.array([[0, 1, 2]])
-    (patch,) = _nearest_patch(unit * CORNERS, face, surface, patches)
-    return patch
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("place", range(7))
-def test_a_face_is_the_patchs_that_is_parallel_wherever_below_it_that_is(place, unit):
-    """The others are turned by 60 degrees; half a length of distance weighs as much."""
-    angles = np.full(7, np.pi / 3)
-    angles[place] = 0.0
-    assert patch_of_a_face(np.zeros(7), angles, unit) == place
-    heights = np.zeros(7)
-    heights[place] = 0.04
-    assert patch_of_a_face(heights, angles, unit) == place
-
-
-def test_a_patch_seen_from_behind_is_another_ones():
-    """Across one another is half as far from parallel as opposite."""
-    angles = np.full(7, np.pi)
-    angles[2] = np.pi / 2
-    assert patch_of_a_face(np.zeros(7), angles) == 2
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_of_parallel_patches_a_face_is_the_nearest_and_middles_ones(unit):
-    """A place that is the share w of the way to a corner counts as 0.05 w of the face's
-    length further away: 0.02 and 0.04."""
-    flat = np.zeros(7)
-
-    def nearest(*heights):
-        by_share = dict(zip((0.0, 0.4, 0.8), heights, strict=True))
-        patch = patch_of_a_face([by_share[share] for share in SHARES], flat, unit)
-        return SHARES[patch]
-
-    assert nearest(0.0, 0.0, 0.0) == 0.0
-    assert nearest(0.015, 0.0, 0.0) == 0.0
-    assert nearest(0.025, 0.0, 0.0) == 0.4
-    assert nearest(0.05, 0.015, 0.0) == 0.4
-    assert nearest(0.05, 0.025, 0.0) == 0.8
-
-
-def test_nodes_are_grouped_by_the_patches_of_their_faces():
-    """Against a set for each node, filled face by face."""
-    rng = np.random.default_rng(5)
-    members = np.array([rng.choice(40, 3, replace=False) for _ in range(30)])
-    patch = rng.integers(0, 4, len(members))
-    sets = {}
-    for face, number in zip(members, patch, strict=True):
-        for node in face:
-            sets.setdefault(int(node), set()).add(int(number))
-    found = {
-        int(node): set(key)
-        for key, group in node_patches(40, members, patch)
-        for node in group
-    }
-    assert found == sets
-    keys = [key for key, _ in node_patches(40, members, patch)]
-    assert len(keys) == len(set(keys))
-    assert all(key == tuple(sorted(key)) for key in keys)
 
 
 def test_points_within_reach_go_to_all_their_shapes_and_others_stay():
@@ -138,55 +51,8 @@ def test_a_face_of_one_tetrahedron_alone_is_on_the_boundary():
     assert len(faces) == sum(n == 1 for n in count.values())
 
 
-def thin(heights):
-    """Tetrahedra side by side, of these heights on unit bases, patch 0."""
-    points, cells = [], []
-    for k, height in enumerate(heights):
-        base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, height]])
-        points.append(base + [2 * k, 0, 0])
-        cells.append(4 * k + np.arange(4))
-    faces = np.array([cell[[0, 2, 1]] for cell in cells])
-    return np.concatenate(points), np.array(cells), faces
-
-
-@pytest.mark.parametrize(
-    ("height", "share"),
-    [
-        (1.2, 1.0),  # a sixth of the volume is left
-        (1.12, 1.0),  # a ninth
-        (1.1, 0.5),  # a 11th would be
-        (0.6, 0.5),  # a sixth is left of half the move
-        (0.55, 0.25),
-        (0.06, 0.5**5),
-        (0.0006, 0.5**11),  # 0.0005 of the move is 0.8 of the height
-    ],
-)
-def test_a_move_is_halved_until_a_tenth_of_the_volume_is_left(height, share):
-    """Of the tetrahedra that it would fold alone: the other is as high as it may be."""
-    lift = 0.01
-    points, cells, faces = thin([height * lift, 1.0])
-    plane = Plane(np.array([0, 0, lift]), Z)
-    moved = moved_onto_shapes(Solid(points, cells, faces, np.zeros(2, int), (plane,)))
-    base = moved.points[faces][..., 2]
-    np.testing.assert_allclose(base[0], share * lift, rtol=1e-9)
-    np.testing.assert_allclose(base[1], lift, rtol=1e-9)
-    assert (moved.volumes() > 0).all()
-
-
 SURFACE = check_surface(CUBE, CUBE_TRIANGLES, "cube")
 ENDS = parse_interface("z=0"), parse_interface("z=0.1")
-
-
-@pytest.mark.parametrize("stretch", [0.981, 0.984, 0.99, 1.01, 1.016, 1.019])
-def test_a_corner_is_moved_by_a_hundredth_of_the_parts_size_at_most(stretch):
-    """1.7 mm of a cube of 0.1 m: a mesh that is higher by more stays as it is."""
-    made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
-    solid = fit_to_patches(
-        made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS)
-    )
-    top = solid.points[solid.faces[solid.patch == 1]][..., 2]
-    near = abs(stretch - 1) < 0.0173
-    np.testing.assert_allclose(top, 0.1 if near else 0.1 * stretch, rtol=1e-12)
 
 
 @pytest.mark.parametrize("stretch", [0.979, 1.021])

@@ -7,9 +7,6 @@ import pytest
 
 from stiffness.fem.elements import isoparametric
 from stiffness.mesh.lagrange import (
-    EDGES,
-    FACES,
-    face_nodes,
     lattice,
     numbered,
     shape_functions,
@@ -35,16 +32,6 @@ def test_a_lattice_has_all_points_once(degree, corners):
     assert (points >= 0).all()
     assert (points.sum(axis=1) == degree).all()
     np.testing.assert_array_equal(points[:corners], degree * np.eye(corners))
-
-
-def test_a_cubic_lattice_runs_from_the_lower_corner_to_the_higher():
-    points = lattice(3)
-    for k, (low, high) in enumerate(EDGES):
-        first, second = points[4 + 2 * k : 6 + 2 * k]
-        assert (first[low], first[high]) == (2, 1)
-        assert (second[low], second[high]) == (1, 2)
-    for k, face in enumerate(FACES):
-        assert points[16 + k][face].tolist() == [1, 1, 1]
 
 
 @pytest.mark.parametrize("corners", CORNERS)
@@ -109,14 +96,6 @@ def test_a_shared_node_has_one_place(order):
     np.testing.assert_allclose(mesh.nodes[mesh.cells], own, atol=1e-15)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_face_nodes_are_those_without_the_missing_corner(order):
-    points = lattice(order)
-    for k, (face, row) in enumerate(zip(FACES, face_nodes(order), strict=True)):
-        assert set(row) == set(np.flatnonzero(points[:, 3 - k] == 0))
-        np.testing.assert_array_equal(points[row][:, face], lattice(order, 3))
-
-
 def test_the_numbers_of_the_corners_do_not_matter(rng):
     """Corners named otherwise: the same places, in other orders, left-handed or not."""
     solid = bar_solid(1, 2, 0.02, 0.06)
@@ -130,17 +109,3 @@ def test_the_numbers_of_the_corners_do_not_matter(rng):
     assert len(one.nodes) == len(two.nodes)
     gap = np.linalg.norm(one.nodes[:, None] - two.nodes[None], axis=2).min(axis=1)
     assert gap.max() < 1e-12
-
-
-@pytest.mark.parametrize("degree", [*ORDERS, 4, 5])
-def test_every_place_has_one_number_and_every_number_one_place(degree):
-    """Three tetrahedra around an edge: what they share is counted once."""
-    cells = np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 3, 4]])
-    points = np.random.default_rng(1).normal(size=(5, 3))
-    numbers, count = numbered(cells, degree)
-    places = np.einsum("mk,tkx->tmx", lattice(degree) / degree, points[cells])
-    every = np.unique(places.reshape(-1, 3).round(9), axis=0)
-    assert count == len(every) == len(np.unique(numbers)) == numbers.max() + 1
-    first = np.full((count, 3), np.nan)
-    first[numbers] = places
-    np.testing.assert_allclose(places, first[numbers], atol=1e-12)

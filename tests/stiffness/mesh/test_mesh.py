@@ -150,33 +150,6 @@ def test_every_edge_has_a_mesh_of_its_own_in_the_cache(tmp_path, monkeypatch):
     assert len(list(tmp_path.iterdir())) == 17
 
 
-def test_what_the_mesher_is_asked_for(tmp_path, monkeypatch):
-    """Edges of a 20th of the diagonal and 300 s at most unless others are wanted; a
-    coarser surface may leave the part by the envelope's share of the diagonal."""
-    cube, asked, tolerances = kuhn_cube(2), [], []
-    monkeypatch.setattr(
-        mesh_module,
-        "coarser_surface",
-        lambda s, tolerance: tolerances.append(tolerance) or (s.points, s.triangles),
-    )
-
-    def mesher(command, timeout, **_):
-        with np.load(command[3]) as given:
-            asked.append([*given["settings"], timeout])
-        np.savez(command[4], points=cube.points, cells=cube.cells)
-        return subprocess.CompletedProcess(command, 0, b"", b"")
-
-    monkeypatch.setattr(mesh_module.subprocess, "run", mesher)
-    surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
-    faces = parse_interface("z=0"), parse_interface("z=0.1")
-    mesh_solid(surface, *faces, cache=tmp_path)
-    other = {"edge": 0.02, "envelope": 1e-3, "time_limit": 7.0}
-    mesh_solid(surface, *faces, **other, cache=tmp_path)
-    diagonal = 0.1 * np.sqrt(3)
-    np.testing.assert_allclose(asked, [[diagonal / 20, 5e-4, 300], [0.02, 1e-3, 7]])
-    np.testing.assert_allclose(tolerances, [5e-4 * diagonal, 1e-3 * diagonal])
-
-
 @pytest.mark.parametrize("words", ["first\nno inside", "no inside\n"])
 def test_a_mesher_without_an_answer_is_reported_with_its_last_words(
     tmp_path, monkeypatch, words

@@ -1,16 +1,10 @@
 """Bisection: edges counted and ranked one by one, halves, who follows whom."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
 from stiffness.mesh.refine import (
-    _terminal_edges,
-    chosen_by_all,
-    edge_code,
     edges_of,
-    length_ranks,
     refine,
     split_edges,
 )
@@ -23,68 +17,6 @@ def crooked(rng):
     solid = box_solid((2, 2, 2), (1.0, 1.0, 1.0))
     points = solid.points + 0.05 * rng.uniform(-1, 1, solid.points.shape)
     return Solid(points, solid.cells, solid.faces, solid.patch, (None,) * 3)
-
-
-def test_edges_are_the_pairs_of_each_cells_corners_once():
-    solid = box_solid((2, 3, 1), (1.0, 1.0, 1.0))
-    ends, of_cell = edges_of(solid.cells, len(solid.points))
-    pairs = {tuple(sorted(p)) for cell in solid.cells for p in combinations(cell, 2)}
-    assert [tuple(end) for end in ends] == sorted(pairs)
-    for cell, edges in zip(solid.cells, of_cell, strict=True):
-        expected = [sorted((cell[i], cell[j])) for i, j in combinations(range(4), 2)]
-        assert ends[edges].tolist() == expected
-
-
-def test_pairs_in_order_have_rising_codes():
-    pairs = np.array([[i, j] for i in range(7) for j in range(7)])
-    codes = edge_code(pairs, 7)
-    assert codes.tolist() == list(range(49))
-
-
-def test_ranks_are_by_length_and_of_equal_ones_by_place(rng):
-    x = rng.integers(0, 4, 30).astype(float)
-    points = np.column_stack([x, 0 * x, 0 * x])
-    ends = np.array(list(combinations(range(30), 2)))
-    rank = length_ranks(points, ends)
-    length = [abs(x[i] - x[j]) for i, j in ends]
-    order = sorted(range(len(ends)), key=lambda k: (length[k], k))
-    assert [order.index(k) for k in range(len(ends))] == rank.tolist()
-
-
-def test_an_edge_is_chosen_by_all_if_every_cell_around_it_chooses_it(rng):
-    _, of_cell = edges_of(box_solid((2, 2, 2), (1.0, 1.0, 1.0)).cells, 27)
-    count = of_cell.max() + 1
-    favourite = rng.permutation(count)
-    chosen = np.array([max(edges, key=lambda e: favourite[e]) for edges in of_cell])
-    every = [(chosen[(of_cell == e).any(axis=1)] == e).all() for e in range(count)]
-    assert 0 < sum(every) < count
-    assert chosen_by_all(of_cell, chosen, count).tolist() == every
-
-
-def test_edges_split_first_are_at_the_ends_of_the_paths_from_a_wanted_cell(rng):
-    """From cell to cell across their longest edges, to one that is the longest of all
-    around it (Rivara)."""
-    solid = crooked(rng)
-    ends, of_cell = edges_of(solid.cells, len(solid.points))
-    length = np.linalg.norm(np.subtract(*solid.points[ends.T]), axis=1)
-    longest = [int(max(edges, key=lambda e: length[e])) for edges in of_cell]
-    for wanted in range(0, len(solid.cells), 5):
-        marked, waiting = set(), [longest[wanted]]
-        while waiting:
-            edge = waiting.pop()
-            if edge not in marked:
-                marked.add(edge)
-                around = np.flatnonzero((of_cell == edge).any(axis=1))
-                waiting += [longest[cell] for cell in around]
-        last = {
-            e
-            for e in marked
-            if all(longest[c] == e for c in np.flatnonzero((of_cell == e).any(axis=1)))
-        }
-        mask = np.arange(len(solid.cells)) == wanted
-        split = _terminal_edges(solid.points, ends, of_cell, mask)
-        assert set(np.flatnonzero(split)) == last
-        assert last
 
 
 def test_a_split_edge_has_its_middle_and_each_cell_there_two_halves(rng):

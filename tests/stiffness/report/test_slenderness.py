@@ -83,7 +83,7 @@ def test_table_and_picture_show_every_entry():
 
 
 # K / K_beam - 1 of RX, TX and TZ, nu = 0.3, by Fourier modes in the half section, good
-# to 1e-6: benchmarks/stiffness_round_references.py on bars of these L / r
+# to 1e-6: benchmarks/evidence/stiffness_round_references.py on bars of these L / r
 ENDS = {
     6: (0.025438, 0.030358, 0.017318),
     12: (0.015261, 0.018274, 0.008585),

@@ -92,10 +92,3 @@ def test_what_is_no_shape_is_refused(shape, lengths, words):
         with pytest.raises(BadInput) as caught:
             call(shape, lengths)
         assert words in str(caught.value)
-
-
-def test_the_thinnest_wall_and_the_smallest_hole_are_shapes():
-    for share in (1e-3, 0.499):
-        check_shape("box", {"length": L, "width": R, "height": S, "wall": share * S})
-        tube = {"length": 1e-6, "radius": R, "inner_radius": R * (1 - share)}
-        check_shape("tube", tube)

@@ -5,18 +5,11 @@ import pytest
 
 from stiffness.surface.decimate import (
     _closed,
-    _distance,
     coarser_surface,
     euler_characteristic,
 )
 from stiffness.surface.surface import check_surface, signed_volume
-from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
-
-
-def test_a_surface_is_closed_if_each_edge_has_two_triangles():
-    assert _closed(CUBE_TRIANGLES)
-    assert not _closed(CUBE_TRIANGLES[1:])
-    assert not _closed(np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES[:1]]))
+from tests.solids_for_tests import CUBE_TRIANGLES, box_solid
 
 
 def test_eulers_characteristic_is_of_what_is_there():
@@ -27,15 +20,6 @@ def test_eulers_characteristic_is_of_what_is_there():
     assert euler_characteristic(CUBE_TRIANGLES[1:]) == 1
     both = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
     assert euler_characteristic(both) == 4
-
-
-def test_the_distance_is_of_the_furthest_point():
-    import pyvista
-
-    mesh = pyvista.PolyData.from_regular_faces(CUBE, CUBE_TRIANGLES)
-    points = np.array([[0.05, 0.05, 0.13], [0.05, 0.05, 0.04], [-0.03, -0.04, 0.02]])
-    assert _distance(mesh, points) == pytest.approx(0.05)
-    assert _distance(mesh, points[:2]) == pytest.approx(0.04)
 
 
 def fine_cube(unit, bump=0.0):

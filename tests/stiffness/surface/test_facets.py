@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.facets import Facets, _barycentric
+from stiffness.surface.facets import Facets
 from tests.solids_for_tests import cylinder
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
-def test_shares_of_the_corners_give_the_point_back(unit):
-    rng = np.random.default_rng(1)
-    corners = unit * (rng.normal(size=(20, 3, 3)) + [5.0, -3.0, 2.0])
-    share = rng.dirichlet([1, 1, 1], size=20)
-    points = np.einsum("pc,pci->pi", share, corners)
-    np.testing.assert_allclose(_barycentric(corners, points), share, atol=1e-12)
 
 
 def side(radius, facets):

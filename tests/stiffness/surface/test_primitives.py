@@ -1,12 +1,9 @@
 """Planes, cones, spheres, tori: distances by hand, fits in any unit, their guesses."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from stiffness.screws import rotation_matrix
-from stiffness.surface import primitives
 from stiffness.surface.primitives import (
     Cone,
     Plane,
@@ -92,46 +89,6 @@ def test_a_plane_looks_where_its_facets_look(sign):
     np.testing.assert_allclose(fitted.normal, sign * AXIS, atol=1e-14)
 
 
-def first_guess(monkeypatch, fit, points, normals):
-    """The shape that nonlinear least squares begin with, of each try."""
-    guesses = []
-
-    def spy(shape, start, points, size):
-        guesses.append(shape(start))
-        return guesses[-1]
-
-    monkeypatch.setattr(primitives, "_refined_fit", spy)
-    fit(points, normals)
-    return guesses
-
-
-def test_the_first_guess_of_a_cylinder_is_the_cylinder(monkeypatch):
-    """Half of it suffices: a circle's centre and radius are linear in |x|^2."""
-    cylinder = Cone(CENTER, AXIS, 2.0)
-    points = (
-        ring_points([2.0, 2.0], [-1.0, 1.0]).reshape(2, -1, 3)[:, :7].reshape(-1, 3)
-    )
-    normals = cylinder.signed(points)[1]
-    for unit in (1e-3, 1.0, 1e3):
-        (guess,) = first_guess(monkeypatch, fit_cone, unit * points, normals)
-        assert guess.radius == pytest.approx(2 * unit, rel=1e-12)
-        assert guess.slope == 0
-        np.testing.assert_allclose(guess.signed(unit * points)[0] / unit, 0, atol=1e-12)
-
-
-def test_one_first_guess_of_a_torus_is_near(monkeypatch):
-    """Of a whole one: mean r^2 is R^2 + t^2 / 2; the spread of r is t / sqrt(2)."""
-    torus, points = CASES["torus"]
-    for unit in (1e-3, 1.0, 1e3):
-        normals = torus.signed(points)[1]
-        guesses = first_guess(monkeypatch, fit_torus, unit * points, normals)
-        near = max(guesses, key=lambda guess: abs(guess.axis @ AXIS))
-        assert abs(near.axis @ AXIS) == pytest.approx(1, rel=1e-12)
-        np.testing.assert_allclose(near.point / unit, CENTER, atol=1e-12)
-        assert near.radius == pytest.approx(unit * np.sqrt(4 + 0.125), rel=1e-12)
-        assert 0.35 <= near.tube / unit <= 0.7
-
-
 def test_a_torus_is_found_in_any_direction_it_is_thin_in():
     """A quarter of one: its thinnest direction is not its axis."""
     torus = CASES["torus"][0]
@@ -155,23 +112,6 @@ def test_too_few_points_give_the_first_guess():
     fitted = fit_cone(points, normals)
     assert fitted.slope == 0
     np.testing.assert_allclose(fitted.signed(points)[0], 0, atol=1e-12)
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_projecting_onto_a_plane_takes_one_step_and_one_to_see_it(unit, monkeypatch):
-    """Newton's method ends with the first step that rounding alone makes."""
-    calls = []
-    plain = Plane.signed
-
-    def counted(self, points):
-        calls.append(len(points))
-        return plain(self, points)
-
-    monkeypatch.setattr(Plane, "signed", counted)
-    plane = replace(CASES["plane"][0], point=unit * CENTER)
-    found = project(unit * (CENTER + [[0.1, 0.2, 0.3]]), (plane,))
-    np.testing.assert_allclose((found - unit * CENTER) @ AXIS, 0, atol=1e-13 * unit)
-    assert len(calls) <= 3
 
 
 def test_projecting_nothing_gives_nothing():

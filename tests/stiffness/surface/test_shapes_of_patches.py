@@ -1,7 +1,6 @@
 """Which triangles lie on an interface, and which shapes a part's patches are."""
 
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ import pytest
 from forcefit.inputs.table import BadInput
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches, interface_shape, triangles_on
-from stiffness.surface.primitives import Cone, Plane, Sphere, Torus
-from stiffness.surface.recognition import fitted_shape, ring
+from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import Surface, check_surface
 from stiffness.surface.triangle_graph import TriangleGraph
 from tests.solids_for_tests import bar, cylinder
@@ -72,18 +70,6 @@ def test_a_triangle_on_a_bore_has_all_corners_there_and_faces_across(unit):
     assert triangles_on(surface, bore, "tip").tolist() == [0, 1, 4, 5]
 
 
-@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
-def test_a_narrow_bore_is_as_near_as_a_plane_at_least(unit):
-    """1e-5 of the diagonal, where that is more than 2e-3 of the radius."""
-    radius, near = 1e-3, 1e-5 * np.sqrt(2)
-    on = around(radius, 0.5)
-    outward = on / radius * [1, 1, 0]
-    shifts = [0.9 * near, 1.1 * near]
-    surface = loose(*(on + shift * outward for shift in shifts), unit=unit)
-    bore = parse_interface(f"bore=0,0,0/0,0,1/{unit * radius}")
-    assert triangles_on(surface, bore, "tip").tolist() == [0]
-
-
 def spoke(low, high):
     """A flat triangle between two distances from the origin."""
     return [[low, 0, 0], [high, 0, 0], [low, 0.01, 0]]
@@ -139,24 +125,6 @@ def test_an_interface_is_the_shape_that_it_is_called():
 # --- shapes --------------------------------------------------------------------------
 
 
-def revolved(profile, facets=24):
-    """A profile (r, z) turned about z, its first and last points closed by fans."""
-    angle = 2 * np.pi * np.arange(facets) / facets
-    rings = [np.column_stack([r * np.cos(angle), r * np.sin(angle), z + 0 * angle])
-             for r, z in profile]  # fmt: skip
-    ends = [[0, 0, profile[0][1]], [0, 0, profile[-1][1]]]
-    i, j = np.arange(facets), (np.arange(facets) + 1) % facets
-    triangles = []
-    for k in range(len(profile) - 1):
-        a, b = k * facets, (k + 1) * facets
-        triangles += [np.column_stack([i + a, j + a, j + b]),
-                      np.column_stack([i + a, j + b, i + b])]  # fmt: skip
-    last, count = (len(profile) - 1) * facets, len(profile) * facets
-    triangles += [np.column_stack([0 * i + count, j, i]),
-                  np.column_stack([0 * i + count + 1, i + last, j + last])]  # fmt: skip
-    return np.concatenate([*rings, ends]), np.concatenate(triangles)
-
-
 def patches_of(points, triangles, top):
     surface = check_surface(points, triangles, "part")
     ends = parse_interface("z=0"), parse_interface(f"z={top}")
@@ -176,23 +144,6 @@ def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
         assert (patches.patch >= 0).all()
 
 
-@pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
-def test_corners_are_on_a_shape_to_two_millionths_of_the_parts_size(unit):
-    """The middle ring's corners in turn in and out."""
-    points, triangles = revolved(
-        unit * np.array([(0.02, 0), (0.02, 0.05), (0.02, 0.1)]), 12
-    )
-    diagonal = unit * np.sqrt(0.04**2 + 0.04**2 + 0.1**2)
-    spokes = points[12:24] * [1, 1, 0] / (0.02 * unit)
-    turns = np.where(np.arange(12) % 2, 1, -1)[:, None]
-    for off, kind in ((1.5e-6, Cone), (2.8e-6, type(None))):
-        moved = points.copy()
-        moved[12:24] += off * diagonal * turns * spokes
-        graph = TriangleGraph(check_surface(moved, triangles, "part"))
-        side = np.flatnonzero(np.abs(graph.normals[:, 2]) < 0.5)
-        assert isinstance(fitted_shape(graph, side), kind)
-
-
 def test_a_cap_with_its_corners_on_a_cylinder_is_not_of_it():
     """A fan from a corner of the rim: all its corners are on the cylinder."""
     points, triangles = cylinder(0.02, 0.1, 24)
@@ -209,65 +160,3 @@ def test_a_cap_with_its_corners_on_a_cylinder_is_not_of_it():
     inside_out = Cone(np.zeros(3), np.array([0.0, 0, -1]), 0.02)
     np.testing.assert_array_equal(graph.fits(inside_out, every), ~along)
     assert not graph.fits(Cone(np.zeros(3), cone.axis, 0.0201), every).any()
-
-
-@pytest.mark.parametrize("rings", [0, 1, 2, 4])
-def test_a_seed_grows_by_a_facet_to_each_side_and_over_no_sharp_edge(rings):
-    """On a prism of sixteen sides: 2 n + 1 of them, two triangles each."""
-    surface = bar(16)
-    graph = TriangleGraph(surface)
-    side = np.abs(surface.normals()[:, 2]) < 1e-12
-    flat = graph.connected_parts(side, 1 - 1e-10)
-    seed = int(np.flatnonzero(side)[5])
-    members = ring(graph, np.ones_like(side), flat, seed, rings)
-    assert side[members].all()
-    assert len(members) == 2 * (2 * rings + 1)
-    normals = graph.normals[members]
-    widest = np.arccos(np.clip(normals @ graph.normals[seed], -1, 1)).max()
-    assert widest == pytest.approx(rings * 2 * np.pi / 16, abs=1e-6)
-
-
-def points_on(shape, count):
-    """Somewhere on each shape, in general position."""
-    rng = np.random.default_rng(4)
-    a, b = rng.uniform(0.2, 1.4, (2, count))
-    if shape is Plane:
-        return np.column_stack([a, b, 0 * a])
-    if shape is Cone:
-        return np.column_stack([
-            (2 + 0.3 * b) * np.cos(a),
-            (2 + 0.3 * b) * np.sin(a),
-            b,
-        ])
-    if shape is Sphere:
-        return np.column_stack([
-            np.cos(a) * np.cos(b),
-            np.sin(a) * np.cos(b),
-            np.sin(b),
-        ])
-    a, b = 2.4 * np.arange(count), 0.9 * np.arange(count)
-    r = 2 + 0.5 * np.cos(b)
-    return np.column_stack([r * np.cos(a), r * np.sin(a), 0.5 * np.sin(b)])
-
-
-@pytest.mark.parametrize(
-    ("shape", "least"), [(Plane, 3), (Cone, 10), (Sphere, 9), (Torus, 12)]
-)
-def test_a_shape_is_that_of_so_many_points_at_least(shape, least):
-    """Ten for a cone, nine for a sphere (a frustum has eight), twelve for a torus."""
-
-    def recognised(count):
-        points = points_on(shape, count)
-        normals = np.tile([0.0, 0, 1], (count, 1))
-        if shape is Cone:
-            normals = points * [1, 1, 0]
-            normals[:, 2] = -0.3 * np.linalg.norm(normals, axis=1)
-        graph = SimpleNamespace(
-            points=points, triangles=np.arange(count)[:, None].repeat(3, axis=1),
-            normals=normals, tolerance=1e-8,
-        )  # fmt: skip
-        return fitted_shape(graph, np.arange(count))
-
-    assert recognised(least - 1) is None
-    for count in (least, least + 1, 150):
-        assert isinstance(recognised(count), shape)

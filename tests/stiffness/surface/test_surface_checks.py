@@ -31,11 +31,6 @@ def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
     assert surface.diagonal == pytest.approx(5)
 
 
-def test_edges_run_as_their_triangles_do():
-    edges = directed_edges(np.array([[4, 7, 2], [1, 0, 3]]))
-    assert edges.tolist() == [[4, 7], [7, 2], [2, 4], [1, 0], [0, 3], [3, 1]]
-
-
 def test_a_digest_is_of_the_geometry_alone():
     """To the last bit of a coordinate and the last corner; of no name, no layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
@@ -93,15 +88,6 @@ def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkey
         read_surface("bar.step", "inch")
 
 
-@pytest.mark.parametrize("corner", [-1, 8])
-def test_a_corner_beyond_the_points_is_refused(corner):
-    wrong = CUBE_TRIANGLES.copy()
-    wrong[-1, 0] = corner
-    words = "cube: a triangle has a corner that is not among the points"
-    with pytest.raises(BadInput, match=words):
-        check_surface(CUBE, wrong, "cube")
-
-
 def test_points_of_no_triangle_are_of_no_concern():
     """Neither one that is no number nor one far away."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
@@ -111,73 +97,12 @@ def test_points_of_no_triangle_are_of_no_concern():
     assert surface.repairs == ()
 
 
-def test_four_triangles_are_the_least_that_bound_a_solid():
-    assert check_surface(CORNERS, TETRAHEDRON, "one").volume == pytest.approx(1e-3 / 6)
-    words = "one: 3 proper triangles bound no solid"
-    with pytest.raises(BadInput, match=words):
-        check_surface(CORNERS, TETRAHEDRON[:3], "one")
-    flat = np.concatenate([TETRAHEDRON[:3], [[0, 0, 3], [3, 1, 1], [2, 1, 2]]])
-    with pytest.raises(BadInput, match=words):
-        check_surface(CORNERS, flat, "one")
-
-
 @pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [1, 0, 1]])
 def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
     triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
     surface = check_surface(CUBE, triangles, "cube")
     assert len(surface.triangles) == 12
     assert surface.repairs == ("1 triangles without area dropped",)
-
-
-@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_corners_within_a_ten_millionth_of_the_size_are_one(unit):
-    """A second corner for one triangle of a cube: a slit that is closed or refused."""
-    size = unit * 0.1 * np.sqrt(3)
-    for gap, closed in ((0.9e-7 * size, True), (1.1e-7 * size, False)):
-        points = np.concatenate([unit * CUBE, [unit * CUBE[7] + [gap, 0, 0]]])
-        triangles = CUBE_TRIANGLES.copy()
-        triangles[3, triangles[3] == 7] = 8
-        if closed:
-            surface = check_surface(points, triangles, "cube")
-            assert surface.repairs == ("1 pairs of nearly equal vertices merged",)
-            assert len(surface.points) == 8
-        else:
-            with pytest.raises(BadInput, match="cube: the surface is open: 4 edges"):
-                check_surface(points, triangles, "cube")
-
-
-def test_a_crowd_of_vertices_is_refused_before_their_pairs_fill_the_memory(rng):
-    """Two billion pairs of 1e-9 m would be 32 GB."""
-    points = np.concatenate([CUBE, 1e-9 * rng.normal(size=(60_000, 3))])
-    triangles = np.concatenate([CUBE_TRIANGLES, np.arange(8, 60_008).reshape(-1, 3)])
-    with pytest.raises(BadInput, match="dust: most of its 60008 vertices are nearer"):
-        check_surface(points, triangles, "dust")
-
-
-def test_a_wall_within_a_part_has_edges_of_three_triangles():
-    """Two tetrahedra on one base that is there once."""
-    points = np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]])
-    below = np.array([[0, 1, 4], [1, 2, 4], [2, 0, 4]])[:, ::-1]
-    triangles = np.concatenate([TETRAHEDRON, below])
-    with pytest.raises(BadInput, match="pyramids: 3 edges are shared by more than two"):
-        check_surface(points, triangles, "pyramids")
-
-
-@pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_a_flat_surface_encloses_no_volume(unit):
-    """Less than a million millionth of its diagonal's cube, wherever it lies."""
-    for share in (1e-11, 1e-13):
-        points = unit * CORNERS.copy()
-        diagonal = unit * 0.1 * np.sqrt(2)
-        points[3] = unit * np.array([0.03, 0.03, 0.0])
-        points[3, 2] = share * diagonal**3 * 6 / (unit * 0.1) ** 2
-        if share > 1e-12:
-            surface = check_surface(points, TETRAHEDRON, "sheet")
-            assert surface.volume == pytest.approx(share * diagonal**3, rel=1e-3)
-            check_surface(points + [5 * unit, 0, 0], TETRAHEDRON, "sheet")
-        else:
-            with pytest.raises(BadInput, match="sheet: the surface encloses no volume"):
-                check_surface(points, TETRAHEDRON, "sheet")
 
 
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
@@ -212,6 +137,51 @@ def test_a_second_body_is_named_by_its_middle():
     place = np.array([float(v) for v in re.findall(r"0\.\d+", str(no.value))])
     corners = far[CUBE_TRIANGLES].reshape(-1, 3).mean(axis=0)
     np.testing.assert_allclose(place, corners, rtol=1e-3)
+
+
+def with_corner(corner):
+    """The cube's triangles, one of which has another corner."""
+    triangles = CUBE_TRIANGLES.copy()
+    triangles[-1, 0] = corner
+    return triangles
+
+
+CUBES = np.concatenate([CUBE_TRIANGLES, CUBE_TRIANGLES + 8])
+SLIVERS = np.concatenate([TETRAHEDRON[:3], [[0, 0, 3], [3, 1, 1], [2, 1, 2]]])
+BELOW = np.array([[0, 1, 4], [1, 2, 4], [2, 0, 4]])[:, ::-1]
+DUST = 1e-9 * np.random.default_rng(0).normal(size=(60_000, 3))
+REFUSED = [
+    (CUBE, with_corner(-1), "a triangle has a corner that is not among the points"),
+    (CUBE, with_corner(8), "a triangle has a corner that is not among the points"),
+    (CUBE, CUBE_TRIANGLES[:0], "holds no triangles"),
+    (np.where(CUBE == CUBE[3], [0, np.nan, 0], CUBE), CUBE_TRIANGLES, "not finite"),
+    (CORNERS, TETRAHEDRON[:3], "3 proper triangles bound no solid"),
+    (CORNERS, SLIVERS, "3 proper triangles bound no solid"),
+    (
+        CUBE, CUBE_TRIANGLES[:-1],
+        r"open: 3 edges have a triangle on one side .*near \(0, 0.05, 0.1\)",
+    ),
+    (  # two cubes share an edge
+        np.concatenate([CUBE, CUBE + [0.1, 0.1, 0]]), CUBES,
+        r"1 edges are shared by more than two .*near \(0.1, 0.1, 0.05\)",
+    ),
+    (  # two tetrahedra on one base that is there once
+        np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]]),
+        np.concatenate([TETRAHEDRON, BELOW]),
+        "3 edges are shared by more than two",
+    ),
+    (  # two billion pairs of vertices would be 32 GB
+        np.concatenate([CUBE, DUST]),
+        np.concatenate([CUBE_TRIANGLES, np.arange(8, 60_008).reshape(-1, 3)]),
+        "most of its 60008 vertices are nearer",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("points", "triangles", "message"), REFUSED)
+def test_surface_that_bounds_no_solid_is_refused(points, triangles, message):
+    with pytest.raises(BadInput, match=f"part: .*{message}"):
+        check_surface(points, triangles, "part")
 
 
 def test_where_a_surface_cuts_itself_is_said():

@@ -17,7 +17,7 @@ from assembly.linear.zone import zone_margin
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from assembly.robots import load_robot
-from benchmarks.validity_models import bush_margin, halves_cost, with_bars
+from benchmarks.evidence.validity_models import bush_margin, halves_cost, with_bars
 from forcefit.commands.validation import app
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 from validation.assumptions.assumptions import assumption_costs

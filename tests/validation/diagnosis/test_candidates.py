@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects.forms import roughness
 from assembly.effects.functions import AXES
 from assembly.files.robot_file import read_robot
 from assembly.model.robot import BeamLink, Frame, Robot
@@ -15,7 +14,6 @@ from validation.campaign.campaign_file import read_commands
 from validation.diagnosis.candidates import (
     Candidate,
     CandidatePart,
-    places_of,
     variables_of,
 )
 from validation.diagnosis.function_forms import CandidateShape
@@ -66,29 +64,6 @@ def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities)
     assert mixed.tolist() == [[1.0]]
 
 
-@pytest.mark.parametrize(("width", "kept"), [(2e-9, 1), (5e-8, 2)])
-def test_a_power_that_is_the_one_below_it_but_for_rounding_is_left_out(width, kept):
-    """Of 1 + w and 1 - w, whose sine to a constant is w; a hundred millionth counts."""
-    campaign = bar(rows=36, temperature=1.0 + width * np.tile([-1.0, 1.0], 18))
-    conditions = conditions_of(campaign)
-    s = Sensitivities(conditions, responses(conditions))
-    columns, mixed = s.basis(("cov.temperature",), LINE)
-    assert mixed.shape == (2, kept)
-    np.testing.assert_allclose(columns.T @ columns / 36, np.eye(kept), atol=1e-5)
-
-
-def test_a_spline_is_of_size_one_and_rough_ones_are_unlikely(sensitivities):
-    """Its values have the covariance (roughness + 0.1)^-1, to a factor."""
-    s, q = sensitivities
-    ends = (("first", q[0]), ("last", q[-1]))
-    shape = CandidateShape("spline", tuple("12345"), ends)
-    columns, mixed = s.basis(("q.one",), shape)
-    assert np.sum(np.mean(columns**2, axis=0)) == pytest.approx(1.0)
-    covariance = np.linalg.inv(roughness(5) + 0.1 * np.eye(5))
-    factor = np.trace(covariance) / np.trace(mixed @ mixed.T)
-    np.testing.assert_allclose(factor * mixed @ mixed.T, covariance, rtol=1e-9)
-
-
 @pytest.mark.parametrize("units", [1.0, 1e-12])
 def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
     """T x, and their deviations; as small as they may be."""
@@ -134,42 +109,6 @@ def arm(drives, beams):
         frames.append(Frame(f"b{k}", parent, [0.5, 0, 0], link=beam))
         parent = f"b{k}"
     return Robot("arm", parent, tuple(frames))
-
-
-@pytest.mark.parametrize("drives", [1, 2, 3])
-@pytest.mark.parametrize("beams", [1, 2, 3])
-def test_drives_and_beams_act_together_where_there_are_two(drives, beams):
-    """Each drive with its own coordinate, beams along themselves; else one by one."""
-    robot = arm(drives, beams)
-    found = list(places_of(robot, ["q.j0", "cov.temperature"]))
-    together = [(kind, parts) for kind, parts in found if len(parts) > 1]
-    own = tuple(CandidatePart(f"j{k}", ("rz",), f"q.j{k}") for k in range(drives))
-    along = tuple(
-        CandidatePart(f"b{k}", ("tx",), "cov.temperature") for k in range(beams)
-    )
-    expected = [("screw", along)] if beams > 1 else []
-    expected += [("screw", own), ("compliance", own)] if drives > 1 else []
-    assert together == expected
-    # by variable: a frame's six components as screw and compliance, its turns, its
-    # shifts; the reading's six and all; the base's six, its turns and shifts
-    single = len(found) - len(together)
-    assert single == 2 * (14 * len(robot.frames) + 7 + 8)
-
-
-def test_a_body_may_turn_or_shift_and_a_reading_be_off():
-    """Where a single frame and what carries all of them may do something."""
-    robot = Robot("one", "tip", (Frame("tip"),))
-    found = [(kind, parts[0]) for kind, parts in places_of(robot, ["time"])]
-    turns, shifts = ("rx", "ry", "rz"), ("tx", "ty", "tz")
-    own = [(axis,) for axis in (*turns, *shifts)]
-    at_base = [p.components for kind, p in found if p.where == "base"]
-    assert sorted(at_base) == sorted([*own, turns, shifts])
-    at_tip = [p.components for kind, p in found if (kind, p.where) == ("screw", "tip")]
-    assert sorted(at_tip) == sorted([*own, turns, shifts])
-    softer = [p for kind, p in found if kind == "compliance"]
-    assert [(p.where, p.components) for p in softer] == [("tip", one) for one in own]
-    read = [p.components for kind, p in found if p.where == "reading"]
-    assert read == [*own, (*turns, *shifts)]
 
 
 @pytest.mark.parametrize("axis", range(6))

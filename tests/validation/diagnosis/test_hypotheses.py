@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.effects import LIBRARY
 from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import BEAM, bar
-from validation.diagnosis.hypotheses import _groupings, hypotheses
+from validation.diagnosis.hypotheses import hypotheses
 from validation.diagnosis.signatures import conditions_of
 
 TIME = 60.0 * np.arange(8)
@@ -21,32 +20,6 @@ def named(conditions, loads=()):
         own = [slot.names for slot in one.slots]
         found.setdefault(one.effect, []).append(own)
     return found
-
-
-def test_frames_have_numbers_of_their_own_share_them_or_act_alone():
-    """Each its own; by kind; one for all; of one kind alone; one alone; none twice."""
-    a, b, c = "a.rod", "b.rod", "a.drive"
-    assert list(_groupings((a, b, c), 1)) == [
-        ((a,), (b,), (c,)), ((a, b), (c,)), ((a, b, c),), ((a, b),), ((c,),),
-        ((a,),), ((b,),),
-    ]  # fmt: skip
-    assert list(_groupings((a,), 1)) == [((a,),)]
-    assert list(_groupings((a, b), 1)) == [((a,), (b,)), ((a, b),), ((a,),), ((b,),)]
-    assert list(_groupings((), 1)) == []
-
-
-@pytest.mark.parametrize(("frames", "each", "few"), [
-    (24, 1, True), (25, 1, False), (12, 2, True), (13, 2, False), (8, 3, True),
-    (9, 3, False),
-])  # fmt: skip
-def test_more_than_two_dozen_unknowns_are_shared(frames, each, few):
-    """Then not all frames have numbers of their own; one alone may have one."""
-    places = tuple(f"leg{k}.rod" for k in range(frames))
-    found = list(_groupings(places, each))
-    assert found[-1] == ((places[-1],),)
-    assert (tuple((p,) for p in places) in found) is few
-    assert len(found) == frames + 1 + few
-    assert (places,) in found
 
 
 @pytest.mark.parametrize(("covariate", "effect", "values", "told"), [
@@ -67,22 +40,6 @@ def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
     assert (effect in named(given)) is told
     others = set(named(given)) ^ set(named(conditions))
     assert others == ({effect} if told else set())
-
-
-def test_settling_is_looked_for_in_parts_of_the_time_that_passed():
-    """All six amplitudes and a time constant, which alone bends the model."""
-    conditions = replace(conditions_of(bar()), time=1000.0 + TIME)
-    found = [h for h in hypotheses(conditions, []) if h.effect == "drift"]
-    scan = LIBRARY["drift"].unknowns(conditions.robot)[-1].scan
-    assert [h.slots[-1].start for h in found] == pytest.approx([
-        part * 420.0 for part in scan
-    ])
-    for one in found:
-        assert [slot.shape for slot in one.slots] == [False] * 6 + [True]
-        assert one.start[:6].tolist() == [0.0] * 6
-        lower, upper = one.bounds
-        assert (lower[-1], upper[-1]) == (1.0, 1e9)
-        assert np.isinf([lower[:6], upper[:6]]).all()
 
 
 def test_a_load_is_off_in_directions_in_which_it_was_recorded():

@@ -124,6 +124,7 @@ def test_what_the_library_lacks_is_learned(diagnosed, tmp_path):
     )
     sizes = dict(zip(signs, SIGMA, strict=True))
     for one in told:
+        assert {"label", "formula", "equivalent_places", "parts_of_range"} <= one.keys()
         for name in one["components"]:
             key = "2" if len(one["components"]) == 1 else f"{name}.2"
             if one["where"] in ("reading", "base"):

@@ -59,42 +59,6 @@ def test_a_measurement_is_worth_a_standard_deviation(power, worth):
     assert (found is not None) == worth
 
 
-def test_what_has_no_answer_decides_nothing():
-    d, J = np.array([[np.nan, 0.0], [3.0, 0.0]]), np.zeros((2, 2, 1))
-    assert module._power(d, J, np.eye(1)).tolist() == [0.0, 9.0]
-
-
-def test_loads_temperatures_and_sides_are_tried_within_and_beyond_what_was_used():
-    """None and 1.5 times the largest either way; half of the range further up."""
-    campaign = bar(
-        [0, 0, 4.0, -2.0, 0, 0], temperature=np.linspace(20.0, 60.0, 8),
-        approach=np.ones(8),
-    )  # fmt: skip
-    tried = module._conditions_tried(conditions_of(campaign))
-    largest = {0: 0.0, 2: 4.0, 3: 2.0}
-    for k, most in largest.items():
-        expected = {-1.5 * most, 0.0, 1.5 * most}
-        assert set(np.unique(tried.load[:, k]).tolist()) == expected
-    assert set(tried.temperature.tolist()) == {20.0, 40.0, 80.0}
-    assert set(tried.approach.tolist()) == {-1.0, 1.0}
-
-
-def test_half_of_the_configurations_are_between_those_measured(rng):
-    """Each between two of them, the others measured ones; frames follow the drive."""
-    measured = conditions_of(bar(rows=8))
-    measured = replace(measured, second_order=np.ones((8, 6)))
-    tried = module._between(measured, rng)
-    was, now = measured.coordinates[:, 0], tried.coordinates[:, 0]
-    assert now[4:].tolist() == was[4:].tolist()
-    assert ((was[:4] < now[:4]) & (now[:4] < was[4:])).all()
-    assert np.ptp((now[:4] - was[:4]) / (was[4:] - was[:4])) > 0.1
-    tip = LENGTH * np.column_stack([np.cos(now), np.sin(now)])
-    np.testing.assert_allclose(tried.transforms[:, 1, :2, 3], tip, atol=1e-12)
-    assert not np.any(tried.second_order)
-    resting = replace(measured, rest=np.zeros((8, 2, 6)))
-    assert module._between(resting, rng) is resting
-
-
 def test_the_pose_is_said_where_poses_were_commanded():
     """A bar of 0.8 m at a quarter turn; x, y, z and the rotation vector."""
     campaign = replace(bar(rows=3, spread=np.pi), commanded="pose")
@@ -104,28 +68,6 @@ def test_the_pose_is_said_where_poses_were_commanded():
     turn = [found[f"pose.{k}"] for k in ("rx", "ry", "rz")]
     assert shift == pytest.approx([0, LENGTH, 0], abs=1e-12)
     assert turn == pytest.approx([0, 0, np.pi / 2], abs=1e-12)
-
-
-def test_nothing_known_is_missed_by_nothing():
-    """d'd where all is known; half of it where J C J' is as large as the noise."""
-    d, J = np.array([[3.0, 0.0]]), np.array([[[1.0], [0.0]]])
-    assert module._power(d, J, np.zeros((1, 1))) == pytest.approx([9.0])
-    assert module._power(d, J, np.eye(1)) == pytest.approx([4.5])
-
-
-def test_slopes_of_a_fit_are_those_of_its_numbers():
-    """Of a length in the readings measured; numbers known surely have none."""
-    campaign = bar(link=BEAM)
-    here = conditions_of(campaign)
-    fit = machine(campaign, LONGER)
-    sigma = SIGMA.copy()
-    sigma[1] = np.nan
-    model, J, _ = module._model(here, fit, sigma)
-    expected = (fit_of(campaign, 1.0) / SIGMA)[:, [0, 2, 3, 4, 5]]
-    assert model.shape == (8, 5)
-    np.testing.assert_allclose(J[:, :, 0], expected, atol=1e-6 / SIGMA.min())
-    sure = replace(fit, covariance=np.zeros((1, 1)))
-    assert not module._model(here, sure, sigma)[1].any()
 
 
 def test_nothing_decides_between_one_explanation_and_itself():

@@ -169,15 +169,6 @@ def test_points_of_a_body_have_noise_of_their_own(rng):
     assert found == pytest.approx(wide / 2, rel=1e-9)
 
 
-def test_thirty_rows_are_enough_and_fewer_are_not(rng):
-    for rows, enough in ((29, False), (30, True)):
-        campaign = session(rows, range(6))
-        z = np.linalg.cholesky(covariance_of(campaign, 0.95)) @ rng.normal(
-            size=6 * rows
-        )
-        assert (noise_in_time(campaign, z) is not None) == enough
-
-
 def test_rows_of_one_moment_say_nothing_of_time(rng):
     campaign = session()
     campaign.covariates["time"] = np.zeros(ROWS)

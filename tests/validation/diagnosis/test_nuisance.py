@@ -10,9 +10,7 @@ from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import LENGTH, along, bar
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis.nuisance import (
-    Nuisance,
     nuisance,
-    visible,
     with_compliance,
     with_error,
 )
@@ -132,43 +130,3 @@ def test_springs_of_passive_joints_leave_their_own_motion_free():
     K = with_compliance(robot, first, axes, np.array([1e-3, 1e-7])).frame("hinge")
     stiffness = np.diag(K.joint_stiffness)
     assert stiffness.tolist() == pytest.approx([np.inf, np.inf, 0, np.inf, 1e7, np.inf])
-
-
-def of_sizes(sizes, most=(np.inf, np.inf)):
-    """Geometric errors at one frame after another whose columns have sizes (n, 6)."""
-    count = sizes.size
-    axis = np.tile(np.arange(6), len(sizes))
-    columns = np.zeros((4, count))
-    columns[2] = sizes.ravel()
-    return Nuisance(
-        columns, np.zeros(count, bool), np.repeat(np.arange(len(sizes)), 6), axis,
-        np.full(count, np.nan), np.array(most)[axis // 3],
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("units", [1.0, 1e6])
-@pytest.mark.parametrize("kind", [0, 1])
-def test_an_unknown_shows_beside_the_largest_of_its_own_kind(kind, units):
-    """By a billionth of that, whatever those of the other kind show."""
-    largest = units * np.array([5e3, 3e-3])
-    shares = np.array([1.0, 1.1e-9, 0.9e-9])
-    sizes = np.zeros((2, 6))
-    for each in (0, 1):
-        own = largest[each] * (shares if each == kind else np.ones(3))
-        sizes[1, 3 * each + np.arange(3)] = own
-    small = of_sizes(sizes)
-    shown = small.take(visible(small))
-    expected = [3 * kind, 3 * kind + 1, *(3 * (1 - kind) + np.arange(3))]
-    assert shown.frame.tolist() == [1] * 5
-    assert shown.axis.tolist() == sorted(expected)
-
-
-@pytest.mark.parametrize("most", [(0.2, 5.0), (1e-4, 3.0), (2.0, 1e-3)])
-def test_an_unknown_must_show_a_thousandth_of_sigma_at_its_largest(most):
-    """Of rotations and of translations as large as each may be."""
-    sizes = np.zeros((1, 6))
-    for axis in range(6):
-        above = 1.01 if axis % 3 else 0.99
-        sizes[0, axis] = above * 1e-3 / most[axis // 3]
-    small = of_sizes(sizes, most)
-    assert small.axis[visible(small)].tolist() == [1, 2, 4, 5]

@@ -14,7 +14,6 @@ from tests.bar_for_tests import (
     BEAM,
     LENGTH,
     LONGER,
-    WARMER,
     along,
     bar,
     fit_of,
@@ -128,25 +127,6 @@ def test_a_length_has_the_same_tangent_about_any_value(x):
     ):
         assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
         assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)
-
-
-def test_a_tangent_about_an_upper_bound_is_taken_below_it():
-    """Of an expansion: the bar's length times 5 K, and never more than allowed."""
-    heat = {"temperature": np.full(8, 5.0)}
-    campaign = bar(link=BEAM, **heat)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    model, tried = tangents.model, []
-
-    def watched(effects):
-        tried.append(effects["thermal_expansion"]["tip"])
-        return model(effects)
-
-    tangents.model = watched
-    most = WARMER.slots[0].unknown.upper
-    found = tangents.about(WARMER, np.array([most]), {})
-    assert max(tried) == most
-    expected = 5.0 * whiten(campaign, fit_of(campaign, LENGTH))
-    assert found.columns[:, 0] == pytest.approx(expected, rel=1e-6, abs=1e-3)
 
 
 def test_wrenches_are_as_small_as_their_loads():

@@ -11,8 +11,6 @@ from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import LENGTH, along, bar
 from validation.diagnosis.registration import (
     coarse_frame,
-    device_frame,
-    off_one_line,
     register,
 )
 from validation.diagnosis.signatures import conditions_of
@@ -24,17 +22,6 @@ def seen_by(turn, shift):
     """(8, 6) what a device reads of a bar that is as declared."""
     p, R = LENGTH * along(bar()), Rotation.from_rotvec(turn)
     return np.hstack([np.tile(turn, (8, 1)), R.apply(p) + shift - p])
-
-
-def test_the_unknowns_of_a_device_are_its_turn_and_shift():
-    """Nothing of the tool; no turn beyond half a round, any shift, from zero."""
-    frame = device_frame(conditions_of(bar()))
-    assert frame.effect == "registration"
-    assert [slot.names for slot in frame.slots] == [(name,) for name in BASE]
-    lower, upper = frame.bounds
-    assert upper.tolist() == [np.pi] * 3 + [np.inf] * 3
-    assert lower.tolist() == (-upper).tolist()
-    assert frame.start.tolist() == [0.0] * 6
 
 
 def test_without_a_position_the_shift_is_zero():
@@ -90,17 +77,6 @@ def test_three_points_off_one_line_are_enough(points):
         return
     guess = coarse_frame(campaign, conditions_of(campaign))
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-8)
-
-
-@pytest.mark.parametrize("length", [0.02, 1.0, 30.0])
-@pytest.mark.parametrize(("width", "off"), [(0.9e-3, False), (1.1e-3, True)])
-def test_points_lie_off_a_line_by_a_thousandth_of_their_length(width, off, length):
-    """A rectangle anywhere, of any size: a plane's two sizes are its sides."""
-    corners = length * np.array([[x, y, 0] for x in (0, 1.0) for y in (0, width)])
-    turn = Rotation.from_rotvec([0.5, 0.2, -0.7])
-    assert off_one_line(turn.apply(corners) + [3.0, -2.0, 5.0]) is off
-    assert not off_one_line(corners[:2])
-    assert not off_one_line(np.zeros((0, 3)))
 
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])

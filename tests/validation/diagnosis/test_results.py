@@ -6,13 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assembly.model.function import Function
 from tests.bar_for_tests import LONGER, TURNED, bar
 from validation.diagnosis import results as module
-from validation.diagnosis.candidates import CandidatePart
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
-from validation.diagnosis.range_parts import RangeError
 from validation.diagnosis.sequence import Errors, Step
 from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
@@ -94,16 +91,6 @@ def test_small_unknowns_are_told_by_frame_and_one_by_one():
     assert module.small(one, "nothing") is None
 
 
-def test_geometry_alone_is_an_effect_with_a_name():
-    """Where nothing of the library is named, and no function; how many are known."""
-    part = Small(GEOMETRY, np.array([0, 1]), np.array([2, 3]), np.full(2, 1e-4))
-    fit = fitted(bar().robot, [part], [1e-4, 2e-4], [1e-5, 1e-5])
-    (one,) = module._unnamed(diagnosis(bar(), fit, effects=()))
-    assert (one["name"], one["where"]) == ("geometric_errors", ["drive", "tip"])
-    assert one["combinations"] == pytest.approx(2 * (1 - 0.01))
-    assert module._unnamed(diagnosis(bar(), fit, effects=("drift",))) == []
-
-
 def test_steps_are_in_metres_or_where_none_was_read_in_radians():
     errors = Errors(1e-5, 2e-6, 3.0), Errors(float("nan"), 4e-6, 5.0)
     one = SimpleNamespace(
@@ -113,41 +100,3 @@ def test_steps_are_in_metres_or_where_none_was_read_in_radians():
     assert (first["kept_aside_rms"], first["unit"]) == (1e-5, "m")
     assert (other["kept_aside_rms"], other["unit"]) == (4e-6, "rad")
     assert (first["kept_aside_rotation"], other["kept_aside_sigma"]) == (2e-6, 5.0)
-
-
-def test_functions_are_told_with_the_errors_before_and_after_each(monkeypatch):
-    """Two effects learned, of which the second is of two functions."""
-    every = [
-        Function(w, ("tx",), ("q.drive",), "powers", {"1": 2.0}, std={"1": 0.5})
-        for w in ("drive", "tip", "reading")
-    ]
-    monkeypatch.setattr(module, "functions_of", lambda *given: [every[:1], every[1:]])
-    sequence = [
-        Step(name, 0, Errors(float(k), 0.0, 0.0))
-        for k, name in enumerate((
-            "declared",
-            "library effects",
-            "learned effects",
-            "learned effects",
-        ))
-    ]
-    same = ((CandidatePart("tip", ("ty", "tz"), "time"),),)
-    one = SimpleNamespace(
-        sequence=sequence,
-        traced=SimpleNamespace(selected=SimpleNamespace(functions=[
-            SimpleNamespace(equivalent=same, range_error=RangeError("time", 4.0, 1.5)),
-            SimpleNamespace(equivalent=(), range_error=None),
-        ])),
-    )  # fmt: skip
-    told = module.learned(one)
-    assert [t["where"] for t in told] == ["drive", "tip", "reading"]
-    assert [t["before"]["position"] for t in told] == [1.0, 2.0, 2.0]
-    assert [t["after"]["position"] for t in told] == [2.0, 3.0, 3.0]
-    assert told[0]["equivalent_places"] == [
-        [{"where": "tip", "components": ["ty", "tz"], "variables": ["time"]}]
-    ]
-    assert told[1]["equivalent_places"] == []
-    parts = {"variable": "time", "without": 4.0, "after": 1.5}
-    assert [one["parts_of_range"] for one in told] == [parts, None, None]
-    assert (told[0]["parameters"], told[0]["std"]) == ({"1": 2.0}, {"1": 0.5})
-    assert told[0]["formula"] == "tx = 2 drive"

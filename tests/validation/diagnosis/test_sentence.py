@@ -11,7 +11,6 @@ from validation.diagnosis import sentence as module
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.lack_of_fit import Trend
-from validation.diagnosis.report import _tiles
 from validation.diagnosis.sentence import (
     calibration_text,
     formula,
@@ -46,21 +45,6 @@ def test_a_product_of_two_variables_names_both():
 def test_numbers_stand_before_what_they_multiply(form, parameters, expected):
     function = Function("drive", ("rz",), ("q.drive",), form, parameters)
     assert formula(function) == expected
-
-
-def test_the_tiles_say_the_error_before_and_after_and_nothing_not_measured():
-    diagnosis = SimpleNamespace(
-        verdict="none_needed", effects=("self_weight", "drift"),
-        probability={"drift": 0.25, "self_weight": 0.75}, next=None,
-        before=SimpleNamespace(position=2e-3, rotation=float("nan")),
-        after=SimpleNamespace(position=5e-4, rotation=float("nan")),
-    )  # fmt: skip
-    verdict, position, cause = _tiles(diagnosis)
-    assert verdict.answer == ["none needed"]
-    before, _, after = position.answer
-    assert (before.value, after.value) == (2e-3, 5e-4)
-    assert cause.answer == ["self weight + drift"]
-    assert "0.750" in str(cause)
 
 
 def test_a_calibration_is_said_in_shares():

@@ -92,27 +92,6 @@ def test_what_is_too_small_to_be_seen_may_be_larger_than_thought(rng):
     assert found.classes() == [("a", "b")]
 
 
-def test_what_nuisances_leave_is_what_shows(rng):
-    """Of 30 sigma a tenth, 3, is seen and a twentieth is not; 1e-3 sigma is a trace."""
-    Q, _ = np.linalg.qr(rng.normal(size=(20, 5)))
-
-    def most_of(size, left, own):
-        return size * (left * Q[:, [own]] + np.sqrt(1 - left**2) * Q[:, [0]])
-
-    found = compare_signatures({
-        "seen": most_of(30.1, 0.1, 1), "hidden": most_of(30.0, 0.05, 2),
-        "trace": most_of(1.1e-2, 0.1, 3), "less": most_of(2e-3, 0.4, 4),
-        "none": 0 * Q[:, [1]],
-    }, Q[:, [0]])  # fmt: skip
-    assert found.left == pytest.approx([0.1, 0.05, 0.1, 0.4, 0.0])
-    assert found.visible.tolist() == [True, False, False, False, False]
-    assert found.traced.tolist() == [True, True, True, False, False]
-    expected = [3 / 3.01, 2.0, 3 / 1.1e-3, np.inf, np.inf]
-    assert found.shows_at == pytest.approx(expected)
-    np.testing.assert_allclose(found.cosine, np.eye(5), atol=1e-9)
-    np.testing.assert_allclose(found.shared, np.eye(5), atol=1e-9)
-
-
 def test_unknowns_of_unlike_size_are_as_many_as_there_are(rng):
     """An angle of 1e4 and a shift of 100 sigma at right angles; and their sum."""
     A = np.eye(3)[:, :2] * [1e4, 100.0]

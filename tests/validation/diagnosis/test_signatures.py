@@ -8,10 +8,8 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.function import Function
 from forcefit.inputs.table import BadInput
-from tests.bar_for_tests import BEAM, LONGER, TURNED, bar, fit_of
+from tests.bar_for_tests import bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis import derivatives
-from validation.diagnosis import signatures as module
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis
 from validation.diagnosis.signatures import (
@@ -73,65 +71,6 @@ def test_the_residual_is_the_reading_less_what_is_declared():
     assert len(tangents.declared) == 46
 
 
-@pytest.mark.parametrize("size", [0.3, 1.01])
-def test_an_unknown_that_does_not_show_at_its_own_size_has_no_column(size):
-    """Of 0.001 sigma in all readings together."""
-    slot = LONGER.slots[0]
-    column = np.full(4, 0.5) / slot.unknown.scale * 1e-3 * size
-    found = module._seen(column, slot)
-    assert found.any() == (size > 1)
-
-
-@pytest.mark.parametrize("size", [0.1, 0.25, 0.3, 1.0])
-def test_an_effect_without_unknowns_is_looked_at_where_loads_are_large(
-    monkeypatch, size
-):
-    """Rows loaded most say whether the squares of all exceed two.
-
-    Of 40 rows four are loaded, and of those each reading changes by ``size`` sigma.
-    """
-    rows = 40
-    loads = np.zeros((rows, 6))
-    loads[[3, 9, 20, 30], 4] = 10.0
-    campaign = replace(bar(rows=rows), loads=loads)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    finite = Hypothesis(FINITE, (), ())
-    seen = []
-
-    def apply(conditions, effects):
-        return replace(conditions, exact=True)
-
-    class Read:
-        def __init__(self, conditions):
-            loaded = conditions.load.any(axis=1)[:, None]
-            seen.append(int(loaded.sum()))
-            self.deviation = SIGMA * loaded * (1 + size * conditions.exact)
-
-    monkeypatch.setattr(module, "apply_effects", apply)
-    monkeypatch.setattr(module, "predict", Read)
-    declared = Read(tangents.derivatives.conditions)
-    tangents.derivatives.declared = declared.deviation
-    invisible = tangents._invisible(finite)
-    assert seen[-1] == 4
-    # of the rows looked at, those of largest load and of largest rotation, the same
-    assert invisible == (size**2 * 240 < 2.0)
-
-
-def test_an_effect_without_an_answer_is_invisible(monkeypatch):
-    campaign = bar([0, 0, 0, 0, 5.0, 0])
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    finite = Hypothesis(FINITE, (), ())
-
-    def unanswered(conditions, effects):
-        return replace(conditions, reading=np.full((len(conditions), 6), np.nan))
-
-    monkeypatch.setattr(module, "apply_effects", unanswered)
-    assert tangents._invisible(finite)
-    found = tangents.at_start(finite)
-    assert found.columns.shape == (48, 0)
-    assert not found.offset.any()
-
-
 def test_a_visible_effect_without_unknowns_is_an_offset():
     """Of a soft drive that turns far, finite motions say much."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
@@ -141,49 +80,3 @@ def test_a_visible_effect_without_unknowns_is_an_offset():
     exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
     assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
     assert found.columns.shape == (48, 0)
-
-
-@pytest.mark.parametrize("rest", [None, "held"])
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("effect", ["joint_clearance", "encoder_offset"])
-def test_clearances_of_an_effect_are_taken_up_in_the_linear_model(
-    monkeypatch, rest, exact, effect
-):
-    """Where they are not held already."""
-    campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    settled = []
-
-    def settle(conditions):
-        settled.append(conditions)
-        return conditions, None
-
-    held = None if rest is None else np.zeros((8, 2, 6))
-    plain = tangents.derivatives.conditions
-    changed = replace(plain, rest=held, exact=exact)
-    monkeypatch.setattr(
-        derivatives, "apply_effects", lambda conditions, effects: changed
-    )
-    monkeypatch.setattr(derivatives, "with_clearances_taken_up", settle)
-    monkeypatch.setattr(derivatives, "predict", lambda conditions: predict(plain))
-    assert len(tangents.model({effect: {}})) == 48
-    taken_up = effect == "joint_clearance" and rest is None and not exact
-    assert len(settled) == taken_up
-
-
-def test_columns_are_taken_once(monkeypatch):
-    """And again for another effect."""
-    campaign = bar(link=BEAM)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    model, asked = tangents.derivatives.model, []
-
-    def watched(effects):
-        asked.append(tuple(effects))
-        return model(effects)
-
-    tangents.derivatives.model = watched
-    first, again = tangents.at_start(LONGER), tangents.at_start(LONGER)
-    assert asked == [("link_length",)]
-    assert first.columns.tolist() == again.columns.tolist()
-    tangents.at_start(TURNED)
-    assert len(asked) == 2

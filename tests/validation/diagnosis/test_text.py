@@ -142,21 +142,6 @@ def test_what_is_left_and_what_to_measure_is_said_last(shown):
     assert load_text((0.0,) * 6) == "none"
 
 
-def test_the_best_known_frames_of_small_terms_are_named_six_at_most():
-    frames = [{"frame": f"f{k}", "identifiable": 0.1 * k} for k in range(1, 9)]
-    one = {
-        "scale": {"rotation": 2e-3}, "unit": {"rotation": "rad", "translation": "m"},
-        "frames": frames, "identifiable": 3.6, "unknowns": 48,
-    }  # fmt: skip
-    assert module._small_lines(None, module.GEOMETRY) == []
-    assert module._small_lines(one, module.GEOMETRY) == [
-        "geometric errors  (size 0.002 rad)",
-        "  3.6 of 48 known: f8 0.8, f7 0.7, f6 0.6, f5 0.5, f4 0.4, f3 0.3",
-    ]
-    declared = module._small_lines(one | {"scale": {}}, module.SPRINGS)
-    assert declared[0] == "springs  (size as the tolerances say)"
-
-
 def test_effects_and_functions_are_listed_with_their_numbers(shown):
     """Geometry has lines of its own; a long formula is cut at 160 letters."""
     number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}

@@ -119,18 +119,6 @@ def test_noise_shows_none_and_six_are_named_at_most(varied, rng):
     assert len(trends(many, conditions_of(many), rest)) == 6
 
 
-@pytest.mark.parametrize("units", [1e-15, 1.0, 1e9])
-def test_a_trend_knows_no_units(units, rng):
-    """Each column may have its own; what is constant but for rounding is none."""
-    x, y = rng.normal(size=(2, 9, 1))
-    z = x + 0.5 * y + 0.1 * rng.normal(size=(9, 1))
-    expected = module._test("x", np.hstack([x, y]), z, 1)
-    found = module._test("x", np.hstack([units * x, y]), z, 1)
-    assert found.share == pytest.approx(expected.share, rel=1e-9)
-    assert found.probability == pytest.approx(expected.probability, rel=1e-6)
-    assert module._test("x", np.full((9, 1), units / 3), z, 1) is None
-
-
 def test_a_square_is_seen_however_far_from_zero(rng):
     """A megakelvin and up to one more, or half a second of time."""
     x = rng.uniform(0, 1, 40)
@@ -140,22 +128,3 @@ def test_a_square_is_seen_however_far_from_zero(rng):
     rest = np.sin(2 * np.pi * x)[:, None] * campaign.sigma
     found = trends(campaign, conditions_of(campaign), rest)
     assert "cov.time, slow waves" in [t.against for t in found]
-
-
-def test_rows_of_one_moment_have_no_waves():
-    campaign = bar(rows=9, time=np.full(9, 3.0))
-    names = [n for n, _ in module._candidates(campaign, conditions_of(campaign))]
-    assert "cov.time" in names
-    assert "cov.time, slow waves" not in names
-
-
-def test_what_cannot_be_tested_is_no_trend():
-    """Too few readings; nothing varied; nothing there; nothing measured."""
-    x = np.linspace(0.0, 1.0, 5)[:, None]
-    for X, z in (
-        (x[:3], x[:3] ** 2), (np.ones((5, 1)), x**2), (x, np.zeros((5, 1))),
-        (x, np.full((5, 1), np.nan)),
-    ):  # fmt: skip
-        assert module._test("x", X, z, 1) is None
-    # one more reading than that; so small that squares are less than one
-    assert module._test("x", x[:4], 1e-3 * x[:4] ** 2, 1).share > 0.9

@@ -29,18 +29,6 @@ def test_one_unknown_against_one_by_hand():
     assert np.isnan(np.diag(apart)).all()
 
 
-def test_the_slope_is_that_of_the_criterion():
-    """A row of weight w^2 added: the criterion grows by w^2 times its slope."""
-    chosen, extra, w = np.arange(12), 20, 1e-3
-    plain = _Criterion(blocks(), ROWS)
-    apart, slope = plain._value(chosen)
-    shrunk = [
-        np.vstack([X[:24], w * X[2 * extra : 2 * extra + 2], X[26:]]) for X in blocks()
-    ]
-    more = _Criterion(shrunk, ROWS).apart(np.arange(13))
-    assert (_told(more) - _told(apart)) / w**2 == pytest.approx(slope[extra], rel=1e-4)
-
-
 def test_exchanges_tell_more_and_take_no_row_twice():
     criterion = _Criterion(blocks(), ROWS)
     start = np.arange(10)

@@ -29,28 +29,6 @@ def body(rng, rows):
     return ReachableSet(np.zeros(6), np.eye(6), H, start, GROUP)
 
 
-@pytest.mark.parametrize("rows", [0, 1, 3])
-def test_a_point_is_moved_onto_the_rows_and_as_far_as_the_cones_allow(rng, rows):
-    """In the body it stays; from outside it comes to the bound of one cone."""
-    for _ in range(20):
-        reachable = body(rng, rows)
-        step = rng.normal(size=6)
-        step -= reachable.rows.T @ (reachable.rows @ step)
-        short = reachable.start + 1e-3 * step
-        inside = cone_sizes(short, GROUP).max() < 1.0
-        v = reachable._screw_near(short) + reachable.start
-        assert not inside or v == pytest.approx(short, abs=1e-15)
-        v = reachable._screw_near(reachable.start + 30.0 * step) + reachable.start
-        sizes = cone_sizes(v, GROUP)
-        assert sizes.max() == pytest.approx(1.0, abs=1e-8)
-        assert np.abs(reachable.rows @ (v - reachable.start)).max(initial=0.0) < 1e-14
-        # along the step, and no less of it than the bound allows
-        along = (v - reachable.start) @ step / (step @ step)
-        assert v - reachable.start == pytest.approx(along * step, abs=1e-14)
-        farther = reachable.start + 1.001 * along * step
-        assert cone_sizes(farther, GROUP).max() > 1.0
-
-
 def test_how_far_a_disc_and_an_interval_extend(rng):
     """Without rows: the centre, and each cone's column along the direction."""
     X = 1e-3 * rng.normal(size=(6, 3))
@@ -79,26 +57,6 @@ def test_a_screw_attains_what_is_certified_where_many_cones_stay_on_their_bound(
     sizes = np.linalg.norm(directions @ reachable.map, axis=1)
     left = [s.height - d @ s.screw for s, d in zip(supports, directions, strict=True)]
     assert np.mean(np.array(left) < 1e-6 * sizes) > 0.9
-
-
-def test_a_point_off_the_rows_comes_onto_them(rng):
-    """Whatever v the solver gives."""
-    for rows in (1, 3):
-        reachable = body(rng, rows)
-        v = reachable._screw_near(reachable.start + rng.normal(size=6))
-        assert np.abs(reachable.rows @ v).max() < 1e-14
-
-
-@pytest.mark.parametrize("step", [0.15, -1.95, 0.05, -1.8])
-def test_a_step_along_one_axis_ends_at_its_bound(step):
-    """From 0.9 of an interval beside one that stands still."""
-    reachable = ReachableSet(
-        np.zeros(6), np.eye(6)[:, :2], np.zeros((0, 2)), np.array([0.9, 0.2]),
-        np.array([0, 1]),
-    )  # fmt: skip
-    found = reachable._screw_near(reachable.start + [step, 0.0])
-    expected = np.clip(0.9 + step, -1.0, 1.0) - 0.9
-    assert found[:2] == pytest.approx([expected, 0.0], abs=1e-8)
 
 
 def test_the_gradient_has_the_height_of_the_cones_alone(rng):
@@ -130,28 +88,6 @@ def test_what_nothing_bounds_is_infinite_in_its_own_half():
         assert reachable.support(d[3]).height == np.inf
         assert np.isfinite(reachable.support(d[4]).height)
         assert reachable.support(1e-3 * d[3] + d[4]).height < np.inf
-
-
-def test_the_search_asks_for_supports_where_its_own_are_not_close_enough(
-    rng, monkeypatch
-):
-    """Asked for less than rounding: each support is then a problem of its own."""
-    reachable, asked = body(rng, 1), []
-    (low, high), _, _ = reachable.farthest(3, 1e-4)
-    support = ReachableSet.support
-
-    def counted(self, direction, method):
-        asked.append(direction)
-        return support(self, direction, method)
-
-    monkeypatch.setattr(ReachableSet, "support", counted)
-    (own_low, own_high), screw, supports = reachable.farthest(3, 1e-15)
-    assert 0 < len(asked) <= supports <= 400
-    assert all(direction[:3].tolist() == [0, 0, 0] for direction in asked)
-    assert own_low <= high + 1e-12
-    assert low <= own_high + 1e-12
-    assert 0.0 <= own_high - own_low < 1e-6
-    assert np.linalg.norm(screw[3:]) == pytest.approx(own_low, rel=1e-12)
 
 
 def test_a_support_that_fails_ends_the_search(rng, monkeypatch):

@@ -1,0 +1,171 @@
+"""A simulated machine corrected: its error at the machine before and after.
+
+    python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
+        [--robots arm6]
+
+Case k, drawn from seed k: a robot of six drives, or a Delta (positions alone), with one
+or two hidden effects of the library or outside it, each 5 times the noise.  It is
+measured, diagnosed, and the robot found is used to correct commands at configurations
+never measured.  The machine is then commanded again, and the distance from where it
+should stand is taken at the machine, without noise and without the measuring device.
+Beside it the floor: errors of the size of the noise that the diagnosis had to work
+with, alone.
+"""
+
+import argparse
+import json
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.model.robot import Robot
+from assembly.robots import load_robot
+from forcefit.inputs.table import BadInput
+from validation.campaign.campaign_file import read_campaign, read_commands
+from validation.correction.compensation import compensate
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.saving import corrected
+from validation.multibody.simulation import SimulationFailed, without_clearance
+from validation.synthetic.again import distances
+from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
+from validation.synthetic.draws import NotApplicable
+from validation.synthetic.effects import LIBRARY
+from validation.synthetic.generator import (
+    Noise,
+    Synthetic,
+    generate_campaign,
+    write_campaign,
+)
+from validation.synthetic.machine import acts_on_machine
+from validation.synthetic.outside import OUTSIDE
+
+ROBOTS = ("arm6", "hexapod", "delta")
+STRENGTH = 5.0
+TARGETS = 12
+TRIES = 20
+NEAR = 1.2  # of the noise: what the machine's error is to come to
+# weight and stiffening set the noise; clearance is left where the load pushes it
+NAMES = [
+    name for name in (*LIBRARY, *OUTSIDE)
+    if acts_on_machine(name)
+    and name not in {"joint_clearance", "geometric_stiffening", "body_mass"}
+    and name not in {"delayed_expansion", "_tilting"}  # they follow what is no command
+]  # fmt: skip
+
+
+def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
+    """A measured machine; draws again what a robot cannot have."""
+    for attempt in range(TRIES):
+        rng = np.random.default_rng([seed, attempt])
+        robot = without_clearance(load_robot(str(rng.choice(robots))))
+        names = rng.choice(NAMES, int(rng.integers(1, 3)), replace=False)
+        errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-4] * 3, *[1e-4] * 3]
+        try:
+            return generate_campaign(
+                robot.with_errors(errors) if not robot.closures else robot,
+                dict.fromkeys(map(str, names), STRENGTH), _design(robot), Noise(),
+                seed=int(rng.integers(2**31)), program="springs",
+            )  # fmt: skip
+        except (NotApplicable, SimulationFailed, BadInput):
+            continue
+    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+
+
+def _design(robot: Robot) -> CampaignDesign:
+    """What is measured."""
+    reach = 0.2 if robot.closures else 0.6
+    return CampaignDesign(30, 120, reach, load=60.0, humidity=True)
+
+
+def plan_table(plan: CampaignPlan) -> str:
+    """The commands of a plan, its loads and covariates."""
+    covariates = list(plan.rows[0].covariates)
+    loads = [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
+    lines = [",".join(["id", *plan.columns, *loads, *(f"cov.{c}" for c in covariates)])]
+    for i, row in enumerate(plan.rows):
+        numbers = [*plan.commands[i], *row.load, *row.covariates.values()]
+        lines.append(",".join([f"t{i}", *(f"{v:.12g}" for v in numbers)]))
+    return "\n".join(lines) + "\n"
+
+
+def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
+    """Errors at the machine before and after, in units of the noise."""
+    begin = time.process_time()
+    case = draw_case(seed, robots)
+    design = replace(_design(case.robot), configurations=TARGETS, rows=TARGETS)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_campaign(case, folder / "campaign")
+        found = diagnose(read_campaign(folder / "campaign"))
+        for attempt in range(TRIES):
+            rng = np.random.default_rng([seed, 999, *([attempt] if attempt else [])])
+            plan = plan_campaign(case.robot, design, rng)
+            (folder / "targets.csv").write_text(plan_table(plan))
+            targets = read_commands(folder / "targets.csv", corrected(found))
+            answer = compensate(targets)
+            try:
+                error = {
+                    when: distances(case.robot, case.effects, targets, q, "springs")
+                    for when, q in (
+                        ("before", targets.coordinates), ("after", answer.coordinates)
+                    )
+                }  # fmt: skip
+            except SimulationFailed:  # of targets that springs do not come to rest at
+                continue
+            break
+        else:
+            raise RuntimeError(f"case {seed}: no targets that can be simulated")
+    six = sum(frame.actuated for frame in case.robot.frames) >= 6
+    return {
+        "seed": seed, "robot": case.robot.name,
+        "hidden": [effect.name for effect in case.effects],
+        "verdict": found.verdict, "claimed": list(found.claimed),
+        "before_um": _rms(error["before"][:, 0]) * 1e6,
+        "after_um": _rms(error["after"][:, 0]) * 1e6,
+        "expected_um": _rms(np.linalg.norm(
+            np.hypot(answer.after, answer.spread)[:, 3:], axis=1)) * 1e6,
+        "before": _against(error["before"], case.sigma, six),
+        "after": _against(error["after"], case.sigma, six),
+        "seconds": time.process_time() - begin,
+    }  # fmt: skip
+
+
+def _against(error: NDArray, sigma: NDArray, six: bool) -> float:
+    """What a device of the same noise would read, over that noise."""
+    parts = [error[:, 0] / sigma[3]] + ([error[:, 1] / sigma[0]] if six else [])
+    return float(np.sqrt(1.0 + np.mean(np.square(parts)) / 3))
+
+
+def _rms(values: NDArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def main() -> None:
+    """Run cases, write every answer, print medians."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--robots", default=",".join(ROBOTS))
+    given = parser.parse_args()
+    robots = tuple(given.robots.split(","))
+    answers = []
+    for seed in range(given.first, given.first + given.count):
+        answers.append(run_case(seed, robots))
+        given.out.write_text(json.dumps(answers, indent=1))
+        print(json.dumps(answers[-1]), flush=True)
+    near = np.mean([answer["after"] <= NEAR for answer in answers])
+    print(f"within {NEAR} of the noise: {near:.0%} of {len(answers)}")
+    for key in ("before", "after", "before_um", "after_um"):
+        values = np.array([answer[key] for answer in answers])
+        ends = np.quantile(values, [0.5, 0.9])
+        print(f"{key}: median {ends[0]:.3g}, 90 % {ends[1]:.3g}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,283 @@
+"""Confusion matrix of the diagnosis over random campaigns with hidden effects.
+
+    python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
+    python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
+
+Case k is drawn from seed k: a robot (``random_robots``), a design, and what is hidden:
+one public effect at 2, 5 or 9 times the noise, two, none, one that no library has, or
+one that the design cannot tell from another.  The data come from the simulation's side
+(``validation.synthetic.generator``); what else would explain them as well is worked out
+there too (``validation.synthetic.equivalents``).  FOLDER keeps campaigns, truths and
+answers, so that a run can be stopped and taken up again.
+
+What counts as right is in ``diagnosis_score.py``.
+"""
+
+import argparse
+import json
+import shutil
+import tempfile
+import time
+import traceback
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnosis_score import VERDICTS, score
+from numpy.typing import NDArray
+from random_robots import draw_robot
+
+from assembly.files.robot_file import read_robot
+from forcefit.inputs.table import BadInput
+from forcefit.inputs.writing import plain, write_json
+from validation.campaign.campaign import Campaign
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.prediction import residual_of
+from validation.diagnosis.results import table
+from validation.diagnosis.saving import save
+from validation.diagnosis.sequence import errors_of
+from validation.multibody.simulation import SimulationFailed
+from validation.synthetic.design import CampaignDesign, varied_for
+from validation.synthetic.draws import SLIDING, NotApplicable, draw_effect
+from validation.synthetic.effects import LIBRARY, Parameters
+from validation.synthetic.equivalents import SAME, Alternative, alternatives
+from validation.synthetic.generator import (
+    Noise,
+    Synthetic,
+    generate_campaign,
+    write_campaign,
+)
+from validation.synthetic.machine import Hidden, simulate_readings
+from validation.synthetic.outside import OUTSIDE
+from validation.synthetic.truth import truth_of
+
+MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
+STRENGTHS = (2.0, 5.0, 9.0)
+TRIES = 12  # draws of a case until its robot can have the effects
+FINE = 2e-7  # [m] noise that no device has; weight or stiffening would be too weak
+VISIBLE = 200.0  # chi square that no public set explains, of an effect outside
+SMALL = 1e-2  # scale of errors and load at which the machine is linear
+
+
+def finite_part(campaign: Synthetic) -> NDArray:
+    """(rows, 6) [rad, m] finite minus linear readings of the declared machine."""
+    robot, rows = campaign.robot, campaign.plan.rows
+
+    def readings(scale: float) -> NDArray:
+        scaled = [replace(row, load=scale * row.load) for row in rows]
+        machine = robot.with_errors(scale * robot.errors)
+        point = campaign.reference_point
+        return simulate_readings(machine, point, scaled, (), "springs")
+
+    return readings(1.0) - (readings(SMALL) - readings(-SMALL)) / (2 * SMALL)
+
+
+def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
+    """Kind and campaign of a case; draws again what a robot cannot have."""
+    for attempt in range(TRIES):
+        rng = np.random.default_rng([seed, attempt])
+        kind = str(rng.choice(list(MIX), p=list(MIX.values())))
+        kind = only or kind
+        try:
+            campaign = _measure(kind, rng)
+        except (NotApplicable, SimulationFailed, BadInput):
+            continue
+        if campaign.sigma[3] >= FINE:
+            return kind, campaign
+    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+
+
+def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
+    """A campaign of a kind."""
+    names = _effects(kind, rng)
+    kinds = dict.fromkeys(SLIDING, "gantry")
+    kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
+    drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
+    robot, load = drawn.robot, drawn.load
+    # robots of many legs take long: half as many rows
+    many = len(robot.frames) > 20
+    design = CampaignDesign(
+        configurations=12 if many else 24,
+        rows=60 if many else 116,
+        reach=drawn.reach,
+        load=load,
+        reference_point=tuple(drawn.point),
+        humidity=rng.random() < 0.3,
+    )
+    design = varied_for(design, names)
+    wanted = {name: float(rng.choice(STRENGTHS)) for name in names}
+    if "geometric_stiffening" in names:  # first of all it needs large errors
+        robot = robot.with_errors(30 * robot.errors)
+    if kind != "confounded":
+        return generate_campaign(
+            robot, wanted, design, Noise(), int(rng.integers(2**31)), "springs"
+        )
+    # a beam that is longer, or warmer by always the same: nothing can tell them apart
+    hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
+    fixed = replace(design, temperature="constant")
+    return generate_campaign(
+        robot, [(hidden, wanted[names[0]])], fixed, Noise(),
+        int(rng.integers(2**31)), "springs",
+    )  # fmt: skip
+
+
+def _effects(kind: str, rng: np.random.Generator) -> list[str]:
+    """Names of what is hidden."""
+    library = list(LIBRARY)
+    if kind == "none":
+        return []
+    if kind == "outside":
+        return [str(rng.choice(list(OUTSIDE)))]
+    if kind == "confounded":
+        return [str(rng.choice(["thermal_expansion", "link_length"]))]
+    if kind == "single":
+        return [str(rng.choice(library))]
+    library.remove("geometric_stiffening")
+    return [str(n) for n in rng.choice(library, 2, replace=False)]
+
+
+def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
+    """Parameters at a single beam."""
+    given = dict(draw_effect(name, robot, 1.0, rng).parameters)
+    first = str(rng.choice(list(given)))
+    return {first: given[first]}
+
+
+def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
+    """The truth, with every set that explains the data as well."""
+    names = sorted(effect.name for effect in campaign.effects)
+    # two public effects may do what one that is not public does
+    most = 2 if len(names) == 2 or kind == "outside" else 1
+    rivals = alternatives(campaign, most) if names else []
+    same = {
+        tuple(sorted(_plain(one)))
+        for one in rivals
+        if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
+    }
+    # nothing at all is a rival too, if the effects hardly show
+    unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
+    accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
+    if kind == "none":  # near a singularity the declared errors may ask for them
+        chi2 = float(np.nansum((finite_part(campaign) / campaign.sigma) ** 2))
+        accept += [["geometric_stiffening"]] if chi2 > SAME else []
+    verdict = "ambiguous" if kind == "confounded" else None
+    truth = truth_of(campaign, verdict, accept)
+    if kind == "outside":
+        least = rivals[0].residual if rivals else np.inf
+        truth["accept_effects"] = [[]]
+        truth["hidden_from_library"] = least
+        truth["accept_verdicts"] = ["outside_library"]
+        if least < VISIBLE:  # a public effect does nearly the same
+            truth["accept_verdicts"] = list(VERDICTS)
+            hidden = [one for one in rivals if one.residual < VISIBLE]
+            truth["accept_effects"] += [_plain(one) for one in hidden]
+    truth["kind"] = kind
+    truth["alternatives"] = [
+        {
+            "names": list(one.names),
+            "parameters": one.parameters,
+            "left_chi2": one.residual,
+        }
+        for one in rivals[:8]
+    ]
+    return truth
+
+
+def _plain(one: Alternative) -> list[str]:
+    """Names without the time constants of drifts."""
+    return [name.partition("(")[0] for name in one.names]
+
+
+def make(
+    folder: Path, seed: int, only: str | None = None, understated: float = 1.0
+) -> None:
+    """Write a case's campaign and truth, unless it is there.
+
+    The campaign states a sigma that is too small by the factor ``understated``.
+    """
+    name = f"c{seed:04d}"
+    if (folder / "truths" / f"{name}.json").exists():
+        return
+    kind, campaign = draw_case(seed, only)
+    shutil.rmtree(folder / "campaigns" / name, ignore_errors=True)
+    stated = replace(campaign, sigma=campaign.sigma / understated)
+    write_campaign(stated, folder / "campaigns" / name)
+    truth = plain(truth_with_rivals(kind, campaign))
+    write_json({name: truth}, str(folder / "truths" / f"{name}.json"))
+
+
+def answer(folder: Path, seed: int) -> None:
+    """Diagnose a case and write the answer, unless it is there."""
+    from validation.campaign.campaign_file import read_campaign
+    from validation.diagnosis.diagnose import diagnose
+
+    name = f"c{seed:04d}"
+    target = folder / "answers" / f"{name}.json"
+    if target.exists():
+        return
+    started = time.process_time()
+    campaign = read_campaign(folder / "campaigns" / name)
+    try:
+        found = diagnose(campaign)
+        diagnosis = table(found) | _saved(found, campaign)
+    except Exception:  # a crash is an answer too, and is counted
+        diagnosis = {"verdict": "crashed", "why": traceback.format_exc()}
+    diagnosis["seconds"] = time.process_time() - started
+    write_json(diagnosis, str(target))
+
+
+def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
+    """The saved file's error on all rows over that printed, and against declared."""
+    if not found.better:
+        return {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.toml"
+        save(found, path)
+        left = residual_of(campaign, read_robot(path))
+    rows = ~found.outliers
+    after = errors_of(campaign, left, rows).normalised
+    before = errors_of(campaign, found.residual_before, rows).normalised
+    return {
+        "read_back": after / found.saved.normalised,
+        "saved_worse": bool(after > before),
+    }
+
+
+def main() -> None:
+    """Make, diagnose, score."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kind", choices=MIX, help="campaigns of one kind alone")
+    parser.add_argument("--step", type=int, default=1, help="for several at a time")
+    parser.add_argument(
+        "--understated", type=float, default=1.0, help="sigma stated too small by it"
+    )
+    parser.add_argument("--make", action="store_true", help="make campaigns only")
+    parser.add_argument("--answer", action="store_true", help="of those made already")
+    parser.add_argument("--score", action="store_true", help="score answers only")
+    asked = parser.parse_args()
+    for name in ("campaigns", "truths", "answers"):
+        (asked.folder / name).mkdir(parents=True, exist_ok=True)
+    if not asked.score:
+        for seed in range(asked.first, asked.first + asked.count, asked.step):
+            started = time.perf_counter()
+            try:
+                if not asked.answer:
+                    make(asked.folder, seed, asked.kind, asked.understated)
+            except SimulationFailed as error:
+                print(f"case {seed}: left out, {error}", flush=True)
+            made = (asked.folder / "truths" / f"c{seed:04d}.json").exists()
+            if made and not asked.make:
+                answer(asked.folder, seed)
+            print(f"case {seed}: {time.perf_counter() - started:.0f} s", flush=True)
+    if not asked.make:
+        scores = score(asked.folder)
+        write_json(scores, str(asked.folder / "score.json"))
+        print(json.dumps(scores, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""Diagnosis of random robots of which three points are measured at once.
+
+    python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
+        [--hidden library|outside] [--common 1.0] [--device 5e-6]
+
+Case k is drawn from seed k: a robot (``random_robots``), 128 rows of 64 configurations,
+noise of 5 um of the device in every reading and, common to the points of a row, a
+motion of 20 um and 200 urad times ``--common``; hidden is nothing, or one effect at
+five times the noise in common.  The device's noise is stated as 5 um whatever it is.
+Printed: verdict, claims, functions, errors in stated sigma, noise found; in how many
+cases a function was added, how many named what is hidden, and how many 90 % intervals
+of its parameters cover.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from forcefit.inputs.table import BadInput
+from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
+from validation.diagnosis.diagnose import diagnose
+from validation.diagnosis.diagnosis import Diagnosis
+from validation.diagnosis.results import table
+from validation.multibody.simulation import SimulationFailed
+from validation.synthetic.design import CampaignDesign
+from validation.synthetic.draws import NotApplicable
+from validation.synthetic.effects import LIBRARY
+from validation.synthetic.generator import Synthetic
+from validation.synthetic.outside import OUTSIDE
+
+sys.path.insert(0, str(Path(__file__).parent))
+from random_robots import draw_robot
+
+LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}  # of given size
+TRIES = 12
+
+
+def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
+    """A simulated machine; draws again what a robot cannot have."""
+    for attempt in range(TRIES):
+        rng = np.random.default_rng([seed, attempt])
+        listed = list(OUTSIDE) if hidden == "outside" else list(LIBRARY)
+        name = str(rng.choice([n for n in listed if n not in LEFT_OUT]))
+        wanted = {name: 5.0} if hidden else {}
+        try:
+            drawn = draw_robot(rng)
+            design = CampaignDesign(
+                configurations=64, rows=128, reach=drawn.reach, load=drawn.load,
+                reference_point=tuple(drawn.point),
+            )  # fmt: skip
+            noise = float(common * MACHINE[3]) or DEVICE
+            return simulated(drawn.robot, wanted, design, seed, noise)
+        except (NotApplicable, SimulationFailed, BadInput):
+            continue
+    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+
+
+def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
+    """How many 90 % intervals of hidden parameters cover, and how many there are."""
+    true = {e.name: e.parameters for e in made.effects}
+    inside = [
+        abs(p["value"] - true[e["name"]][p["name"]]) < 1.645 * p["std"]
+        for e in table(found)["effects"] if e["name"] in true
+        for p in e["parameters"] if p["name"] in true[e["name"]] and p["std"]
+    ]  # fmt: skip
+    return sum(inside), len(inside)
+
+
+def main() -> None:
+    """Draw, diagnose, count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=710000)
+    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--hidden", choices=["library", "outside"])
+    parser.add_argument("--common", type=float, default=1.0)
+    parser.add_argument("--device", type=float, default=DEVICE)
+    asked = parser.parse_args()
+    functions = named = 0
+    inside = np.zeros(2, dtype=int)
+    for seed in range(asked.first, asked.first + asked.count):
+        made = machine(seed, asked.hidden, asked.common)
+        names = tuple(effect.name for effect in made.effects)
+        with tempfile.TemporaryDirectory() as folder:
+            campaign = write_points(
+                made, Path(folder) / "campaign", seed,
+                common=asked.common * MACHINE, device=asked.device,
+            )  # fmt: skip
+            found = diagnose(campaign)
+        functions += bool(found.fit.unknowns.functions)
+        named += found.claimed == names
+        inside += covered(found, made)
+        turn, shift = found.traced.selected.noise.common
+        print(
+            f"{seed} {made.robot.name}: {', '.join(names) or 'nothing'}; "
+            f"{found.verdict} {', '.join(found.claimed)}, "
+            f"{len(found.fit.unknowns.functions)} functions; "
+            f"{found.before.normalised:.2f} sigma before, {found.after.normalised:.2f} "
+            f"after, {found.noise.normalised:.2f} noise; "
+            f"in common {1e6 * turn:.0f} urad, {1e6 * shift:.1f} um",
+            flush=True,
+        )
+    print(
+        f"{asked.count} cases: {functions} with functions, {named} named as hidden, "
+        f"{inside[0]} of {inside[1]} intervals cover"
+    )
+
+
+if __name__ == "__main__":
+    main()

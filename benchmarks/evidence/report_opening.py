@@ -1,0 +1,67 @@
+"""How large a report is, and how long a browser takes to open it.
+
+    python benchmarks/evidence/report_opening.py my_study/report.html
+
+Headless Chromium by selenium, which draws without a graphics card: a desktop is faster.
+Times are from the start of loading: the headline readable, the first screen drawn, all
+figures drawn; and the processor time of the page's thread.  Each page is opened in a
+browser that has shown an empty page, and in one just started, which still makes ready
+what it draws with.
+"""
+
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from selenium import webdriver
+from selenium.webdriver.support.ui import WebDriverWait
+
+TIMES = 5
+EMPTY = "data:text/html,<p>empty"
+MARKS = """
+const at = name => (performance.getEntriesByName(name)[0] || {}).startTime;
+return ['first-contentful-paint', 'first screen', 'drawn'].map(at);
+"""
+
+
+def opened(path: Path, first: str) -> list[float]:
+    """[s] Headline, first screen, all, processor, once a first address was shown."""
+    options = webdriver.ChromeOptions()
+    for word in ("headless=new", "no-sandbox", "use-angle=swiftshader",
+                 "enable-unsafe-swiftshader", "window-size=1200,1000"):  # fmt: skip
+        options.add_argument(f"--{word}")
+    driver = shutil.which("chromedriver")
+    browser = webdriver.Chrome(options, webdriver.ChromeService(driver))
+    try:
+        if first:
+            browser.get(first)
+            time.sleep(1.0)  # processes started for the next page
+        browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+        browser.get(path.resolve().as_uri())
+        WebDriverWait(browser, 60, 0.05).until(
+            lambda b: b.execute_script("return document.documentElement.dataset.drawn")
+        )
+        metrics = browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+        busy = next(m["value"] for m in metrics if m["name"] == "TaskDuration")
+        marks = [float(mark or "nan") / 1e3 for mark in browser.execute_script(MARKS)]
+        return [*marks, busy]
+    finally:
+        browser.quit()
+
+
+def main() -> None:
+    """Print size and times of each page that is named."""
+    head = "page, browser, MB, headline, first screen, all, processor [s]"
+    print(f"{head}; least and median of {TIMES}")
+    for path in map(Path, sys.argv[1:]):
+        for state, first in (("running", EMPTY), ("just started", "")):
+            runs = [opened(path, first) for _ in range(TIMES)]
+            times = [sorted(column) for column in zip(*runs, strict=True)]
+            columns = ", ".join(f"{t[0]:.2f} .. {t[TIMES // 2]:.2f}" for t in times)
+            size = path.stat().st_size / 1e6
+            print(f"{path.name}, {state}, {size:.2f}, {columns}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""Judge the estimated error of peak stresses on shouldered, grooved and bored shafts.
+
+``python benchmarks/evidence/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
+
+Twenty parts drawn at random, each in tension, torsion or bending, solved and read as
+``forcefit stiffness stress`` does, one radius away from the ends.  Their references
+are of quadratic axisymmetric elements (scikit-fem; the first harmonic in bending), held
+rigidly at both ends, on meshes of r / 20 and r / 40 in the notch that agree to 0.25 %.
+Printed: true error, told error, covered or not; then how many are.  20 to 100 s a part.
+"""
+
+import argparse
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiffness.fem.fea import FemOptions, solve_link
+from stiffness.fem.material import Material
+from stiffness.fem.stress import peak_stress
+from stiffness.surface.interface import parse_interface
+from stiffness.surface.surface import Surface, check_surface
+
+AROUND, ROWS, APART = 48, 8, 0.005  # facets, in a quarter of a fillet; [m] of rings
+COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}
+
+
+class Part(NamedTuple):
+    """A shaft along z, lengths in mm.
+
+    Attributes:
+        kind: ``"shoulder"`` or ``"groove"``.
+        large: diameter at the base, of a groove at both ends.
+        small: diameter beyond the shoulder, or at the groove's bottom.
+        radius: of the fillet, or of the groove.
+        bore: diameter; 0 without.
+        place: z of the shoulder, or of the groove's middle.
+        length: from base to tip.
+        load: of 1 N or 1 N m at the tip.
+        peak: [Pa] largest von Mises stress at least half the diameter from both ends.
+    """
+
+    kind: str
+    large: float
+    small: float
+    radius: float
+    bore: float
+    place: float
+    length: float
+    load: str
+    peak: float
+
+
+PARTS = (
+    Part("shoulder", 26.863, 20, 2.402, 0, 32.2355, 77.2355, "tension", 5576.7),
+    Part("shoulder", 31.4763, 20, 2.3633, 0, 37.7716, 82.7716, "torsion", 1.4763e6),
+    Part("shoulder", 29.6787, 20, 3.3875, 0, 35.6144, 80.6144, "bending", 1.8018e6),
+    Part("shoulder", 38.4823, 20, 1.8611, 0, 46.1788, 91.1788, "tension", 6524.6),
+    Part("shoulder", 34.4446, 20, 2.1756, 0, 41.3335, 86.3335, "torsion", 1.5052e6),
+    Part("shoulder", 39.4714, 20, 3.7916, 0, 47.3657, 92.3657, "bending", 1.7525e6),
+    Part("shoulder", 34.1739, 20, 3.3571, 0, 41.0087, 86.0087, "tension", 5306.2),
+    Part("shoulder", 32.2425, 20, 3.5473, 0, 38.691, 83.691, "torsion", 1.3766e6),
+    Part("shoulder", 31.1741, 20, 2.2809, 0, 37.4089, 82.4089, "bending", 2.0076e6),
+    Part("groove", 20, 15.2389, 1.8446, 0, 35, 70, "tension", 11190),
+    Part("groove", 20, 13.8482, 2.2413, 0, 35, 70, "torsion", 4.5775e6),
+    Part("groove", 20, 14.0681, 2.4611, 0, 35, 70, "bending", 5.5558e6),
+    Part("groove", 20, 14.3026, 2.1163, 0, 35, 70, "tension", 11958),
+    Part("groove", 20, 15.0746, 1.7126, 0, 35, 70, "torsion", 3.821e6),
+    Part("groove", 20, 14.4653, 2.0965, 0, 35, 70, "bending", 5.4229e6),
+    Part("shoulder", 27.3507, 20, 2.5727, 10.7848, 32.8208, 77.8208, "tension", 7440.3),
+    Part("shoulder", 32, 20, 2.2973, 11.6809, 40.4488, 85.4488, "torsion", 1.6241e6),
+    Part("shoulder", 32, 20, 2.5252, 11.4027, 39.6168, 84.6168, "bending", 2.2221e6),
+    Part("shoulder", 29.1095, 20, 3.1883, 7.8829, 34.9314, 79.9314, "tension", 6096.9),
+    Part("shoulder", 28.1848, 20, 2.8647, 7.3674, 33.8218, 78.8218, "torsion",
+         1.4371e6),
+)  # fmt: skip
+
+
+def outline(part: Part) -> NDArray:
+    """(k, 2) [m] radius and z of the rings of a shaft's outer side, and of its bore."""
+    R, q, r, place, end = (
+        v / 1e3 for v in (part.large / 2, part.small / 2, part.radius, part.place,
+                          part.length)
+    )  # fmt: skip
+    if part.kind == "shoulder":
+        turn = np.linspace(0, np.pi / 2, ROWS + 1)
+        arc = np.column_stack([q + r - r * np.sin(turn), place + r - r * np.cos(turn)])
+        corners = [[R, 0], [R, place], *arc, [q, end]]
+    else:
+        turn = np.linspace(0, np.pi, 2 * ROWS + 1)
+        arc = np.column_stack([q + r - r * np.sin(turn), place - r * np.cos(turn)])
+        corners = [[R, 0], [R, place - r], *arc, [R, place + r], [R, end]]
+    if part.bore:
+        corners += [[part.bore / 2e3, end], [part.bore / 2e3, 0], [R, 0]]
+    rings = [np.array(corners[:1])]
+    for a, b in zip(np.array(corners[:-1]), np.array(corners[1:]), strict=True):
+        count = max(1, round(float(np.linalg.norm(b - a)) / APART))
+        rings.append(a + np.linspace(0, 1, count + 1)[1:, None] * (b - a))
+    return np.concatenate(rings)
+
+
+def surface_of(part: Part) -> Surface:
+    """A shaft's surface, each ring turned by half a facet against the one before."""
+    profile = outline(part)
+    if part.bore:  # closed: an even number of rings, so that the last meets the first
+        profile = profile[:-1]
+        if len(profile) % 2:
+            profile = np.insert(profile, 1, (profile[0] + profile[1]) / 2, axis=0)
+    count, number = len(profile), np.arange(AROUND)
+    angle = 2 * np.pi / AROUND * (number + 0.5 * (np.arange(count)[:, None] % 2))
+    points = np.stack([
+        profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle),
+        np.broadcast_to(profile[:, 1:], angle.shape),
+    ], axis=-1).reshape(-1, 3)  # fmt: skip
+    following, triangles = (number + 1) % AROUND, []
+    for k in range(count if part.bore else count - 1):
+        a, b = k * AROUND + number, k * AROUND + following
+        c, d = ((k + 1) % count * AROUND + n for n in (number, following))
+        pair = ((a, b, c), (b, d, c)) if k % 2 == 0 else ((a, b, d), (a, d, c))
+        triangles += [np.column_stack(corners) for corners in pair]
+    if not part.bore:
+        ends = [[0, 0, profile[0, 1]], [0, 0, profile[-1, 1]]]
+        last = (count - 1) * AROUND
+        low, high = (np.full(AROUND, len(points) + k) for k in (0, 1))
+        triangles.append(np.column_stack([low, following, number]))
+        triangles.append(np.column_stack([high, last + number, last + following]))
+        points = np.concatenate([points, ends])
+    return check_surface(points, np.concatenate(triangles), part.kind)
+
+
+def main() -> None:
+    """Print a line a part and how many are covered."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--accuracy", type=float, default=0.02)
+    parser.add_argument("--parts", default="0:20")
+    asked = parser.parse_args()
+    first, last = map(int, asked.parts.split(":"))
+    covered = 0
+    for part in PARTS[first:last]:
+        solved = solve_link(
+            surface_of(part),
+            parse_interface("z=0"),
+            parse_interface(f"z={part.length / 1e3}"),
+            [Material(2.1e11, 0.3)],
+            options=FemOptions(asked.accuracy),
+        )
+        load = np.eye(6)[COMPONENTS[part.load]]
+        peak = peak_stress(solved, load, away=part.large / 2e3)
+        error = peak.von_mises / part.peak - 1
+        inside = abs(peak.von_mises - part.peak) <= peak.error
+        covered += inside
+        print(
+            f"{part.kind:9s}{part.load:8s} error {100 * error:6.2f} %, told "
+            f"{100 * peak.error / peak.von_mises:5.1f} %{'' if inside else ' MISSED'}",
+            flush=True,
+        )
+    print(f"{covered} of {len(PARTS[first:last])} covered")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""The costs of ``crosscheck_validity.py`` once more, by the multibody simulation.
+
+Run ``python benchmarks/evidence/validity_simulated.py``: some two minutes; it prints
+the last table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts
+at nine nodes of each beam, a pin presses against two bushes as two contacts.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from crosscheck_validity import GRAVITY, POSES, free_of_errors, postures
+
+from assembly.exact.exact import solve_exact
+from assembly.kinematics.posture import Posture
+from assembly.linear.energy import solve_assembly
+from validation.assumptions.bushes import solve_bushes
+from validation.crosscheck.spread_weight import energy_between_ends
+from validation.multibody.simulation import SimulationModel, simulate_assembly
+
+ELEMENTS = 8  # of each beam under its weight
+
+
+def closures(at: Posture) -> tuple[float, ...]:
+    """[um] [%] simulation against the linear and the exact model."""
+    assembly, exact = simulate_assembly(at), solve_exact(at)
+    costs = []
+    for model in (exact.linear, exact):
+        shift = (assembly.platform_screw - model.platform_screw)[3:]
+        energy = assembly.energy / model.energy - 1
+        costs += [1e6 * float(np.linalg.norm(shift)), 100 * abs(energy)]
+    return tuple(costs)
+
+
+def weights(at: Posture) -> tuple[float, ...]:
+    """[um] [%] against the ends' equivalents, [%] with what is between them."""
+    assembly = simulate_assembly(
+        at, model=SimulationModel(elements=ELEMENTS), gravity=GRAVITY
+    )
+    ends = solve_assembly(at, gravity=GRAVITY)
+    shift = (assembly.platform_screw - ends.platform_screw)[3:]
+    whole = ends.energy + energy_between_ends(at, GRAVITY, ELEMENTS)
+    return (
+        1e6 * float(np.linalg.norm(shift)),
+        100 * abs(1 - ends.energy / assembly.energy),
+        100 * abs(1 - whole / assembly.energy),
+    )
+
+
+def discs(at: Posture) -> tuple[float, ...]:
+    """[%] what bushes cost more by cones, and by contacts at a sixteenth of all."""
+    by_cones = solve_bushes(at).energy / solve_assembly(at).energy
+    disc, bushes = (
+        simulate_assembly(
+            at, 1 / 16, SimulationModel(clearances=True, bushes=b)
+        ).rigid_energy
+        for b in (False, True)
+    )
+    return 100 * (by_cones - 1), 100 * (bushes / disc - 1)
+
+
+def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """What is compared, and the numbers of four cases or so."""
+    for ratio in (None, 40.0):
+        label = "as built" if ratio is None else "L / r = 40"
+        for at in postures(name, ratio)[::5]:
+            yield f"closures, {label}", closures(at)
+    for ratio in (10.0, 40.0):
+        for at in free_of_errors(postures(name, ratio))[:3]:
+            yield f"weight, L / r = {ratio:g}", weights(at)
+    for at in postures(name, play=True)[::5]:
+        yield "bushes", discs(at)
+
+
+def main() -> None:
+    """One row for each comparison: medians and largest."""
+    for name in POSES:
+        rows: dict[str, list[tuple[float, ...]]] = {}
+        for what, numbers in cases(name):
+            rows.setdefault(what, []).append(numbers)
+        for what, values in rows.items():
+            columns = np.transpose(values)
+            cells = [f"{np.median(c):.3g} ({c.max():.3g})" for c in columns]
+            print(f"| {name} | {what} |", " | ".join(cells), "|", flush=True)
+
+
+if __name__ == "__main__":
+    main()
