@@ -32,7 +32,7 @@ MACHINES = [
     (3, "assembly stiffness delta.toml --direction tz=1 --json -"),
     (2, "assembly deflection delta.toml --along fz=0:-100:50 -o new.svg"),
     (2, "assembly frequencies delta.toml --count 3 --json new.json"),
-    (3, "assembly sweep delta.toml --grid tx=0:0.01:0.01 -o new.nc --stiffness "
+    (3, "assembly sweep delta.toml --grid tx=0:0.01:0.01 -o new.nc --state nominal "
         "--csv new.csv"),
     (4, "assembly zone rounded.toml --rest coupler --json -"),
     (2, "assembly table swept.nc -o new.csv"),

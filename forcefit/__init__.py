@@ -110,19 +110,27 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
+# module and name of what an old public name means; each works for one release
+_RENAMED: dict[str, tuple[str, str]] = {}
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first asked for."""
+    """Import a public name when it is first needed; an old one with a warning."""
     if name == "__version__":
         return _version()
-    if name not in _OWNER_OF:
+    if name not in _OWNER_OF and name not in _RENAMED:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_OWNER_OF[name]), name)
+    if name in _OWNER_OF:
+        return getattr(import_module(_OWNER_OF[name]), name)
+    from warnings import warn
+
+    owner, new = _RENAMED[name]
+    warn(f"forcefit.{name} is now forcefit.{new}", FutureWarning, stacklevel=2)
+    return getattr(import_module(owner), new)
 
 
 def __dir__() -> list[str]:

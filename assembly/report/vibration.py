@@ -1,6 +1,6 @@
 """Natural frequencies for machines and for people."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from forcefit.inputs.display import numbers
 
 _NOMINAL = (
     "load and gravity are left out: these are the frequencies of the nominal robot; "
-    "with --exact they count, and so does the stiffness that they give"
+    "with --state exact they count, and so does the stiffness that they give"
 )
 _NAMED = 3  # parts of a mode that people are told
 
@@ -24,7 +24,7 @@ def vibration_of(
     count: int = 6,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
     """Everything ``assembly frequencies`` reports, as plain values.
 
@@ -33,7 +33,7 @@ def vibration_of(
         count: modes at most.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether around the equilibrium with errors, clearances and loads.
+        state: ``"exact"`` around the equilibrium with errors, clearances and loads.
 
     Returns:
         Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"`` or
@@ -44,12 +44,12 @@ def vibration_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "exact": exact, "remarks": [],
+        "exact": state == "exact", "remarks": [],
     }  # fmt: skip
-    if not exact and (np.any(load) or np.any(gravity)):
+    if state == "nominal" and (np.any(load) or np.any(gravity)):
         results["remarks"] = [_NOMINAL]
     try:
-        modes = natural_modes(posture, count, load, gravity, exact)
+        modes = natural_modes(posture, count, load, gravity, state)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     if np.isnan(modes.frequencies).any():

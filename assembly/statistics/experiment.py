@@ -45,7 +45,7 @@ class Experiment:
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state of the platform's stiffness, one of
-            :data:`assembly.sweeps.point_stiffness.STATES`, not the classical one;
+            :data:`assembly.sweeps.point_stiffness.STATES`, not the nominal one;
             empty for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
             upper minus lower bound; inf for one that is not needed.

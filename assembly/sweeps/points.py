@@ -31,7 +31,7 @@ from assembly.sweeps.point_conditions import (
 )
 from assembly.sweeps.point_kinematics import note_geometry
 from assembly.sweeps.point_stiffness import (
-    classical_stiffnesses,
+    nominal_stiffnesses,
     tangent_stiffnesses,
 )
 from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
@@ -288,12 +288,12 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """The classical K_C once a posture, its draws share it; a tangent at each point."""
+    """The nominal K_C once a posture, its draws share it; a tangent at each point."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
-    if state == "classical":
+    if state == "nominal":
         starts = [run.start for run in runs]
-        quantities, reasons = classical_stiffnesses(conditions.postures[starts])
+        quantities, reasons = nominal_stiffnesses(conditions.postures[starts])
     else:
         quantities, reasons = tangent_stiffnesses(conditions, state)
         runs = [slice(i, i + 1) for i in range(len(T))]

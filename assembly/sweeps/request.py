@@ -62,9 +62,9 @@ class SweepOptions:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that effects of the robot's file depend on.
-        stiffness: also K_C and the shares of its parts, clearances held at zero.
-        tangent: ``"contact"`` or ``"exact"``: instead the K_C of what is there, its
-            errors, loads and clearances.
+        state: also K_C and the shares of its parts, in this state: ``"nominal"``,
+            clearances held at zero; ``"contact"`` or ``"exact"``, with the errors,
+            loads and clearances of each point.
         frequencies: how many natural frequencies.
         rest: a frame that takes what a closure leaves open, as
             :func:`assembly.kinematics.closing.rest_in`.
@@ -87,8 +87,7 @@ class SweepOptions:
     load: Sequence[float] = (0.0,) * 6
     gravity: Sequence[float] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
-    stiffness: bool = False
-    tangent: str | None = None
+    state: str | None = None
     frequencies: int | None = None
     rest: str | None = None
     mismatch: str | None = None
@@ -142,7 +141,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         load=tuple(options.load),
         gravity=tuple(options.gravity),
         under=dict(options.under),
-        stiffness=options.tangent or ("classical" if options.stiffness else ""),
+        stiffness=options.state or "",
         frequencies=options.frequencies or 0,
     )
     _check_readings(question)
@@ -170,12 +169,9 @@ def _check(options: SweepOptions, machine: Robot) -> None:
                 f"--yield-strength: no link of {machine.name} has a shape from which "
                 "its stress follows"
             )
-    tangents = [state for state in STATES if state != "classical"]
-    if options.tangent is not None and options.tangent not in tangents:
-        hint = nearest(options.tangent, tangents)
-        raise BadInput(f'--tangent: found "{options.tangent[:60]}"{hint}')
-    if options.tangent is not None and options.stiffness:
-        raise BadInput("sweep: found --stiffness and --tangent, expected one of them")
+    if options.state is not None and options.state not in STATES:
+        hint = nearest(options.state, list(STATES))
+        raise BadInput(f'--state: found "{options.state[:60]}"{hint}')
     if options.frequencies is not None:
         if not 1 <= options.frequencies <= _MODES:
             raise BadInput(

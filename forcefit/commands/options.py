@@ -163,6 +163,26 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     return [given.get(name, 0.0) for name in "xyz"]
 
 
+def parse_state(
+    text: str, valid: Sequence[str] = ("nominal", "contact", "exact")
+) -> Any:
+    """State in which K_C is taken, from ``--state``.
+
+    Args:
+        text: what was given.
+        valid: states that the command knows.
+
+    Returns:
+        The word.
+
+    Raises:
+        BadInput: it is none of them.
+    """
+    if text not in valid:
+        raise BadInput(f"--state: found {describe(text)}{nearest(text, valid)}")
+    return text
+
+
 def parse_point(text: str | None, option: str) -> list[float]:
     """A point of the platform as ``x,y,z``; its origin if not given.
 

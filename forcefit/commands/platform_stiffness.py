@@ -20,6 +20,7 @@ from forcefit.commands.options import (
     parse_covariates,
     parse_direction,
     parse_point,
+    parse_state,
 )
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.errors import checked
@@ -46,14 +47,14 @@ def stiffness(
         list[str] | None,
         typer.Option(help="Such as tx=1,tz=-1: stiffness and shares along it."),
     ] = None,
-    exact: Annotated[
-        bool,
+    state: Annotated[
+        str,
         typer.Option(
-            "--exact",
-            help="The tangent of the exact equilibrium: internal forces and loads "
-            "stiffen or soften.",
+            help="nominal (clearances at zero; contact too if there are any) | contact "
+            "(errors, loads, clearances) | exact (internal forces and loads stiffen or "
+            "soften)."
         ),
-    ] = False,
+    ] = "nominal",
     length: Annotated[
         float | None,
         typer.Option(help="[m] by which angles are multiplied in eigen-stiffnesses."),
@@ -61,8 +62,8 @@ def stiffness(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also dC by a number of the robot file, by its path; with --exact at "
-            "the exact equilibrium."
+            help="Also dC by a number of the robot file, by its path; in "
+            "the state chosen."
         ),
     ] = None,
     output: Annotated[
@@ -83,23 +84,24 @@ def stiffness(
         checked("--length", length, "m", above=0)
     point = parse_point(at, "--at")
     way = parse_direction(direction)
+    word = parse_state(state)
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,
         mismatch=mismatch,
     )  # fmt: skip
     with one_thread():
         results = stiffness_of(
-            applied.posture, applied.load, applied.gravity, point, exact, length,
+            applied.posture, applied.load, applied.gravity, point, word, length,
             way,
         )  # fmt: skip
         if by and "compliance" in results:
-            states = {"slopes": "exact" if exact else "without clearance"}
+            states = {"slopes": word}
             if "in_contact" in results:
-                states["slopes_in_contact"] = "in contact"
+                states["slopes_in_contact"] = "contact"
             asked = (applied.load, applied.gravity, point)
-            for key, state in states.items():
+            for key, one in states.items():
                 results[key], results["cannot_change"] = _slopes(
-                    robot, by, pose, joint, (state, *asked), under
+                    robot, by, pose, joint, (one, *asked), under
                 )
     write_json(results, json)
     if json != "-":

@@ -90,11 +90,11 @@ def statistics(
     margins: Annotated[
         bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
     ] = True,
-    stiffness: Annotated[
+    state: Annotated[
         str | None,
         typer.Option(
-            help="Spread of the platform's stiffness: contact (clearances pressed or "
-            "free) | exact (internal forces too)."
+            help="Spread of the platform's stiffness in a state: contact (clearances "
+            "pressed or free) | exact (internal forces too)."
         ),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
@@ -128,8 +128,8 @@ def statistics(
 
     _check_clearance_model(play, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
-    if stiffness is not None:
-        _check_word("--stiffness", stiffness, ("contact", "exact"))
+    if state is not None:
+        _check_word("--state", state, ("contact", "exact"))
     if not 0 < confidence < 1:
         raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
@@ -157,7 +157,7 @@ def statistics(
     experiment = Experiment(
         posture, sources, seed, play, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
-        stiffness=stiffness or "", precision=precision_for(limits),
+        stiffness=state or "", precision=precision_for(limits),
         contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])

@@ -96,14 +96,11 @@ def sweep(
         bool,
         typer.Option("--linearisation", help="What finite motions would change; slow."),
     ] = False,
-    stiffness: Annotated[
-        bool,
-        typer.Option("--stiffness", help="K_C, and which part gives way."),
-    ] = False,
-    tangent: Annotated[
+    state: Annotated[
         str | None,
         typer.Option(
-            help="contact | exact: K_C of what is there, errors, loads, clearances."
+            help="Also K_C, and which part deforms: nominal (clearances at zero) | "
+            "contact | exact (both with errors, loads and clearances)."
         ),
     ] = None,
     frequencies: Annotated[
@@ -166,9 +163,8 @@ def sweep(
                 seed=seed, reading=reading, play_alone=play_alone,
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
-                gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
-                tangent=tangent, frequencies=frequencies, rest=rest,
-                mismatch=mismatch,
+                gravity=g or (0.0,) * 3, under=covariates or {}, state=state,
+                frequencies=frequencies, rest=rest, mismatch=mismatch,
             ),
         )  # fmt: skip
         if figure is not None:
@@ -179,7 +175,7 @@ def sweep(
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(
             "forcefit: note: load and gravity are left out of the frequencies; "
-            "assembly frequencies --exact counts them",
+            "assembly frequencies --state exact counts them",
             file=sys.stderr,
         )
     done = [0]

@@ -46,7 +46,7 @@ QUESTIONS = {
     "path": lambda at, method: follow_load(at, 4, 0.0, 60.0, count=4, method=method),
     "modes": lambda at, method: natural_modes(at, method=method),
     "modes, finite": lambda at, method: natural_modes(
-        at, load=LOAD, exact=True, method=method
+        at, load=LOAD, state="exact", method=method
     ),
 }
 
@@ -133,7 +133,7 @@ def test_both_methods_follow_a_load_through_a_contact(exact):
 
 def test_both_methods_find_the_same_modes_and_stiffness():
     one, other = (
-        natural_modes(beams(), load=LOAD, exact=True, method=method)
+        natural_modes(beams(), load=LOAD, state="exact", method=method)
         for method in METHODS
     )
     np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-6)

@@ -53,7 +53,7 @@ def questions(posture):
         lambda method: zone_margin([posture], method=method),
         lambda method: bound_pose_error(assembly, method=method),
         lambda method: bound_pose_error(many, method=method),
-        lambda method: platform_stiffness(posture, "in contact", method=method),
+        lambda method: platform_stiffness(posture, "contact", method=method),
         lambda method: platform_stiffness([posture], method=method),
     )
 

@@ -15,7 +15,7 @@ from stiffness.screws import WRENCH
 @pytest.fixture(scope="module")
 def data():
     return ff.sweep_in_memory(ff.ask_sweep("five_bar", ff.SweepOptions(
-        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", stiffness=True,
+        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", state="nominal",
         vary=["elbow.link.young=7e10,2.1e11"], wrench=("left.elbow", "right.elbow"),
     )))  # fmt: skip
 

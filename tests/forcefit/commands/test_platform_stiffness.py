@@ -62,11 +62,11 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        ["stiffness", "--exact", "--load", "fz=5"],
+        ["stiffness", "--state", "exact", "--load", "fz=5"],
         ["deflection", "--along", "fz=0:5:5"],
         ["deflection", "--along", "fz=0:5:5", "--exact"],
         ["deflection", "--along", "fz=0:5:5", "--follow"],
-        ["frequencies", "--exact", "--load", "fz=5"],
+        ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],
 )
 def test_a_load_that_nothing_resists_is_exit_1_with_the_motion_named(
@@ -86,7 +86,7 @@ def test_a_sweep_names_the_motion_that_is_free(tmp_path):
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
-        SweepOptions(grid="tz=0:0:1", reading="none", stiffness=True),
+        SweepOptions(grid="tz=0:0:1", reading="none", state="nominal"),
     )
     data = sweep_in_memory(asked).squeeze()
     assert str(data.reason.values) == (
@@ -116,7 +116,7 @@ def test_what_is_no_point_length_or_load_is_refused(run, option, message):
 def test_the_chart_is_written(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
-        "assembly", "stiffness", "irsbot2", "--exact", "--load", "fz=-100",
+        "assembly", "stiffness", "irsbot2", "--state", "exact", "--load", "fz=-100",
         "-o", str(picture),
     )  # fmt: skip
     assert picture.stat().st_size > 1000
@@ -163,7 +163,8 @@ def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
         "assembly",
         "stiffness",
         "four_bar",
-        "--exact",
+        "--state",
+        "exact",
         "--load",
         "fx=1e9",
         "--json",
@@ -179,7 +180,15 @@ def test_a_platform_pushed_through_its_legs_is_said_to_be_far(run):
     """By 10 MN, from 0.5 m below the base to above it; by 300 N by micrometres."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
         _, out, _ = run(
-            "assembly", "stiffness", "irsbot2", "--exact", "--load", load, "--json", "-"
+            "assembly",
+            "stiffness",
+            "irsbot2",
+            "--state",
+            "exact",
+            "--load",
+            load,
+            "--json",
+            "-",
         )
         found = json.loads(out)
         assert (found["point"][2] > 0) == far

@@ -1,0 +1,54 @@
+"""Old names of options: each works for one release, with a line on stderr.
+
+The commands themselves know the new names only; ``--help`` shows no others.
+"""
+
+import sys
+from collections.abc import Sequence
+
+# new words by command and old option; a value follows where the option takes one
+OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    "assembly stiffness": {"--exact": ("--state", "exact")},
+    "assembly frequencies": {"--exact": ("--state", "exact")},
+    "assembly sweep": {
+        "--stiffness": ("--state", "nominal"),
+        "--tangent": ("--state",),
+    },
+    "assembly statistics": {"--stiffness": ("--state",)},
+}
+
+
+def with_new_names(words: Sequence[str]) -> list[str]:
+    """Replace options given by their old names, each reported on stderr once.
+
+    Args:
+        words: of the command line, without the program's name.
+
+    Returns:
+        The words that the commands understand.
+    """
+    renamed = _renamed_options(words)
+    end = words.index("--") if "--" in words else len(words)
+    reported: list[str] = []
+    new_words: list[str] = []
+    for word in words[:end]:
+        option, equals, value = word.partition("=")
+        if option not in renamed:
+            new_words.append(word)
+            continue
+        new = renamed[option]
+        if option not in reported:
+            print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
+        reported.append(option)
+        new_words += [*new[:-1], new[-1] + equals + value]
+    return new_words + list(words[end:])
+
+
+def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Old options of the command that the first words name."""
+    renamed: dict[str, tuple[str, ...]] = {}
+    for command, options in OPTIONS.items():
+        path = command.split()
+        if list(words[: len(path)]) == path:
+            renamed |= options
+    return renamed

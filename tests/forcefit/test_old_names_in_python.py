@@ -1,0 +1,43 @@
+"""Public names, arguments and values of the last release: they work, with a warning."""
+
+import numpy as np
+import pytest
+
+import forcefit as ff
+
+LOAD = [0, 0, 0, 0, 0, -100.0]
+
+
+@pytest.fixture(scope="module")
+def posture():
+    return ff.home_posture(ff.load_robot("irsbot2"))
+
+
+@pytest.mark.parametrize("old", sorted(ff._RENAMED))
+def test_an_old_public_name_is_the_new_object(old):
+    _, new = ff._RENAMED[old]
+    with pytest.warns(FutureWarning, match=rf"forcefit\.{old} is now forcefit\.{new}"):
+        found = getattr(ff, old)
+    assert found is getattr(ff, new)
+    assert old not in ff.__all__
+    assert new in ff.__all__
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("without clearance", "nominal"), ("in contact", "contact")]
+)
+def test_an_old_state_is_the_new_one(posture, old, new):
+    with pytest.warns(FutureWarning, match=f"state='{old}' is now state='{new}'"):
+        found = ff.platform_stiffness(posture, old, LOAD)
+    expected = ff.platform_stiffness(posture, new, LOAD)
+    assert found.state == new
+    np.testing.assert_array_equal(found.compliance, expected.compliance)
+
+
+def test_modes_of_the_exact_state_by_the_old_flag():
+    posture = ff.home_posture(ff.load_robot("delta"))
+    with pytest.warns(FutureWarning, match="state='exact'") as caught:
+        found = ff.natural_modes(posture, 2, LOAD, exact=True)
+    assert caught[0].filename == __file__
+    expected = ff.natural_modes(posture, 2, LOAD, state="exact")
+    np.testing.assert_array_equal(found.frequencies, expected.frequencies)
