@@ -12,7 +12,7 @@ The same sweep on the command line, on two processes:
 
     forcefit assembly sweep hexapod --errors examples/hexapod_errors.toml --draws 10 \\
         --grid "tx=-0.05:0.05:0.025,ty=-0.05:0.05:0.025,tz=0.53,rx=0,ry=0,rz=0" \\
-        --vary ball_3.clearance.axial=8e-6,4e-6 --play-alone --workers 2 \\
+        --vary ball_3.clearance.axial=8e-6,4e-6 --clearance-alone --workers 2 \\
         -o hexapod.nc --figure hexapod.png
 """
 
@@ -43,7 +43,7 @@ def main():
             vary=[f"{CLEARANCE}=8e-6,4e-6"],
             errors=HERE / "hexapod_errors.toml",
             draws=options.draws,
-            play_alone=True,
+            clearance_alone=True,
         ),
     )
     run_sweep(asked, options.output)
@@ -66,7 +66,7 @@ def print_errors(clearance, data):
     )
     for part, factor, unit in (("translation", 1e6, "um"), ("rotation", 1e6, "urad")):
         share = factor * upper[f"{part}_error"].quantile(0.9, "draw")
-        alone = factor * upper[f"{part}_error_play"].isel(draw=0)
+        alone = factor * upper[f"{part}_error_clearance"].isel(draw=0)
         middle = share.sel(tx=0, ty=0, method="nearest")
         print(f"  {part:11s} 90 % below {float(middle):.0f} {unit} in the middle, "
               f"{float(share.max()):.0f} {unit} at the worst posture; "

@@ -32,8 +32,14 @@ ROWS = (
     ("energy", 1, "J", (1.1e-3, 3.36, 14.7), (3.2e-3, 17.3, 67.1)),
     ("rotation_error", 1e3, "mrad", (8.6, 12.7, 27.7), (24.5, 38.0, 66.3)),
     ("translation_error", 1e3, "mm", (0.235, 0.823, 2.60), (0.49, 2.24, 7.76)),
-    ("rotation_error_play", 1e3, "mrad", (1.53, 1.74, 3.54), (1.53, 1.74, 3.54)),
-    ("translation_error_play", 1e3, "mm", (0.293, 0.332, 0.732), (0.293, 0.332, 0.732)),
+    ("rotation_error_clearance", 1e3, "mrad", (1.53, 1.74, 3.54), (1.53, 1.74, 3.54)),
+    (
+        "translation_error_clearance",
+        1e3,
+        "mm",
+        (0.293, 0.332, 0.732),
+        (0.293, 0.332, 0.732),
+    ),
 )
 
 
@@ -53,7 +59,8 @@ def main():
         errors = draw_errors(robot, ErrorDraw(frames, LEAST, MOST, 1, signs))
         write_robot(robot.with_errors(errors), base.with_suffix(".toml"))
         asked = ask_sweep(
-            str(base.with_suffix(".toml")), SweepOptions(grid=grid, play_alone=True)
+            str(base.with_suffix(".toml")),
+            SweepOptions(grid=grid, clearance_alone=True),
         )
         run_sweep(asked, base.with_suffix(".nc"))
         data = open_dataset(base.with_suffix(".nc"))

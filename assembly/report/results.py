@@ -322,7 +322,7 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
 
 
 def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> str:
-    """How well the screw is known, and the certified largest error with play."""
+    """How well the screw is known, and the certified largest error with clearances."""
     turn, shift = 1e3 * bound["screw_rotation_error"], bound["screw_translation_error"]
     text = f"platform error proved to {turn:.1e} mrad, {1e6 * shift:.1e} um"
     loose = 1e3 * bound["screw_rotation_open"], 1e6 * bound["screw_translation_open"]

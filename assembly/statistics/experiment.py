@@ -70,7 +70,7 @@ class Experiment:
     def __post_init__(self) -> None:
         if self.clearance_model not in CLEARANCE_MODELS:
             raise ValueError(
-                f"play is {self.clearance_model!r}, expected one of "
+                f"clearance is {self.clearance_model!r}, expected one of "
                 f"{tuple(CLEARANCE_MODELS)}"
             )
         if self.contact_length is not None and not 0 < self.contact_length < np.inf:
@@ -129,7 +129,7 @@ class Experiment:
         if self.stiffness:
             shapes |= {"stiffness": (6,), "free_motion": (6, 6)}
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
-        flags = ["play_mixed"] if self.clearance_model == "uniform" else []
+        flags = ["clearance_mixed"] if self.clearance_model == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
@@ -187,7 +187,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
             if self.clearance_model == "uniform":
-                rows["play_mixed"] = mixed
+                rows["clearance_mixed"] = mixed
         rows["platform_screw"] = screws
         wrenches = without_rounding(solved.wrenches)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):

@@ -285,7 +285,7 @@ class Requirement:
                 raise BadInput(
                     f"limit {key}: even perfect parts reach {value:.4g} {unit} by "
                     f"clearances alone at {where}; expected at most {limits[key]:g} "
-                    f"{unit} (or --play least, if clearances stay as solved)"
+                    f"{unit} (or --clearance least, if clearances stay as solved)"
                 )
 
     def check_taken_up(self) -> None:

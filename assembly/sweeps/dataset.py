@@ -32,6 +32,12 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
+# names of variables and attributes in files of older releases, and the present ones
+_OLD_NAMES = {
+    "rotation_error_play": "rotation_error_clearance",
+    "translation_error_play": "translation_error_clearance",
+    "play_mixed": "clearance_mixed", "play": "clearance",
+}  # fmt: skip
 # blocks written together: a write takes as long as that of a hundred points
 _TOGETHER = 256
 
@@ -275,7 +281,15 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     forgive_damaged_files()
     check_heaps(path)
     try:
-        return xarray.load_dataset(path, engine="h5netcdf")
+        data = xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # of a damaged file HDF5 raises whatever it meets
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
+    return _with_new_names(data)
+
+
+def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
+    """A data set of an older release under the present names."""
+    old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
+    data.attrs = {_OLD_NAMES.get(str(k), k): v for k, v in data.attrs.items()}
+    return data.rename_vars(old)

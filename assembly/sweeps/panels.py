@@ -51,9 +51,9 @@ _PAPER = (
     Panel("energy", 1.0, "minimum assembly energy [J]", "inferno"),
     Panel("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
     Panel("translation", 1e3, "platform position error [mm]", "viridis"),
-    Panel("rotation_error_play.upper", 1e3,
+    Panel("rotation_error_clearance.upper", 1e3,
           "orientation error by clearances alone [mrad]", "viridis"),
-    Panel("translation_error_play.upper", 1e3,
+    Panel("translation_error_clearance.upper", 1e3,
           "position error by clearances alone [mm]", "viridis"),
 )  # fmt: skip
 _RIGID = Panel("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
@@ -67,7 +67,7 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     """The panels of a sweep's figure for which no quantity is named."""
-    if "rotation_error_play" in data:
+    if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
     if "frequency" in data:

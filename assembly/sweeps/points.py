@@ -344,10 +344,10 @@ def _bound_clearance_only(
     starts = [run.start for run in runs]
     bounds = bound_pose_error(solve_assembly(perfect[starts]), "frozen")
     for i, run in enumerate(runs):
-        solved.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
-        solved.records["translation_error_play"][rows[run]] = bounds.translation_error[
-            i
-        ]
+        solved.records["rotation_error_clearance"][rows[run]] = bounds.rotation_error[i]
+        solved.records["translation_error_clearance"][rows[run]] = (
+            bounds.translation_error[i]
+        )
         if bounds.status[i] != "ok":
             for row in rows[run].tolist():
                 reason = f"clearances alone: {bounds.reason[i]}"

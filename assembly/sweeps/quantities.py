@@ -210,7 +210,7 @@ def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
     if question.reading is not None:
         yield "", f", {question.reading}"
     if question.clearance_only:
-        yield "_play", ", frozen, by clearances alone: without errors"
+        yield "_clearance", ", frozen, by clearances alone: without errors"
 
 
 def record_type(question: Question) -> np.dtype:

@@ -54,7 +54,7 @@ class SweepOptions:
         draws: number of draws.
         seed: of the draws.
         reading: of problem (27), or ``"none"``.
-        play_alone: bound (27) also without errors.
+        clearance_alone: bound (27) also without errors.
         wrench: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
@@ -79,7 +79,7 @@ class SweepOptions:
     draws: int | None = None
     seed: int = 1
     reading: str = "frozen"
-    play_alone: bool = False
+    clearance_alone: bool = False
     wrench: Sequence[str] = ()
     linearisation: bool = False
     near: float = 0.02
@@ -133,7 +133,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         sources=sources,
         seed=options.seed,
         reading=None if options.reading == "none" else options.reading,
-        clearance_only=options.play_alone,
+        clearance_only=options.clearance_alone,
         wrenches=tuple(options.wrench),
         linearisation=options.linearisation,
         near=options.near,
@@ -213,7 +213,7 @@ def _check_readings(question: Question) -> None:
         raise BadInput(
             "--reading: the robot is loaded (--load, --gravity or an effect), and the "
             "bounds of the pose error are those of an unloaded one; expected "
-            "--reading none, and no --play-alone"
+            "--reading none, and no --clearance-alone"
         )
 
 

@@ -13,8 +13,11 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly sweep": {
         "--stiffness": ("--state", "nominal"),
         "--tangent": ("--state",),
+        "--play-alone": ("--clearance-alone",),
     },
-    "assembly statistics": {"--stiffness": ("--state",)},
+    "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
+    "assembly tolerances": {"--play": ("--clearance",)},
+    "validation crosscheck": {"--clearances": ("--with-clearance",)},
 }
 
 

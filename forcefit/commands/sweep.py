@@ -86,8 +86,9 @@ def sweep(
     reading: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
-    play_alone: Annotated[
-        bool, typer.Option("--play-alone", help="The pose error also without errors.")
+    clearance_alone: Annotated[
+        bool,
+        typer.Option("--clearance-alone", help="The pose error also without errors."),
     ] = False,
     wrench_of: Annotated[
         list[str] | None, typer.Option(help="A frame whose wrench is kept.")
@@ -160,7 +161,7 @@ def sweep(
             robot,
             SweepOptions(
                 grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-                seed=seed, reading=reading, play_alone=play_alone,
+                seed=seed, reading=reading, clearance_alone=clearance_alone,
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, state=state,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import forcefit as ff
 
@@ -41,3 +42,13 @@ def test_modes_of_the_exact_state_by_the_old_flag():
     assert caught[0].filename == __file__
     expected = ff.natural_modes(posture, 2, LOAD, state="exact")
     np.testing.assert_array_equal(found.frequencies, expected.frequencies)
+
+
+def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
+    variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
+    old = xarray.Dataset(variables, attrs={"play": "worst", "near": 0.02})
+    old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    data = ff.open_dataset(tmp_path / "old.nc")
+    assert sorted(data) == ["energy", "translation_error_clearance"]
+    assert data.translation_error_clearance.values.tolist() == [1.0, 2.0]
+    assert data.attrs == {"clearance": "worst", "near": 0.02}

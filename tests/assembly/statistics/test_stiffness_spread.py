@@ -94,7 +94,7 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     errors = tmp_path / "errors.toml"
     errors.write_text(ERRORS)
     words = ["assembly", "statistics", "irsbot2", "--errors", str(errors), "--pose",
-             "tx=0.1,tz=-0.5", "--draws", "20", "--no-margins", "--play", "least",
+             "tx=0.1,tz=-0.5", "--draws", "20", "--no-margins", "--clearance", "least",
              "--state"]  # fmt: skip
     file = tmp_path / "draws.nc"
     status, out, _ = run(*words, "contact", "-o", str(file), "--json", "-")

@@ -296,7 +296,7 @@ def test_block_size_changes_no_number():
     one = sweep_in_memory(small)
     other = sweep_in_memory(replace(small, block_size=15))
     assert one.identical(other)
-    assert np.isfinite(one.rotation_error_play).any()
+    assert np.isfinite(one.rotation_error_clearance).any()
 
 
 @pytest.mark.slow

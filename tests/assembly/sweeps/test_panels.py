@@ -106,5 +106,5 @@ def arm_draws(rng):
             "platform_screw": (("draw", "screw"), screw, {"units": "rad, m"}),
         },
         {"screw": ["RX", "RY", "RZ", "TX", "TY", "TZ"]},
-        {"play": "least", "sources_and_posture_sha256": "0"},
+        {"clearance": "least", "sources_and_posture_sha256": "0"},
     )  # fmt: skip

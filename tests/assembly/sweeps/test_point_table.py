@@ -121,7 +121,7 @@ def test_draws_and_importance_have_tables_of_their_own(run, tmp_path, monkeypatc
     )
     status, *_ = run(
         "assembly", "statistics", "five_bar", "--errors", "errors.toml", "--pose",
-        "tx=0,ty=0.13", "--draws", 20, "--importance", 16, "--play", "least",
+        "tx=0,ty=0.13", "--draws", 20, "--importance", 16, "--clearance", "least",
         "-o", "d.nc", "--csv", "d.csv",
     )  # fmt: skip
     assert status == 0

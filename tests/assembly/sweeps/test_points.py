@@ -73,13 +73,13 @@ def test_bounds_and_finite_motions_are_those_of_one_posture(robot, data):
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_play_alone_is_symmetric_where_the_robot_is(data):
+def test_clearance_alone_is_symmetric_where_the_robot_is(data):
     """Without errors x and -x are one: within the bounds' own gap of 1e-6."""
-    for name in ("rotation_error_play", "translation_error_play"):
+    for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
         assert values == pytest.approx(values[::-1], abs=2e-6)
         assert values == pytest.approx(data[name].sel(bound="lower").values, abs=2e-6)
-    assert (data.rotation_error_play < data.rotation_error).all()
+    assert (data.rotation_error_clearance < data.rotation_error).all()
 
 
 def test_a_design_that_varies_is_that_robot_bit_for_bit():
@@ -229,7 +229,7 @@ def test_figures_need_only_the_data_set(tmp_path):
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
     asked = ask_sweep(
         "five_bar",
-        SweepOptions(grid=grid, errors=path, draws=3, near=0.6, play_alone=True),
+        SweepOptions(grid=grid, errors=path, draws=3, near=0.6, clearance_alone=True),
     )
     data = sweep_in_memory(asked)
     figure = figure_of(data)

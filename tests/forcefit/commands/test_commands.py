@@ -294,7 +294,7 @@ def test_the_version_is_that_of_the_package(run):
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [("forcefit asse", "assembly"), ("forcefit assembly so", "solve"),
-     ("forcefit validation crosscheck --clear", "--clearances"),
+     ("forcefit validation crosscheck --with", "--with-clearance"),
      ("forcefit assembly zone arm", "arm6")],
 )  # fmt: skip
 def test_a_shell_completes_commands_options_and_robots(typed, offered):

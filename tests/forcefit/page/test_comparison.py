@@ -9,7 +9,8 @@ from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse
 
 BEFORE = {
-    "title": "robot", "worst_play": {"pose": {"translation": 8e-4, "rotation": 0.0}},
+    "title": "robot",
+    "worst_clearance": {"pose": {"translation": 8e-4, "rotation": 0.0}},
     "passed": True, "certificate": {"gap": 1e-12},
     "governing": [
         {"part": "a", "what": "clearance", "translation": 7e-4},
@@ -17,7 +18,8 @@ BEFORE = {
     ],
 }  # fmt: skip
 AFTER = {
-    "title": "robot", "worst_play": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
+    "title": "robot",
+    "worst_clearance": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
     "passed": False, "certificate": {"gap": 3e-12}, "new": 1,
     # another order, the same parts
     "governing": [

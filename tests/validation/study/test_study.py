@@ -107,7 +107,7 @@ def test_the_figures_on_the_page_are_the_results(results):
     outcome, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     table = json.loads((folder / "results.json").read_text())
-    worst = table["worst_play"]["pose"]
+    worst = table["worst_clearance"]["pose"]
     tile = [number.value for number in seen.numbers[:2]]
     assert tile == [worst["translation"], worst["rotation"]]
     assert seen.numbers[0].text == "0.794 mm"  # of the 0.7943345850 mm in the README
