@@ -37,7 +37,7 @@ _UNSTABLE = "the potential falls along a motion, as beyond a critical load"
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Margins of (21) in both readings of compliant joints, as plain values."""
+    """Margins of (21), compliant joints held and free, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -302,7 +302,7 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Certified bounds of the largest pose error, reading ``frozen`` of (27).
+    """Certified bounds of the largest pose error, assumption ``frozen`` of (27).
 
     Args:
         assembly: at least energy.
@@ -316,7 +316,7 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
     except (FreeMotion, SolverFailed):
         return None
     return {
-        "reading": "frozen", "rotation": bound.rotation_error[1],
+        "assumption": "frozen", "rotation": bound.rotation_error[1],
         "translation": bound.translation_error[1],
     }  # fmt: skip
 
@@ -334,7 +334,7 @@ def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> 
     turn, shift = largest["rotation"], largest["translation"]
     return (
         f"{text}at most {1e3 * turn:.3g} mrad, {1e6 * shift:.4g} um from nominal "
-        "(certified, reading frozen of assembly error)"
+        "(certified, assumption frozen of assembly error)"
     )
 
 

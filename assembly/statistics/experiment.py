@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import MARGIN_READINGS
+from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.clearance_positions import (
@@ -100,7 +100,7 @@ class Experiment:
         """The posture prepared for (21), by quantity."""
         if not self.margins:
             return {}
-        return {k: prepare_margins(self.posture, r) for k, r in MARGIN_READINGS.items()}
+        return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
 
     @cached_property
     def links(self) -> tuple[str, ...]:

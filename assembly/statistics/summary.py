@@ -60,7 +60,8 @@ def summarise(
     Returns:
         ``draws`` and how many of them are ``assembled``; ``clearance``, what it means
         and its ``contact_length`` [m];
-        ``assembles`` (with any energy, rigidly in both readings), ``exceeds`` and
+        ``assembles`` (with any energy, rigidly with compliant joints held or free),
+        ``exceeds`` and
         ``within_limits`` with the probabilities among all draws; what perfect parts
         reach (``perfect_parts``) and which limits they break; mean, quantiles and
         most probable value of every quantity among those that assemble, of margins

@@ -96,7 +96,7 @@ def present_errors(
 
     Args:
         postures: of a robot with errors.
-        compliant: ``"free"`` or ``"rigid"``, reading of compliant joints.
+        compliant: ``"free"`` or ``"rigid"``, about the own axis of compliant joints.
         progress: called with postures done and their number.
 
     Returns:

@@ -32,12 +32,13 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
-# names of variables and attributes in files of older releases, and the present ones
+# names in files of older releases, and the present ones
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
-    "play_mixed": "clearance_mixed", "play": "clearance",
-}  # fmt: skip
+    "play_mixed": "clearance_mixed",
+}
+_OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
 # blocks written together: a write takes as long as that of a hundred points
 _TOGETHER = 256
 
@@ -291,5 +292,5 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
     """A data set of an older release under the present names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
-    data.attrs = {_OLD_NAMES.get(str(k), k): v for k, v in data.attrs.items()}
+    data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

@@ -16,7 +16,7 @@ from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.zone import MARGIN_READINGS, zone_margin
+from assembly.linear.zone import MARGINS, zone_margin
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses, stressed_links
@@ -211,7 +211,7 @@ def _solve_reached(
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     there = replace(conditions.postures, robot=robot)
     failed: dict[int, str] = {}
-    for key, compliant in MARGIN_READINGS.items():
+    for key, compliant in MARGINS.items():
         zone = zone_margin(there, compliant, errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.unproved) if r} | failed
@@ -238,8 +238,8 @@ def _solve_reached(
         _record_wrenches(question, robot, wrenches[ok], own[ok], solved, rows_ok)
     if question.clearance_only:
         _bound_clearance_only(replace(there, robot=perfect), solved, rows)
-    if question.reading is not None and ok:
-        bounds = bound_pose_error(energies, question.reading)
+    if question.assumption is not None and ok:
+        bounds = bound_pose_error(energies, question.assumption)
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
         tangents = replace(conditions, robot=robot)

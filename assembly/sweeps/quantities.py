@@ -41,7 +41,7 @@ class Question:
         components: of the postures, see :mod:`assembly.sweeps.targets`.
         sources: of drawn errors; None for the robot's own.
         seed: of the draws.
-        reading: of problem (27), or None to leave its bounds out.
+        assumption: of problem (27), or None to leave its bounds out.
         clearance_only: bound (27) also for the robot without errors.
         wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -61,7 +61,7 @@ class Question:
     components: tuple[str, ...] = ()
     sources: "ErrorSources | None" = None
     seed: int = 0
-    reading: str | None = None
+    assumption: str | None = None
     clearance_only: bool = False
     wrenches: tuple[str, ...] = ()
     linearisation: bool = False
@@ -207,8 +207,8 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
     """Suffix and meaning of each pair of bounds asked for."""
-    if question.reading is not None:
-        yield "", f", {question.reading}"
+    if question.assumption is not None:
+        yield "", f", {question.assumption}"
     if question.clearance_only:
         yield "_clearance", ", frozen, by clearances alone: without errors"
 

@@ -13,7 +13,7 @@ from assembly.effects.robot_effects import check_covariates
 from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.reference.pose_error import READINGS
+from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import check_masses
@@ -53,7 +53,7 @@ class SweepOptions:
         errors: file that says how errors are distributed, see docs/statistics.md.
         draws: number of draws.
         seed: of the draws.
-        reading: of problem (27), or ``"none"``.
+        assumption: of problem (27), or ``"none"``.
         clearance_alone: bound (27) also without errors.
         wrench: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -78,7 +78,7 @@ class SweepOptions:
     errors: Path | str | None = None
     draws: int | None = None
     seed: int = 1
-    reading: str = "frozen"
+    assumption: str = "frozen"
     clearance_alone: bool = False
     wrench: Sequence[str] = ()
     linearisation: bool = False
@@ -132,7 +132,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         components=targets.names,
         sources=sources,
         seed=options.seed,
-        reading=None if options.reading == "none" else options.reading,
+        assumption=None if options.assumption == "none" else options.assumption,
         clearance_only=options.clearance_alone,
         wrenches=tuple(options.wrench),
         linearisation=options.linearisation,
@@ -144,7 +144,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         stiffness=options.state or "",
         frequencies=options.frequencies or 0,
     )
-    _check_readings(question)
+    _check_assumption(question)
     command = _command(robot, options)
     return Sweep(question, targets, tuple(varied.values()), options.draws or 0, command)
 
@@ -153,10 +153,11 @@ def _check(options: SweepOptions, machine: Robot) -> None:
     """Refuse options that contradict each other or the robot."""
     if (options.grid is None) == (options.poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
-    reading, near, strength = options.reading, options.near, options.yield_strength
-    if reading not in (*READINGS, "none"):
-        hint = nearest(reading, [*READINGS, "none"])
-        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
+    assumption, near = options.assumption, options.near
+    strength = options.yield_strength
+    if assumption not in (*ASSUMPTIONS, "none"):
+        hint = nearest(assumption, [*ASSUMPTIONS, "none"])
+        raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
     if not 0 <= near <= 1:
         raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
     for name in options.wrench:
@@ -204,16 +205,16 @@ def _short(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _check_readings(question: Question) -> None:
+def _check_assumption(question: Question) -> None:
     """Refuse bounds of the pose error of a loaded robot: (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
-    if is_loaded(home) and (question.reading or question.clearance_only):
+    if is_loaded(home) and (question.assumption or question.clearance_only):
         raise BadInput(
-            "--reading: the robot is loaded (--load, --gravity or an effect), and the "
-            "bounds of the pose error are those of an unloaded one; expected "
-            "--reading none, and no --clearance-alone"
+            "--assumption: the robot is loaded (--load, --gravity or an effect), and "
+            "the bounds of the pose error are those of an unloaded one; expected "
+            "--assumption none, and no --clearance-alone"
         )
 
 

@@ -8,12 +8,15 @@ from collections.abc import Sequence
 
 # new words by command and old option; a value follows where the option takes one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    "assembly error": {"--reading": ("--assumption",)},
+    "assembly show": {"--reading": ("--assumption",)},
     "assembly stiffness": {"--exact": ("--state", "exact")},
     "assembly frequencies": {"--exact": ("--state", "exact")},
     "assembly sweep": {
         "--stiffness": ("--state", "nominal"),
         "--tangent": ("--state",),
         "--play-alone": ("--clearance-alone",),
+        "--reading": ("--assumption",),
     },
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
     "assembly tolerances": {"--play": ("--clearance",)},

@@ -83,7 +83,7 @@ def sweep(
         typer.Option(help="Draws of errors at each point.", min=1, max=10**9),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
-    reading: Annotated[
+    assumption: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
     clearance_alone: Annotated[
@@ -161,7 +161,7 @@ def sweep(
             robot,
             SweepOptions(
                 grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-                seed=seed, reading=reading, clearance_alone=clearance_alone,
+                seed=seed, assumption=assumption, clearance_alone=clearance_alone,
                 wrench=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, state=state,

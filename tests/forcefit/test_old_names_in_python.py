@@ -46,9 +46,20 @@ def test_modes_of_the_exact_state_by_the_old_flag():
 
 def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
     variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
-    old = xarray.Dataset(variables, attrs={"play": "worst", "near": 0.02})
+    old = xarray.Dataset(variables, attrs={"play": "worst", "reading": "free"})
     old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
     data = ff.open_dataset(tmp_path / "old.nc")
     assert sorted(data) == ["energy", "translation_error_clearance"]
     assert data.translation_error_clearance.values.tolist() == [1.0, 2.0]
-    assert data.attrs == {"clearance": "worst", "near": 0.02}
+    assert data.attrs == {"clearance": "worst", "assumption": "free"}
+
+
+def test_a_pose_error_by_the_old_word_for_its_assumption(posture):
+    forced = ff.solve_assembly(posture)
+    with pytest.warns(FutureWarning, match="bound_pose_error.assumption='free'"):
+        found = ff.bound_pose_error(forced, reading="free")
+    expected = ff.bound_pose_error(forced, assumption="free")
+    assert found.assumption == "free"
+    with pytest.warns(FutureWarning, match=r"is now PoseError\.assumption"):
+        assert found.reading == "free"
+    np.testing.assert_array_equal(found.rotation_error, expected.rotation_error)

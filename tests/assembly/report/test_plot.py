@@ -73,8 +73,8 @@ def test_the_picture_shows_the_axes_of_driven_and_passive_joints():
     ("words", "message"),
     [
         (["-o", "x.xyz"], 'x.xyz: found the ending ".xyz", expected a picture: .png'),
-        (["-o", "x.png", "--load", "fx=1", "--error-body", "translation", "--reading",
-          "budget"], "--reading: found budget with --load"),
+        (["-o", "x.png", "--load", "fx=1", "--error-body", "translation",
+          "--assumption", "budget"], "--assumption: found budget with --load"),
         (["-o", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
         (["-o", "x.png", "--exaggeration", "1e300"], "--exaggeration: found 1e+300"),
     ],

@@ -63,7 +63,7 @@ def test_table_of_a_robot_without_joints_has_its_rows(tmp_path):
         'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
         "translation = [1.0, 0, 0]\n"
     )
-    options = ff.SweepOptions(grid="tx=1", reading="none")
+    options = ff.SweepOptions(grid="tx=1", assumption="none")
     data = ff.sweep_in_memory(ff.ask_sweep(tmp_path / "bar.toml", options))
     assert list(ff.point_table(data)["energy", ""]) == [0.0]
 

@@ -43,7 +43,7 @@ def data(robot):
     """Everything that can be asked for, at six postures."""
     axes = parse_grid(GRID)
     question = Question(
-        robot, None, (), tuple(axes), reading="free", clearance_only=True,
+        robot, None, (), tuple(axes), assumption="free", clearance_only=True,
         wrenches=("leg1.link_a", "leg2.elbow_b_first"), linearisation=True,
     )  # fmt: skip
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
@@ -85,7 +85,8 @@ def test_clearance_alone_is_symmetric_where_the_robot_is(data):
 def test_a_design_that_varies_is_that_robot_bit_for_bit():
     path = "link_a.link.beam.radius"
     asked = ask_sweep(
-        "irsbot2", SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], reading="none")
+        "irsbot2",
+        SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none"),
     )
     data = sweep_in_memory(asked)
     assert data.energy.dims == (path, "tx", "tz")
@@ -111,7 +112,7 @@ def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
     for i in range(3):
         one = sweep_poses(
             robot.with_errors(errors[i]), parse_grid("tx=0:0.02:0.02,ty=0.14"),
-            reading="frozen",
+            assumption="frozen",
         )  # fmt: skip
         there = data.isel(draw=i)
         for name in ("margin", "margin_free", "energy", "rotation_error"):
@@ -129,7 +130,7 @@ def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
     (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
     asked = ask_sweep(
         str(tmp_path / "robot.toml"),
-        SweepOptions(poses=tmp_path / "path.csv", reading="none"),
+        SweepOptions(poses=tmp_path / "path.csv", assumption="none"),
     )
     found = sweep_in_memory(asked)
     assert found.energy.dims == ("posture",)
@@ -162,7 +163,7 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     asked = ask_sweep(
         "irsbot2",
         SweepOptions(
-            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], reading="none"
+            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], assumption="none"
         ),
     )
     data = sweep_in_memory(asked).squeeze()
@@ -200,7 +201,8 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
     ("options", "message"),
     [
         ({}, "sweep: expected --grid or --poses, one of them"),
-        ({"grid": "tx=0", "reading": "fozen"}, '--reading: found "fozen"; did you'),
+        ({"grid": "tx=0", "assumption": "fozen"},
+         '--assumption: found "fozen"; did you'),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius"]},
          '--vary: found "link_a.link.beam.radius", expected PATH=VALUE,..'),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03,-1"]},

@@ -18,7 +18,9 @@ def test_each_point_has_the_stiffness_of_its_posture():
         ask_sweep(
             "irsbot2",
             SweepOptions(
-                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1", reading="none", state="nominal"
+                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
+                assumption="none",
+                state="nominal",
             ),
         )
     )
@@ -50,7 +52,7 @@ def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
             SweepOptions(
                 grid="tx=0,tz=-0.5",
                 vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
-                reading="none",
+                assumption="none",
                 state="nominal",
             ),
         )
@@ -66,7 +68,7 @@ LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
     """Of its own errors and of draws; loads and draws change it, the classical not."""
     options = SweepOptions(
-        grid="tx=0.1,tz=-0.5", reading="none", state=state, load=LOAD,
+        grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],
     )  # fmt: skip
     data = sweep_in_memory(ask_sweep("irsbot2", options)).squeeze()
@@ -87,7 +89,7 @@ def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
 
 def test_a_tangent_names_the_motions_that_nothing_resists():
     data = sweep_in_memory(
-        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", reading="none",
+        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", assumption="none",
                                           state="contact", load=LOAD))
     )  # fmt: skip
     assert "nothing resists the platform's motion" in str(data.reason.values.ravel()[0])
@@ -95,6 +97,6 @@ def test_a_tangent_names_the_motions_that_nothing_resists():
 
 
 def test_a_wrong_state_is_refused():
-    options = SweepOptions(grid="tx=0,tz=-0.5", reading="none", state="exakt")
+    options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
     with pytest.raises(BadInput, match='--state: found "exakt"'):
         ask_sweep("irsbot2", options)

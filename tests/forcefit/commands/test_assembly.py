@@ -21,7 +21,7 @@ ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
 def test_a_point_of_the_platform_and_a_direction(run):
     status, out, _ = run(
-        "assembly", "error", *ROBOT, "--reading", "free", "--point", "x=0.1,z=-0.05",
+        "assembly", "error", *ROBOT, "--assumption", "free", "--point", "x=0.1,z=-0.05",
         "--direction", "tx=1,tz=-1", "--json", "-",
     )  # fmt: skip
     assert status == 0
@@ -109,9 +109,9 @@ mass = 3.0
     sag = 2e-5 + (20 + 3.0 * 10) / 1e6
     screw = json.loads(out)["platform_screw"]
     assert screw[5] == pytest.approx(-sag, rel=1e-9)
-    status, out, err = run(*words, "--reading", "budget")
+    status, out, err = run(*words, "--assumption", "budget")
     assert (status, out) == (2, "")
-    assert "reading budget: found a load; expected frozen or free" in err
+    assert "assumption budget: found a load; expected frozen or free" in err
 
 
 HINGE = """
@@ -141,7 +141,7 @@ def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
     assert free.startswith("free    no answer: the load drives a motion")
     _, out, _ = run("assembly", "error", file, "--load", "mz=0.1", "--json", "-")
     assert json.loads(out)["error"]["free"]["rotation"] is None
-    _, out, _ = run("assembly", "error", file, "--reading", "free")
+    _, out, _ = run("assembly", "error", file, "--assumption", "free")
     assert "rotation without bound, translation 0.0360555 to" in out
 
 

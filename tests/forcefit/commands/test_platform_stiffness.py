@@ -86,7 +86,7 @@ def test_a_sweep_names_the_motion_that_is_free(tmp_path):
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
-        SweepOptions(grid="tz=0:0:1", reading="none", state="nominal"),
+        SweepOptions(grid="tz=0:0:1", assumption="none", state="nominal"),
     )
     data = sweep_in_memory(asked).squeeze()
     assert str(data.reason.values) == (

@@ -332,7 +332,7 @@ def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypat
 def test_sweep_says_that_frequencies_leave_load_and_gravity_out(
     run, tmp_path, words, said
 ):
-    grid = ["--grid", "tx=0,ty=0.13", "--reading", "none", "--frequencies", "1"]
+    grid = ["--grid", "tx=0,ty=0.13", "--assumption", "none", "--frequencies", "1"]
     target = ["-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", "five_bar", *grid, *words, *target)
     assert status == 0

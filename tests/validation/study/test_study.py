@@ -290,7 +290,7 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     sentences = verdict(results)
     assert f"at most {1e3 * bound:.3g} mm" in sentences
     assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in sentences
-    assert "certified bounds of (27), reading frozen" in sentences
+    assert "certified bounds of (27), assumption frozen" in sentences
     assert "with clearances resting at least energy it is 0 mm" in sentences
     lost = verdict(replace(results, error={}, maps=None))
     assert "could not be bounded; with clearances resting at least energy" in lost
