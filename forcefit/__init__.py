@@ -73,7 +73,7 @@ _OWNERS = {
     "stiffness.surface.interface": ("Interface", "parse_interface"),
     "assembly.exact.exact": ("solve_exact",),
     "assembly.exchange.convert": ("convert",),
-    "assembly.exchange.robot_files": ("load_robot", "read_robot", "write_robot"),
+    "assembly.exchange.robot_files": ("load_robot", "write_robot"),
     "assembly.kinematics.closing": ("preloaded", "rest_in"),
     "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
     "assembly.kinematics.singular_posture": ("is_singular",),
@@ -83,7 +83,7 @@ _OWNERS = {
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
     "assembly.model.random_errors": ("draw_errors",),
-    "assembly.platform_stiffness.deflection": ("load_deflection",),
+    "assembly.platform_stiffness.deflection": ("deflection_curve",),
     "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
@@ -102,7 +102,7 @@ _OWNERS = {
     "validation.assumptions.assumptions": ("assumption_costs",),
     "validation.campaign.campaign_file": ("read_campaign", "read_commands"),
     "validation.correction.compensation": ("compensate",),
-    "validation.correction.prediction": ("foretell",),
+    "validation.correction.prediction": ("predict",),
     "validation.crosscheck.crosscheck": ("crosscheck",),
     "validation.diagnosis.diagnose": ("diagnose",),
     "validation.inspection.inspection": ("inspect_campaign",),
@@ -111,7 +111,11 @@ _OWNERS = {
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
 # module and name of what an old public name means; each works for one release
-_RENAMED: dict[str, tuple[str, str]] = {}
+_RENAMED = {
+    "foretell": ("validation.correction.prediction", "predict"),
+    "load_deflection": ("assembly.platform_stiffness.deflection", "deflection_curve"),
+    "read_robot": ("assembly.exchange.robot_files", "load_robot"),
+}
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 

@@ -115,7 +115,7 @@ Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
-def load_deflection(
+def deflection_curve(
     posture: Posture,
     component: int,
     loads: Sequence[float],
@@ -152,7 +152,7 @@ def load_deflection(
     check_method(method)
     if component not in range(6) or not len(loads):
         raise BadInput(
-            f"load_deflection: found component {component} and {len(loads)} loads, "
+            f"deflection_curve: found component {component} and {len(loads)} loads, "
             "expected one of 0 to 5 and at least one load"
         )
     rest = np.zeros(6) if load is None else numbers_of("load", load, 6, "N m, N")

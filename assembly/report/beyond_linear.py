@@ -1,4 +1,4 @@
-"""What is said of an exact equilibrium that the linear model does not foretell."""
+"""Remarks on an exact equilibrium that the linear model does not predict."""
 
 import numpy as np
 

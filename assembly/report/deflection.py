@@ -13,7 +13,7 @@ from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import (
     DeflectionCurve,
     Progress,
-    load_deflection,
+    deflection_curve,
 )
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
@@ -64,7 +64,7 @@ def deflection_of(
                 progress,
             )  # fmt: skip
         else:
-            curve = load_deflection(
+            curve = deflection_curve(
                 posture, component, loads, load, gravity, exact, progress
             )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

@@ -3,10 +3,10 @@
 The assumption is ``frozen``: all springs as in the solution of (22), all clearances
 that carry no load anywhere within their bounds.  By strict convexity every solution of
 (22) has the same springs, and by complementary slackness the same loaded clearances.
-So this is the set of *all* solutions of (22), inside a zone and outside.  The positions of
-the uniform and the contact model and the solver's own solution are points of it.  The
-other assumptions change the robot: ``free`` lets compliant joints turn without energy,
-``budget`` lets parts store more energy than the least.
+So this is the set of *all* solutions of (22), inside a zone and outside.  The positions
+of the uniform and the contact model and the solver's own solution are points of it.
+The other assumptions change the robot: ``free`` lets compliant joints turn without
+energy, ``budget`` lets parts store more energy than the least.
 
 Under a load the same holds for energy minus work: only clearances that no load holds
 are free.
