@@ -19,10 +19,7 @@ The same sweep on the command line, on two processes:
 import argparse
 from pathlib import Path
 
-from assembly.sweeps.dataset import open_dataset
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import run_sweep
+import forcefit as ff
 
 HERE = Path(__file__).parent
 CLEARANCE = "ball_3.clearance.axial"
@@ -36,24 +33,21 @@ def main():
     parser.add_argument("-o", "--output", type=Path, default=Path("hexapod.nc"))
     options = parser.parse_args()
     square = ",".join(f"{axis}=-0.05:0.05:{options.step}" for axis in ("tx", "ty"))
-    asked = ask_sweep(
+    data = ff.sweep(
         "hexapod",
-        SweepOptions(
-            grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
-            vary=[f"{CLEARANCE}=8e-6,4e-6"],
-            errors=HERE / "hexapod_errors.toml",
-            draws=options.draws,
-            clearance_alone=True,
-        ),
-    )
-    run_sweep(asked, options.output)
-    data = open_dataset(options.output).squeeze()
+        grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
+        vary=[f"{CLEARANCE}=8e-6,4e-6"],
+        errors=HERE / "hexapod_errors.toml",
+        draws=options.draws,
+        clearance_alone=True,
+        output=options.output,
+    ).squeeze()
     for place, part in data.groupby(CLEARANCE):
         print_errors(float(place), part.squeeze())
     near = data["singular_distance"].min(["tx", "ty", "draw", CLEARANCE])
     said = ", ".join(f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values)
     print(f"least distances to singularities in the square: {said}")
-    figure = figure_of(data, {CLEARANCE: 8e-6})
+    figure = ff.figure_of(data, {CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 
 

@@ -13,14 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+import forcefit as ff
 from assembly.files.robot_file import write_robot
 from assembly.linear.zone import ASSEMBLABLE
 from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_named
 from assembly.robots import load_robot
-from assembly.sweeps.dataset import open_dataset
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import run_sweep
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
 LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] the paper's section IV
@@ -58,13 +55,11 @@ def main():
         base = options.output / f"figure5_{signs}"
         errors = draw_errors(robot, ErrorDraw(frames, LEAST, MOST, 1, signs))
         write_robot(robot.with_errors(errors), base.with_suffix(".toml"))
-        asked = ask_sweep(
-            str(base.with_suffix(".toml")),
-            SweepOptions(grid=grid, clearance_alone=True),
-        )
-        run_sweep(asked, base.with_suffix(".nc"))
-        data = open_dataset(base.with_suffix(".nc"))
-        figure_of(data).savefig(base.with_suffix(".png"), dpi=150)
+        data = ff.sweep(
+            base.with_suffix(".toml"), grid=grid, clearance_alone=True,
+            output=base.with_suffix(".nc"),
+        )  # fmt: skip
+        ff.figure_of(data).savefig(base.with_suffix(".png"), dpi=150)
         print_table(signs, data, column)
 
 

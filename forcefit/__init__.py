@@ -97,8 +97,7 @@ _OWNERS = {
     "assembly.sweeps.dataset": ("open_dataset",),
     "assembly.sweeps.maps": ("figure_of",),
     "assembly.sweeps.point_table": ("point_table",),
-    "assembly.sweeps.request": ("SweepOptions", "ask_sweep"),
-    "assembly.sweeps.sweep": ("run_sweep", "sweep_in_memory"),
+    "assembly.sweeps.robot_sweep": ("sweep",),
     "validation.assumptions.assumptions": ("assumption_costs",),
     "validation.campaign.campaign_file": ("read_campaign", "read_commands"),
     "validation.correction.compensation": ("compensate",),
@@ -110,12 +109,16 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
-# module and name of what an old public name means; each works for one release
+# public names of the last release, which work in this one: the new public name; and
+# module and name of the object, where that is another
 _RENAMED = {
-    "foretell": ("validation.correction.prediction", "predict"),
-    "load_deflection": ("assembly.platform_stiffness.deflection", "deflection_curve"),
-    "read_robot": ("assembly.exchange.robot_files", "load_robot"),
-}
+    "foretell": ("predict",), "load_deflection": ("deflection_curve",),
+    "read_robot": ("load_robot",),
+    "SweepOptions": ("sweep", "assembly.sweeps.robot_sweep", "options_by_old_names"),
+    "ask_sweep": ("sweep", "assembly.sweeps.request", "ask_sweep"),
+    "run_sweep": ("sweep", "assembly.sweeps.sweep", "run_sweep"),
+    "sweep_in_memory": ("sweep", "assembly.sweeps.sweep", "sweep_in_memory"),
+}  # fmt: skip
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 
@@ -132,9 +135,10 @@ def __getattr__(name: str) -> object:
         return getattr(import_module(_OWNER_OF[name]), name)
     from warnings import warn
 
-    owner, new = _RENAMED[name]
+    new, *place = _RENAMED[name]
     warn(f"forcefit.{name} is now forcefit.{new}", FutureWarning, stacklevel=2)
-    return getattr(import_module(owner), new)
+    owner, attribute = place or (_OWNER_OF[new], new)
+    return getattr(import_module(owner), attribute)
 
 
 def __dir__() -> list[str]:

@@ -24,8 +24,7 @@ from assembly.statistics.summary import summarise
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.point_table import point_table
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import run_sweep, sweep_in_memory
+from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import Section, rectangular_section, round_section
@@ -64,9 +63,7 @@ __all__ = [
     "Posture",
     "Robot",
     "Section",
-    "SweepOptions",
     "allocate",
-    "ask_sweep",
     "assumption_costs",
     "beam_compliance",
     "bound_pose_error",
@@ -103,11 +100,10 @@ __all__ = [
     "round_section",
     "run_draws",
     "run_study",
-    "run_sweep",
     "solve_assembly",
     "solve_exact",
     "summarise",
-    "sweep_in_memory",
+    "sweep",
     "turn_link",
     "write_robot",
     "write_study",

@@ -44,33 +44,7 @@ _MODES = 100  # natural frequencies at most
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of ``forcefit assembly sweep``, by their names.
-
-    Attributes:
-        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
-        poses: a table of postures.
-        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``.
-        errors: file that says how errors are distributed, see docs/statistics.md.
-        draws: number of draws.
-        seed: of the draws.
-        assumption: of problem (27), or ``"none"``.
-        clearance_alone: bound (27) also without errors.
-        wrench: frames whose wrench is recorded.
-        linearisation: compare each point with finite motions.
-        near: distance below which a singularity is named.
-        yield_strength: [Pa] of the links, for their stress and safety.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        under: covariates that effects of the robot's file depend on.
-        state: also K_C and the shares of its parts, in this state: ``"nominal"``,
-            clearances held at zero; ``"contact"`` or ``"exact"``, with the errors,
-            loads and clearances of each point.
-        frequencies: how many natural frequencies.
-        rest: a frame that takes what a closure leaves open, as
-            :func:`assembly.kinematics.closing.rest_in`.
-        mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded,
-            as :func:`assembly.kinematics.closing.preloaded`.
-    """
+    """The options of :func:`assembly.sweeps.robot_sweep.sweep`, by their names."""
 
     grid: str | None = None
     poses: Path | str | None = None
@@ -80,7 +54,7 @@ class SweepOptions:
     seed: int = 1
     assumption: str = "frozen"
     clearance_alone: bool = False
-    wrench: Sequence[str] = ()
+    wrench_of: Sequence[str] = ()
     linearisation: bool = False
     near: float = 0.02
     yield_strength: float | None = None
@@ -93,11 +67,11 @@ class SweepOptions:
     mismatch: str | None = None
 
 
-def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
+def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     """The sweep that ``forcefit assembly sweep`` would run.
 
     Args:
-        robot: a robot file, or a built-in name.
+        robot: a robot, a robot file, or a built-in name.
         options: of the command.
 
     Returns:
@@ -113,10 +87,20 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
             f"{option}: found --vary, which replaces the errors that it makes; "
             "expected one of them"
         )
-    machine = load_robot(robot, close)
+    if isinstance(robot, Robot):
+        if options.vary:
+            raise BadInput(
+                "--vary: found a robot in memory; expected a robot file or a built-in "
+                "name, whose numbers have paths"
+            )
+        machine = robot if close is None else close(robot)
+    else:
+        machine = load_robot(robot, close)
     check_covariates(machine, options.under)
     _check(options, machine)
-    design = load_design(robot) if options.vary else None
+    design = None
+    if options.vary and not isinstance(robot, Robot):
+        design = load_design(robot)
     varied = _vary(design, options.vary) if design is not None else {}
     sources = _sources(options, machine, varied)
     targets = _targets(machine, options.grid, options.poses)
@@ -134,7 +118,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         seed=options.seed,
         assumption=None if options.assumption == "none" else options.assumption,
         clearance_only=options.clearance_alone,
-        wrenches=tuple(options.wrench),
+        wrenches=tuple(options.wrench_of),
         linearisation=options.linearisation,
         near=options.near,
         strength=options.yield_strength,
@@ -145,7 +129,7 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         frequencies=options.frequencies or 0,
     )
     _check_assumption(question)
-    command = _command(robot, options)
+    command = "" if isinstance(robot, Robot) else _command(robot, options)
     return Sweep(question, targets, tuple(varied.values()), options.draws or 0, command)
 
 
@@ -160,7 +144,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
         raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
     if not 0 <= near <= 1:
         raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
-    for name in options.wrench:
+    for name in options.wrench_of:
         machine.index(name)
     if strength is not None:
         if not 0 < strength < float("inf"):

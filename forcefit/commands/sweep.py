@@ -162,7 +162,7 @@ def sweep(
             SweepOptions(
                 grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
                 seed=seed, assumption=assumption, clearance_alone=clearance_alone,
-                wrench=wrench_of or (), linearisation=linearisation, near=near,
+                wrench_of=wrench_of or (), linearisation=linearisation, near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, state=state,
                 frequencies=frequencies, rest=rest, mismatch=mismatch,

@@ -46,7 +46,7 @@ def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
             assumption="none",
             load=[0, 0, 0, 0, 10, 0],
             gravity=[0, -G, 0],
-            wrench=["drive"],
+            wrench_of=["drive"],
         ),
     )
     data = sweep_in_memory(asked)

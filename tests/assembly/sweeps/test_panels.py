@@ -10,10 +10,10 @@ from assembly.sweeps.dataset import save_dataset
 
 @pytest.fixture(scope="module")
 def data():
-    return ff.sweep_in_memory(ff.ask_sweep("five_bar", ff.SweepOptions(
-        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", state="nominal", assumption="none",
-        wrench=("left.elbow",), load=(0, 0, 0, 10, 0, 0),
-    )))  # fmt: skip
+    return ff.sweep(
+        "five_bar", grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", state="nominal",
+        assumption="none", wrench_of=("left.elbow",), load=(0, 0, 0, 10, 0, 0),
+    )  # fmt: skip
 
 
 def shown(panel):

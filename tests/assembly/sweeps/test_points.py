@@ -213,7 +213,7 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
                                    "leg1.link_a.link.beam.radius=0.04"]},
          "leg1.link_a.link.beam.radius varies already"),
         ({"grid": "tx=0", "draws": 3}, "sweep: --errors and --draws go together"),
-        ({"grid": "tx=0", "wrench": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
+        ({"grid": "tx=0", "wrench_of": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
         ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
         ({"grid": "tx=0:1:1e-5,tz=0:1:0.1", "vary": ["tip.mass=1:100:1"]},
          "sweep: 110001100 points; expected at most 10000000"),
