@@ -41,6 +41,7 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import Numbers, PointResults
+from assembly.model.statuses import SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
 from forcefit.inputs.display import Figures, bracket, short_repr
@@ -195,7 +196,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
         for name, values in rows.items():
             values[i] = getattr(one, name)
         if one.unproved:
-            status[i], reason[i] = "solver failed", one.unproved
+            status[i], reason[i] = SOLVER_FAILED, one.unproved
     method = np.full(len(assembly), asked.method, dtype=object)
     return PoseError(asked.assumption, **rows, method=method, one_by_one=left,
                      status=status, reason=reason)  # fmt: skip

@@ -9,6 +9,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
@@ -136,8 +137,8 @@ def _in_contact(
 def _status(stiffness: PlatformStiffness) -> str:
     """Whether the platform is held, and stable."""
     if not stiffness.stable:
-        return "unstable"
-    return "free motion" if stiffness.free.shape[1] else "ok"
+        return UNSTABLE
+    return FREE_MOTION if stiffness.free.shape[1] else "ok"
 
 
 def stiffness_values(
@@ -221,7 +222,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if "compliance" not in results:
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    if results["status"] == "unstable":
+    if results["status"] == UNSTABLE:
         lines.append("unstable: this equilibrium has a direction of negative stiffness")
     lines += _state_lines(results)
     lines += _share_lines(results["shares"])

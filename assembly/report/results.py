@@ -26,6 +26,7 @@ from assembly.linear.load import massless
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
+from assembly.model.statuses import NOT_PROVED, UNSTABLE
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
@@ -41,7 +42,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
-        "status": "not proved" if unproved_parts else "ok",
+        "status": NOT_PROVED if unproved_parts else "ok",
         "assemblable": rigid.assemblable,
         "assemblable_free": free.assemblable,
         "margin": _finite(rigid.margin),
@@ -127,7 +128,7 @@ def solution_of(
 
 def proof_status(reason: str) -> dict[str, str]:
     """Status and reason of a solution with an incomplete proof; empty otherwise."""
-    return {"status": "not proved", "reason": reason} if reason else {}
+    return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
 def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
@@ -215,7 +216,7 @@ def exact_of(
     }
     loaded = assembly.load.any() or gravity is not None
     if loaded and not exact_tangent(assembly).stable:
-        results |= {"status": "unstable", "reason": _UNSTABLE}
+        results |= {"status": UNSTABLE, "reason": _UNSTABLE}
     return results | {
         **_screws_and_wrenches(assembly),
         "certificate": certificate,

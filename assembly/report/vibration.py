@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers
@@ -53,9 +54,9 @@ def vibration_of(
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     if np.isnan(modes.frequencies).any():
-        results["status"] = "unstable"
+        results["status"] = UNSTABLE
     elif (modes.frequencies == 0.0).any():
-        results["status"] = "free motion"
+        results["status"] = FREE_MOTION
     return results | {
         "frequencies": modes.frequencies,
         "idle_motions": modes.idle,

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.statuses import OF_POINTS
 from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_file
-from assembly.sweeps.quantities import STATUSES, TEXTS, variables
+from assembly.sweeps.quantities import TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
 
@@ -28,7 +29,7 @@ KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
 }  # fmt: skip
 _TEXT = {
-    "status": "ok, or why there is no answer: " + ", ".join(STATUSES[1:]),
+    "status": "ok, or why there is no answer: " + ", ".join(OF_POINTS[1:]),
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
@@ -181,7 +182,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
     """(k,) of objects: a text variable of some points."""
     if name == "status":
-        return np.array(STATUSES, dtype=object)[records["status"]]
+        return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
     for row, text in texts[name].items():
         column[row] = text

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
 from assembly.linear.zone import MARGINS, zone_margin
@@ -21,6 +20,14 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import Robot
+from assembly.model.statuses import (
+    BEYOND_SINGULARITY,
+    INVALID_ROBOT,
+    OF_POINTS,
+    OUT_OF_REACH,
+    SINGULAR,
+    SOLVER_FAILED,
+)
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
@@ -34,7 +41,7 @@ from assembly.sweeps.point_stiffness import (
     nominal_stiffnesses,
     tangent_stiffnesses,
 )
-from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
+from assembly.sweeps.quantities import TEXTS, Question, record_type
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
@@ -125,7 +132,7 @@ def _solve_variant(
         place = place_many_joints if of_joints(question.components) else place_many
         postures, reasons = place(robot, goals)
     except BadInput as error:
-        _fail(solved, range(first, first + count), "invalid robot", str(error))
+        _fail(solved, range(first, first + count), INVALID_ROBOT, str(error))
         return
     rows = [range(first + run.start, first + run.stop) for run in runs]
     reached = [i for i, posture in enumerate(postures) if posture is not None]
@@ -137,7 +144,7 @@ def _solve_variant(
     reachable: list[tuple[int, Posture]] = []
     far: list[tuple[int, str]] = []
     for i, posture in enumerate(postures):
-        status, reason = status_of.get(i, ("out of reach", reasons[i]))
+        status, reason = status_of.get(i, (OUT_OF_REACH, reasons[i]))
         if posture is None or status not in ("", BEYOND_SINGULARITY):
             _fail(solved, rows[i], status, reason)
             continue
@@ -169,7 +176,7 @@ def _solve_or_split(
     except (np.linalg.LinAlgError, SolverFailed) as error:
         if len(rows) == 1:
             row = int(rows[0])
-            _fail(solved, range(row, row + 1), "solver failed", str(error))
+            _fail(solved, range(row, row + 1), SOLVER_FAILED, str(error))
             return
         for i in range(len(rows)):
             one = slice(i, i + 1)
@@ -181,7 +188,7 @@ def _solve_or_split(
 
 def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
     """Record the status of points without a solution."""
-    solved.records["status"][rows.start : rows.stop] = STATUSES.index(status)
+    solved.records["status"][rows.start : rows.stop] = OF_POINTS.index(status)
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
@@ -259,7 +266,7 @@ def _solved_rows(
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
         if i in failed:
-            status, reason = "solver failed", failed[i]
+            status, reason = SOLVER_FAILED, failed[i]
         if status == "ok":
             ok.append(i)
         else:

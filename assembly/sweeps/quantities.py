@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assembly.kinematics.singularity import KINDS
-from assembly.kinematics.verdict import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design
@@ -18,12 +17,6 @@ from stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
 
-STATUSES = (
-    "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot",
-    "no equilibrium", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
-)  # fmt: skip
-# of points at which nothing was asked
-UNUSABLE = {"out of reach", "invalid robot", SINGULAR, BEYOND_LIMITS}
 TEXTS = ("reason", "near_singularity")
 
 

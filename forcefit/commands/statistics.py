@@ -264,7 +264,7 @@ def tolerances(
 
     from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import closing_of
-    from assembly.kinematics.verdict import SINGULAR
+    from assembly.model.statuses import SINGULAR
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
     from assembly.statistics.replay import journalled

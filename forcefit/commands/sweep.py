@@ -135,11 +135,11 @@ def sweep(
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
     """
+    from assembly.model.statuses import UNUSABLE
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.netcdf import stored_dataset
     from assembly.sweeps.point_table import write_point_table
-    from assembly.sweeps.quantities import UNUSABLE
     from assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,

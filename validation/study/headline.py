@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.verdict import BEYOND_LIMITS, SINGULAR
+from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from validation.study.study import StudyResults
 
 WORST = "frozen"  # assumption of (27): all clearance motions without spring deformation
