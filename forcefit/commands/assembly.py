@@ -10,6 +10,8 @@ import typer
 from forcefit.commands.deflection import deflection
 from forcefit.commands.frequencies import frequencies
 from forcefit.commands.options import (
+    AlongOption,
+    AtOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -22,7 +24,7 @@ from forcefit.commands.options import (
     declared_under,
     parse_direction,
     parse_load,
-    parse_vector,
+    parse_point,
     posture_of,
 )
 from forcefit.commands.platform_stiffness import stiffness
@@ -148,14 +150,8 @@ def error(
     tolerance_translation: Annotated[
         float, typer.Option(help="[m] upper minus lower bound.")
     ] = 1e-6,
-    point: Annotated[
-        list[str] | None,
-        typer.Option(help="Of the platform, in its axes [m], such as x=0.1,z=-0.05."),
-    ] = None,
-    direction: Annotated[
-        list[str] | None,
-        typer.Option(help="Also the largest error along it, such as tx=1,tz=-1."),
-    ] = None,
+    at: AtOption = None,
+    along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
@@ -184,8 +180,8 @@ def error(
         results = pose_error_of(
             applied.posture, assumption or None,
             load=applied.load, gravity=applied.gravity,
-            point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
-            direction=parse_direction(direction), **options,
+            point=parse_point(at),
+            direction=parse_direction(along), **options,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":

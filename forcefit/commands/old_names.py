@@ -8,9 +8,16 @@ from collections.abc import Sequence
 
 # new words by command and old option; a value follows where the option takes one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
-    "assembly error": {"--reading": ("--assumption",)},
+    "assembly error": {
+        "--reading": ("--assumption",),
+        "--point": ("--at",),
+        "--direction": ("--along",),
+    },
     "assembly show": {"--reading": ("--assumption",)},
-    "assembly stiffness": {"--exact": ("--state", "exact")},
+    "assembly stiffness": {
+        "--exact": ("--state", "exact"),
+        "--direction": ("--along",),
+    },
     "assembly frequencies": {"--exact": ("--state", "exact")},
     "assembly sweep": {
         "--stiffness": ("--state", "nominal"),
@@ -21,6 +28,9 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
     "assembly tolerances": {"--play": ("--clearance",)},
     "validation crosscheck": {"--clearances": ("--with-clearance",)},
+    "validation generate": {"--point": ("--at",)},
+    "validation plan": {"--point": ("--at",)},
+    "stiffness beam": {"--axis": ("--along",)},
 }
 
 

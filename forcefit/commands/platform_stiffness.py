@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from forcefit.commands.options import (
+    AlongOption,
+    AtOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -39,14 +41,8 @@ def stiffness(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
-    at: Annotated[
-        str | None,
-        typer.Option(help="Point of the platform, in its axes [m], such as 0,0,-0.1."),
-    ] = None,
-    direction: Annotated[
-        list[str] | None,
-        typer.Option(help="Such as tx=1,tz=-1: stiffness and shares along it."),
-    ] = None,
+    at: AtOption = None,
+    along: AlongOption = None,
     state: Annotated[
         str,
         typer.Option(
@@ -82,8 +78,8 @@ def stiffness(
         check_writable(output, PICTURE)
     if length is not None:
         checked("--length", length, "m", above=0)
-    point = parse_point(at, "--at")
-    way = parse_direction(direction)
+    point = parse_point(at)
+    way = parse_direction(along)
     word = parse_state(state)
     applied = declared_under(
         robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,

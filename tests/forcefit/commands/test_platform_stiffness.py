@@ -127,7 +127,7 @@ def test_the_chart_is_written(run, tmp_path):
 def test_a_direction_has_its_stiffness_and_shares(run):
     """Along fz it is what stands there already; of any length it is the same."""
     status, out, _ = run(
-        "assembly", "stiffness", "orthoglide", "--direction", "tz=-2", "--json", "-"
+        "assembly", "stiffness", "orthoglide", "--along", "tz=-2", "--json", "-"
     )
     answer = json.loads(out)
     assert status == 0
@@ -141,8 +141,8 @@ def test_a_direction_has_its_stiffness_and_shares(run):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--direction", "tx=0"], "--direction: expected components of a translation"),
-        (["--direction", "tx=nan"], "--direction tx: found nan"),
+        (["--along", "tx=0"], "--along: expected components of a translation"),
+        (["--along", "tx=nan"], "--along tx: found nan"),
         (["--at", "1,2"], "--at: found '1,2', expected three numbers"),
         (["--length", "0"], "--length: found 0, expected a finite number > 0"),
         (["--load", "fz=nan"], "--load fz: found nan, expected a finite number"),
