@@ -153,7 +153,7 @@ COMMANDS = [
         "new.json"),
     (3, "assembly exact bar.toml --joint crank=1.1"),
     (3, "assembly error bar.toml --assumption frozen --at x=0.1 --along tx=1"),
-    (1, "assembly show bar.toml -o new.png --exaggeration 20"),
+    (1, "assembly show bar.toml --figure new.png --exaggeration 20"),
     (5, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --near 0.1"),
     (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --assumption none "
         "--wrench-of elbow"),
@@ -169,8 +169,8 @@ COMMANDS = [
     (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
         "-o new.nc --json -"),
     (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --compliant rigid"),
-    (2, "assembly plot swept.nc -o new.svg"),
-    (1, "assembly plot draws.nc -o new.png --kind histogram"),
+    (2, "assembly plot swept.nc --figure new.svg"),
+    (1, "assembly plot draws.nc --figure new.png --kind histogram"),
     (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 "
         "--along 1,0,2 --theory timoshenko --json -"),
     (4, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --section "

@@ -5,7 +5,7 @@ time.  For each convention it writes a robot file with the errors of one draw, t
 set of its maps and the figure, and prints least, median and largest values beside those
 of a reference made by another program (same draw for the positive errors, other signs).
 The figure alone is drawn again, without solving, by
-``forcefit assembly plot figure5_literal.nc -o figure5_literal.png``.
+``forcefit assembly plot figure5_literal.nc --figure figure5_literal.png``.
 """
 
 import argparse

@@ -193,10 +193,10 @@ def error(
 @app.command()
 def show(
     robot: RobotArgument,
-    output: Annotated[
+    figure: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="PNG, JPEG, BMP or TIFF; a window opens without."
+            "--figure", help="PNG, JPEG, BMP or TIFF; a window opens without."
         ),
     ] = None,
     pose: PoseOption = None,
@@ -228,10 +228,10 @@ def show(
     from assembly.report.results import remark_lines
     from assembly.solvers.conic import SolverFailed
 
-    if output is not None:
-        check_writable(output, PIXELS)
+    if figure is not None:
+        check_writable(figure, PIXELS)
     elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
-        raise BadInput("no display to open a window on; name a file with --output")
+        raise BadInput("no display to open a window on; name a file with --figure")
     for option, value, valid in (
         ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
     ):  # fmt: skip
@@ -253,15 +253,15 @@ def show(
     try:
         assembly = solve_assembly(posture, wrench)
         plotter = plot_assembly(
-            assembly, exaggeration, error_body, assumption, output is not None
+            assembly, exaggeration, error_body, assumption, figure is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
         raise typer.Exit(1) from None
-    if output is None:
+    if figure is None:
         plotter.show()
     else:
-        save_pixels(plotter.screenshot(return_img=True), output)
+        save_pixels(plotter.screenshot(return_img=True), figure)
     plotter.close()
 
 

@@ -6,6 +6,7 @@ The commands themselves know the new names only; ``--help`` shows no others.
 import sys
 from collections.abc import Sequence
 
+_PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
 # new words by command and old option; a value follows where the option takes one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
@@ -13,8 +14,9 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
         "--point": ("--at",),
         "--direction": ("--along",),
     },
-    "assembly show": {"--reading": ("--assumption",)},
-    "assembly stiffness": {
+    "assembly show": _PICTURE | {"--reading": ("--assumption",)},
+    "assembly stiffness": _PICTURE
+    | {
         "--exact": ("--state", "exact"),
         "--direction": ("--along",),
     },
@@ -27,6 +29,9 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
     "assembly tolerances": {"--play": ("--clearance",)},
+    "assembly deflection": _PICTURE,
+    "assembly plot": _PICTURE,
+    "report compare": {"-o": ("--report",), "--output": ("--report",)},
     "validation crosscheck": {"--clearances": ("--with-clearance",)},
     "validation generate": {"--point": ("--at",)},
     "validation plan": {"--point": ("--at",)},
@@ -48,7 +53,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
     reported: list[str] = []
     new_words: list[str] = []
     for word in words[:end]:
-        option, equals, value = word.partition("=")
+        option, equals, value = _parts(word)
         if option not in renamed:
             new_words.append(word)
             continue
@@ -58,6 +63,13 @@ def with_new_names(words: Sequence[str]) -> list[str]:
         reported.append(option)
         new_words += [*new[:-1], new[-1] + equals + value]
     return new_words + list(words[end:])
+
+
+def _parts(word: str) -> tuple[str, str, str]:
+    """Option, "=" and value of a word; of ``-ofile`` too."""
+    if word.startswith("--") or not word.startswith("-"):
+        return word.partition("=")
+    return word[:2], "=" * bool(word[2:]), word[2:]
 
 
 def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:

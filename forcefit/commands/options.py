@@ -6,6 +6,7 @@ Every error message names its option.
 import math
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -101,6 +102,12 @@ MismatchOption = Annotated[
         help="spring: redundant elastic drives take up what their coordinates "
         "(--joint, or those at home) leave open.",
     ),
+]
+
+
+FigureOption = Annotated[
+    Path | None,
+    typer.Option("--figure", help="Also a picture of it: PNG, SVG or PDF."),
 ]
 
 

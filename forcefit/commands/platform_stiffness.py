@@ -1,6 +1,5 @@
 """The command ``forcefit assembly stiffness``."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -8,6 +7,7 @@ import typer
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
+    FigureOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -62,9 +62,7 @@ def stiffness(
             "the state chosen."
         ),
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Bar chart of the shares.")
-    ] = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """How stiff the platform is, and which part gives way."""
@@ -74,8 +72,8 @@ def stiffness(
         stiffness_text,
     )
 
-    if output is not None:
-        check_writable(output, PICTURE)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     if length is not None:
         checked("--length", length, "m", above=0)
     point = parse_point(at)
@@ -103,8 +101,8 @@ def stiffness(
     if json != "-":
         print(stiffness_text(results))
         _print_slopes(results)
-    if output is not None and "shares" in results:
-        save_figure(plot_shares(results), output)
+    if figure is not None and "shares" in results:
+        save_figure(plot_shares(results), figure)
     if results["status"] != "ok" or results.get("cannot_change"):
         raise typer.Exit(1)
 

@@ -225,9 +225,7 @@ def _solver(workers: int | None, scheduler: str | None) -> "Solver":
 
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="PNG, SVG or PDF file.")
-    ],
+    picture: Annotated[Path, typer.Option("--figure", help="PNG, SVG or PDF file.")],
     at: Annotated[
         list[str] | None,
         typer.Option(help="Where to stand on other axes, such as draw=3."),
@@ -251,7 +249,7 @@ def plot(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
-    check_writable(output, PICTURE)
+    check_writable(picture, PICTURE)
     places = {}
     for text in at or ():
         name, equals, value = (piece.strip() for piece in text.rpartition("="))
@@ -263,7 +261,7 @@ def plot(
         figure = figure_of_draws(data, kind, quantity or ())
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places, quantity or ()), output)
+    save_figure(figure or figure_of(data, places, quantity or ()), picture)
 
 
 def table(

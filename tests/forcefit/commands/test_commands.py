@@ -175,7 +175,9 @@ def test_gravity_pulls_an_arm_down(run):
 
 
 def test_show_draws_a_picture(run, robot_file, tmp_path):
-    status, _, _ = run("assembly", "show", robot_file, "-o", tmp_path / "robot.png")
+    status, _, _ = run(
+        "assembly", "show", robot_file, "--figure", tmp_path / "robot.png"
+    )
     assert status == 0
     assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
 

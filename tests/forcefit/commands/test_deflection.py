@@ -12,7 +12,7 @@ def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
     picture = tmp_path / "curve.svg"
     status, out, _ = run(
         "assembly", "deflection", "hexapod", "--along", "fz=-100:100:50", "--json",
-        "-", "-o", str(picture),
+        "-", "--figure", str(picture),
     )  # fmt: skip
     answer = json.loads(out)
     assert status == 0
@@ -43,7 +43,7 @@ def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
     picture = tmp_path / "path.svg"
     status, out, _ = run(
         "assembly", "deflection", str(column), "--along", "fy=0:-300:15", "--follow",
-        "--json", "-", "-o", str(picture),
+        "--json", "-", "--figure", str(picture),
     )  # fmt: skip
     answer = json.loads(out)
     assert status == 0

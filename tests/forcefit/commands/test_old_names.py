@@ -25,7 +25,8 @@ def options_of(command):
 @pytest.mark.parametrize(("command", "old", "new"), RENAMED)
 def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsys):
     words = command.split()
-    found = with_new_names([*words, old, "value", f"{old}=value", "--json", "-"])
+    joined = f"{old}=value" if old.startswith("--") else f"{old}value"
+    found = with_new_names([*words, old, "value", joined, "--json", "-"])
     assert found == [
         *words,
         *new,

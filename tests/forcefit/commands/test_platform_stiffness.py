@@ -117,7 +117,7 @@ def test_the_chart_is_written(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
         "assembly", "stiffness", "irsbot2", "--state", "exact", "--load", "fz=-100",
-        "-o", str(picture),
+        "--figure", str(picture),
     )  # fmt: skip
     assert picture.stat().st_size > 1000
     assert "stiffness exact" in out

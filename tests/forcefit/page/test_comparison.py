@@ -77,7 +77,7 @@ def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
     second.write_text(json.dumps(AFTER))
     pages = [tmp_path / "c.html", tmp_path / "d.html"]
     for page in pages:
-        status, printed, err = run("report", "compare", first, second, "-o", page)
+        status, printed, err = run("report", "compare", first, second, "--report", page)
         assert (status, err) == (0, "")
     assert "certified worst case, pose, shift: 0.0008 to 0.0004 m (-50 %)" in printed
     status, printed, _ = run("report", "compare", *pages, "--json", "-")
