@@ -12,7 +12,8 @@ The same sweep on the command line, on two processes:
 
     forcefit assembly sweep hexapod --errors examples/hexapod_errors.toml --draws 10 \\
         --grid "tx=-0.05:0.05:0.025,ty=-0.05:0.05:0.025,tz=0.53,rx=0,ry=0,rz=0" \\
-        --vary ball_3.clearance.axial=8e-6,4e-6 --clearance-alone --workers 2 \\
+        --vary ball_3.clearance.axial=8e-6,4e-6 --workers 2 \\
+        --quantities default,rotation_error_clearance,translation_error_clearance \\
         -o hexapod.nc --figure hexapod.png
 """
 
@@ -39,7 +40,11 @@ def main():
         vary=[f"{CLEARANCE}=8e-6,4e-6"],
         errors=HERE / "hexapod_errors.toml",
         draws=options.draws,
-        clearance_alone=True,
+        quantities=[
+            "default",
+            "rotation_error_clearance",
+            "translation_error_clearance",
+        ],
         output=options.output,
     ).squeeze()
     for place, part in data.groupby(CLEARANCE):

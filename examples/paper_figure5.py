@@ -56,7 +56,10 @@ def main():
         errors = draw_errors(robot, ErrorDraw(frames, LEAST, MOST, 1, signs))
         write_robot(robot.with_errors(errors), base.with_suffix(".toml"))
         data = ff.sweep(
-            base.with_suffix(".toml"), grid=grid, clearance_alone=True,
+            base.with_suffix(".toml"), grid=grid,
+            quantities=[
+                "default", "rotation_error_clearance", "translation_error_clearance"
+            ],
             output=base.with_suffix(".nc"),
         )  # fmt: skip
         ff.figure_of(data).savefig(base.with_suffix(".png"), dpi=150)

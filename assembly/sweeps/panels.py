@@ -66,7 +66,38 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels of a sweep's figure for which no quantity is named."""
+    """The panels of a sweep's figure for which no quantity is named.
+
+    Args:
+        data: of a sweep.
+
+    Returns:
+        Those whose quantities are stored.
+
+    Raises:
+        BadInput: the sweep stored none of their quantities.
+    """
+    usual = _usual_panels(data)
+    panels = tuple(panel for panel in usual if _is_stored(data, panel.key))
+    if not panels:
+        raise BadInput(
+            "figure: found none of the usual quantities, such as energy; name one of "
+            "the file with assembly plot --quantity"
+        )
+    return panels
+
+
+def _is_stored(data: "xarray.Dataset", key: str) -> bool:
+    """Whether a quantity follows from what is stored."""
+    try:
+        quantity(data, key)
+    except KeyError:
+        return False
+    return True
+
+
+def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
+    """The same where everything is stored."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]

@@ -41,7 +41,13 @@ from assembly.sweeps.point_stiffness import (
     nominal_stiffnesses,
     tangent_stiffnesses,
 )
-from assembly.sweeps.quantities import TEXTS, Question, record_type
+from assembly.sweeps.quantities import (
+    TEXTS,
+    Question,
+    computed,
+    record_of,
+    record_type,
+)
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
@@ -91,15 +97,20 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
         Rows in the order of the points.
     """
     count = len(points.rows)
-    solved = SolvedPoints(
-        np.zeros(count, record_type(question)), {t: {} for t in TEXTS}
-    )
+    whole = record_of(computed(question))
+    solved = SolvedPoints(np.zeros(count, whole), {t: {} for t in TEXTS})
     for name in solved.records.dtype.names or ():
         if name != "status":
             solved.records[name] = np.nan
     for run in _runs(points.values):
         _solve_variant(question, points.part(run), solved, run.start)
-    return solved
+    stored = record_type(question)
+    if stored == whole:
+        return solved
+    records = np.zeros(count, stored)
+    for name in stored.names or ():
+        records[name] = solved.records[name]
+    return SolvedPoints(records, solved.texts)
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:

@@ -46,6 +46,7 @@ class Question:
         stiffness: also K_C and the shares of its parts, in a state of
             :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
         frequencies: how many natural frequencies, of the same K_C and declared masses.
+        kept: names of the variables that are stored; all that are computed if empty.
     """
 
     robot: Robot
@@ -65,6 +66,7 @@ class Question:
     under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: str = ""
     frequencies: int = 0
+    kept: tuple[str, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -94,7 +96,20 @@ class Variable:
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a question asks for, by name.
+    """The numeric quantities that a sweep stores, by name.
+
+    Args:
+        question: of a sweep.
+
+    Returns:
+        All but ``status`` and the texts.
+    """
+    table = computed(question)
+    return {k: v for k, v in table.items() if not question.kept or k in question.kept}
+
+
+def computed(question: Question) -> dict[str, Variable]:
+    """The numeric quantities that are computed, some perhaps not stored.
 
     Args:
         question: of a sweep.
@@ -207,9 +222,14 @@ def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: its quantities, and ``status`` as a code."""
+    """Type of a point's record: what is stored, and ``status`` as a code."""
+    return record_of(variables(question))
+
+
+def record_of(table: Mapping[str, Variable]) -> np.dtype:
+    """Type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
-        for name, v in variables(question).items()
+        for name, v in table.items()
     ]
     return np.dtype([*fields, ("status", "u1")])

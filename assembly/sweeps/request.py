@@ -22,6 +22,7 @@ from assembly.sweeps.plan import Sweep
 from assembly.sweeps.point_conditions import is_loaded, point_conditions
 from assembly.sweeps.point_stiffness import STATES
 from assembly.sweeps.quantities import Question
+from assembly.sweeps.selection import select
 from assembly.sweeps.targets import (
     Targets,
     grid_targets,
@@ -53,9 +54,8 @@ class SweepOptions:
     draws: int | None = None
     seed: int = 1
     assumption: str = "frozen"
-    clearance_alone: bool = False
+    quantities: Sequence[str] = ()
     wrench_of: Sequence[str] = ()
-    linearisation: bool = False
     near: float = 0.02
     yield_strength: float | None = None
     load: Sequence[float] = (0.0,) * 6
@@ -117,9 +117,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
         sources=sources,
         seed=options.seed,
         assumption=None if options.assumption == "none" else options.assumption,
-        clearance_only=options.clearance_alone,
         wrenches=tuple(options.wrench_of),
-        linearisation=options.linearisation,
         near=options.near,
         strength=options.yield_strength,
         load=tuple(options.load),
@@ -128,6 +126,10 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
         stiffness=options.state or "",
         frequencies=options.frequencies or 0,
     )
+    if options.quantities:
+        question = select(question, options.quantities)
+    if question.frequencies:
+        check_masses(machine)
     _check_assumption(question)
     command = "" if isinstance(robot, Robot) else _command(robot, options)
     return Sweep(question, targets, tuple(varied.values()), options.draws or 0, command)
@@ -157,12 +159,10 @@ def _check(options: SweepOptions, machine: Robot) -> None:
     if options.state is not None and options.state not in STATES:
         hint = nearest(options.state, list(STATES))
         raise BadInput(f'--state: found "{options.state[:60]}"{hint}')
-    if options.frequencies is not None:
-        if not 1 <= options.frequencies <= _MODES:
-            raise BadInput(
-                f"--frequencies: found {options.frequencies}, expected 1 to {_MODES}"
-            )
-        check_masses(machine)
+    if options.frequencies is not None and not 1 <= options.frequencies <= _MODES:
+        raise BadInput(
+            f"--frequencies: found {options.frequencies}, expected 1 to {_MODES}"
+        )
 
 
 def _sources(
@@ -198,7 +198,7 @@ def _check_assumption(question: Question) -> None:
         raise BadInput(
             "--assumption: the robot is loaded (--load, --gravity or an effect), and "
             "the bounds of the pose error are those of an unloaded one; expected "
-            "--assumption none, and no --clearance-alone"
+            "--assumption none, and no bounds by clearances alone"
         )
 
 

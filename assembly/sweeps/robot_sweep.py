@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from assembly.model.robot import Robot
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.request import SweepOptions, ask_sweep
+from assembly.sweeps.selection import BY_CLEARANCE, DEFAULT, FINITE
 from assembly.sweeps.sweep import (
     Progress,
     Solver,
@@ -32,9 +33,8 @@ def sweep(
     draws: int | None = None,
     seed: int = 1,
     assumption: str = "frozen",
-    clearance_alone: bool = False,
+    quantities: Sequence[str] = (),
     wrench_of: Sequence[str] = (),
-    linearisation: bool = False,
     near: float = 0.02,
     yield_strength: float | None = None,
     load: Sequence[float] = (0.0,) * 6,
@@ -61,9 +61,12 @@ def sweep(
         seed: of the draws.
         assumption: of problem (27): ``"frozen"``, ``"free"``, ``"budget"``, or
             ``"none"`` to leave its bounds out.
-        clearance_alone: bound (27) also without errors.
+        quantities: names of the data variables to compute and store, with
+            ``"default"`` for those that are stored without names: the bounds by
+            clearances alone (``"rotation_error_clearance"``,
+            ``"translation_error_clearance"``) and what finite motions change
+            (``"linearisation_rotation"``, ..) are only computed where they are named.
         wrench_of: frames whose wrench is recorded.
-        linearisation: compare each point with finite motions.
         near: distance below which a singularity is named.
         yield_strength: [Pa] of the links, for their stress and safety.
         load: (6,) [N m, N] on the platform at its origin, base axes.
@@ -92,9 +95,8 @@ def sweep(
         robot,
         SweepOptions(
             grid=grid, poses=poses, vary=vary, errors=errors, draws=draws, seed=seed,
-            assumption=assumption, clearance_alone=clearance_alone,
-            wrench_of=wrench_of, linearisation=linearisation, near=near,
-            yield_strength=yield_strength, load=load, gravity=gravity,
+            assumption=assumption, quantities=quantities, wrench_of=wrench_of,
+            near=near, yield_strength=yield_strength, load=load, gravity=gravity,
             under=under or {}, state=state, frequencies=frequencies, rest=rest,
             mismatch=mismatch,
         ),
@@ -109,8 +111,8 @@ def options_by_old_names(**options: Any) -> SweepOptions:
     """Options of a sweep by the keywords of the last release.
 
     Args:
-        options: ``reading``, ``play_alone``, ``wrench``, ``stiffness`` and ``tangent``,
-            and those of :class:`SweepOptions`.
+        options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,
+            ``stiffness`` and ``tangent``, and those of :class:`SweepOptions`.
 
     Returns:
         The options.
@@ -120,10 +122,15 @@ def options_by_old_names(**options: Any) -> SweepOptions:
         state = state or "nominal"
     if state is not None:
         options["state"] = state
-    for old, new in (
-        ("reading", "assumption"), ("play_alone", "clearance_alone"),
-        ("wrench", "wrench_of"),
-    ):  # fmt: skip
+    for old, new in (("reading", "assumption"), ("wrench", "wrench_of")):
         if old in options:
             options[new] = options.pop(old)
+    added = [
+        name
+        for old, names in (("play_alone", BY_CLEARANCE), ("linearisation", FINITE))
+        if options.pop(old, False)
+        for name in names
+    ]
+    if added:
+        options["quantities"] = (DEFAULT, *added)
     return SweepOptions(**options)

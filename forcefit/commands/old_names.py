@@ -24,7 +24,15 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly sweep": {
         "--stiffness": ("--state", "nominal"),
         "--tangent": ("--state",),
-        "--play-alone": ("--clearance-alone",),
+        "--play-alone": (
+            "--quantities",
+            "default,rotation_error_clearance,translation_error_clearance",
+        ),
+        "--linearisation": (
+            "--quantities",
+            "default,linearisation_rotation,linearisation_translation,"
+            "linearisation_energy",
+        ),
         "--reading": ("--assumption",),
     },
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},

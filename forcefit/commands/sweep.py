@@ -54,6 +54,16 @@ CsvOption = Annotated[
 ]
 
 
+def _list_quantities(names: list[str] | None) -> list[str] | None:
+    """Print the data variables of sweeps where ``list`` is asked for."""
+    if names == ["list"]:
+        from assembly.sweeps.selection import quantities_text
+
+        print(quantities_text())
+        raise typer.Exit
+    return names
+
+
 def sweep(
     robot: RobotArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
@@ -86,17 +96,18 @@ def sweep(
     assumption: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
-    clearance_alone: Annotated[
-        bool,
-        typer.Option("--clearance-alone", help="The pose error also without errors."),
-    ] = False,
+    quantities: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Names of data variables to compute and store, such as energy,margin; "
+            "default stands for those stored without it, list prints all.",
+            callback=_list_quantities,
+            is_eager=True,
+        ),
+    ] = None,
     wrench_of: Annotated[
         list[str] | None, typer.Option(help="A frame whose wrench is kept.")
     ] = None,
-    linearisation: Annotated[
-        bool,
-        typer.Option("--linearisation", help="What finite motions would change; slow."),
-    ] = False,
     state: Annotated[
         str | None,
         typer.Option(
@@ -161,8 +172,8 @@ def sweep(
             robot,
             SweepOptions(
                 grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-                seed=seed, assumption=assumption, clearance_alone=clearance_alone,
-                wrench_of=wrench_of or (), linearisation=linearisation, near=near,
+                seed=seed, assumption=assumption, quantities=quantities or (),
+                wrench_of=wrench_of or (), near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
                 gravity=g or (0.0,) * 3, under=covariates or {}, state=state,
                 frequencies=frequencies, rest=rest, mismatch=mismatch,

@@ -5,6 +5,7 @@ import pytest
 import xarray
 
 import forcefit as ff
+from assembly.sweeps.selection import BY_CLEARANCE
 
 LOAD = [0, 0, 0, 0, 0, -100.0]
 
@@ -70,7 +71,8 @@ def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
     """Options, question and answer apart; the file has what memory has."""
     new = ff.sweep(
         "five_bar", grid="tx=0:0.02:0.02,ty=0.13", assumption="free",
-        clearance_alone=True, wrench_of=["left.elbow"], state="contact",
+        wrench_of=["left.elbow"], state="contact",
+        quantities=["default", *BY_CLEARANCE],
     )  # fmt: skip
     with pytest.warns(FutureWarning):
         SweepOptions, ask_sweep, run_sweep, sweep_in_memory = (

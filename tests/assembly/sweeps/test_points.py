@@ -18,6 +18,7 @@ from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
+from assembly.sweeps.selection import BY_CLEARANCE
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
@@ -231,7 +232,13 @@ def test_figures_need_only_the_data_set(tmp_path):
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
     asked = ask_sweep(
         "five_bar",
-        SweepOptions(grid=grid, errors=path, draws=3, near=0.6, clearance_alone=True),
+        SweepOptions(
+            grid=grid,
+            errors=path,
+            draws=3,
+            near=0.6,
+            quantities=["default", *BY_CLEARANCE],
+        ),
     )
     data = sweep_in_memory(asked)
     figure = figure_of(data)

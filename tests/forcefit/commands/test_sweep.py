@@ -9,6 +9,7 @@ import zlib
 import pytest
 import xarray
 
+from assembly.sweeps.selection import BY_CLEARANCE, FINITE
 from forcefit.commands import app as command
 
 ERRORS = """
@@ -24,7 +25,7 @@ def test_everything_at_once_ends_in_one_file_and_one_object(run, tmp_path):
     words = ["five_bar", "--poses", tmp_path / "poses.csv",
              "--errors", tmp_path / "errors.toml", "--draws", "2", "--seed", "5",
              "--vary", "elbow.link.young=7e10,2.1e11", "--wrench-of", "left.arm",
-             "--clearance-alone", "--linearisation"]  # fmt: skip
+             "--quantities", ",".join(["default", *BY_CLEARANCE, *FINITE])]  # fmt: skip
     status, out, _ = run("assembly", "sweep", *words, "-o", tmp_path / "x.nc",
                          "--json", "-")  # fmt: skip
     found = json.loads(out)
