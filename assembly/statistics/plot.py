@@ -57,7 +57,7 @@ def figure_of_draws(
     if kind == "histogram":
         return histogram_figure(data, quantities)
     if quantities:
-        raise BadInput(f"--quantity: found with {kind}, expected with a histogram")
+        raise BadInput(f"--quantities: found with {kind}, expected with a histogram")
     return tornado_figure(data) if kind == "tornado" else allocation_figure(data)
 
 

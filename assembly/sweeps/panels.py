@@ -82,7 +82,7 @@ def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     if not panels:
         raise BadInput(
             "figure: found none of the usual quantities, such as energy; name one of "
-            "the file with assembly plot --quantity"
+            "the file with assembly plot --quantities"
         )
     return panels
 
@@ -127,18 +127,18 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
             variables = dict.fromkeys(k.partition(".")[0] for k in known)
             near = [k for k in known if k.partition(".")[0] == name.partition(".")[0]]
             raise BadInput(
-                f"--quantity: no {quoted(name)}{nearest(name, near or variables)}"
+                f"--quantities: no {quoted(name)}{nearest(name, near or variables)}"
             )
         if len(own) > _MOST:
             raise BadInput(
-                f"--quantity {quoted(name)}: found {len(own)} components, expected at "
-                f"most {_MOST}; name one, such as {own[0]}"
+                f"--quantities {quoted(name)}: found {len(own)} components, expected "
+                f"at most {_MOST}; name one, such as {own[0]}"
             )
         for key in own:
             scale, unit = _SHOWN.get(known[key], (1.0, known[key]))
             panels.append(Panel(key, scale, f"{plot_label(key)} [{unit}]", "viridis"))
     if len(panels) > _MOST:
-        raise BadInput(f"--quantity: found {len(panels)}, expected at most {_MOST}")
+        raise BadInput(f"--quantities: found {len(panels)}, expected at most {_MOST}")
     return tuple(panels)
 
 

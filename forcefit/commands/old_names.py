@@ -38,7 +38,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
     "assembly tolerances": {"--play": ("--clearance",)},
     "assembly deflection": _PICTURE,
-    "assembly plot": _PICTURE,
+    "assembly plot": _PICTURE | {"--quantity": ("--quantities",)},
     "report compare": {"-o": ("--report",), "--output": ("--report",)},
     "validation crosscheck": {"--clearances": ("--with-clearance",)},
     "validation generate": {"--point": ("--at",)},

@@ -245,11 +245,11 @@ def plot(
         str | None,
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
-    quantity: Annotated[
+    quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="What to show, such as stiffness.FX, frequency.1, translation, "
-            "wrench.leg1.link_a.FZ; may be repeated. A variable alone: all components."
+            help="What to show, such as stiffness.FX,translation or "
+            "wrench.leg1.link_a.FZ. A variable alone: all components."
         ),
     ] = None,
 ) -> None:
@@ -267,12 +267,13 @@ def plot(
         if not equals:
             raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
         places[name] = value
+    names = [part.strip() for text in quantities or () for part in text.split(",")]
     data = open_dataset(file)
     try:
-        figure = figure_of_draws(data, kind, quantity or ())
+        figure = figure_of_draws(data, kind, names)
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places, quantity or ()), picture)
+    save_figure(figure or figure_of(data, places, names), picture)
 
 
 def table(

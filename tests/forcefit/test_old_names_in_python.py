@@ -5,7 +5,7 @@ import pytest
 import xarray
 
 import forcefit as ff
-from assembly.sweeps.selection import BY_CLEARANCE
+from assembly.sweeps.selection import BY_CLEARANCE, FINITE
 
 LOAD = [0, 0, 0, 0, 0, -100.0]
 
@@ -88,5 +88,6 @@ def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
     )
     run_sweep(ask_sweep("five_bar", options), tmp_path / "old.nc")
     xarray.testing.assert_identical(ff.open_dataset(tmp_path / "old.nc"), new)
+    assert SweepOptions(linearisation=True).quantities == ("default", *FINITE)
     assert SweepOptions(stiffness=True).state == "nominal"
     assert SweepOptions(stiffness=False).state is None

@@ -76,8 +76,10 @@ def test_unknown_and_too_many_quantities_are_one_line(run, data, tmp_path):
         ("stiffness.FQ", 'no "stiffness.FQ"; did you mean "stiffness.F'),
         ("compliance", "found 36 components, expected at most 12"),
     ):
-        status, _, err = run("assembly", "plot", tmp_path / "s.nc", "--quantity", name,
-                             "--figure", tmp_path / "p.png")  # fmt: skip
+        status, _, err = run(
+            "assembly", "plot", tmp_path / "s.nc", "--quantities", name,
+            "--figure", tmp_path / "p.png",
+        )  # fmt: skip
         assert (status, err.count("\n")) == (2, 1)
         assert said in err
     assert not (tmp_path / "p.png").exists()

@@ -81,7 +81,7 @@ def test_the_command_lists_quantities_and_keeps_those_named(run, tmp_path):
     text = picture.read_text()
     assert "assembly energy" in text
     assert "orientation" not in text
-    status, _, err = run("assembly", "plot", file, "--quantity", "energy", "--figure",
+    status, _, err = run("assembly", "plot", file, "--quantities", "energy", "--figure",
                          picture)  # fmt: skip
     assert (status, err) == (0, "")
 
