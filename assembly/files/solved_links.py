@@ -42,13 +42,26 @@ def solve_links(robot: Robot) -> Robot:
         BadInput: a file cannot be read or is not usable, or an interface is not.
     """
     # libraries first: what can be refused is refused before the finite elements
-    links = {
-        frame.name: solved_link(frame)
+    frames = [
+        frame
         for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
         if (isinstance(frame.link, MeshLink) and frame.link.solution is None)
         or (isinstance(frame.link, LibraryLink) and frame.link.compliance is None)
-    }
+    ]
+    links, total = {}, len(frames)
+    try:
+        for done, frame in enumerate(frames):
+            _note(done, total)
+            links[frame.name] = solved_link(frame)
+    finally:
+        _note(total, total)
     return robot.with_links(links) if links else robot
+
+
+def _note(done: int, total: int) -> None:
+    """How many links are known, for those who show progress."""
+    known = {"done": done, "total": total}
+    _LOG.debug("%d of %d links", done, total, extra=known)
 
 
 def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:

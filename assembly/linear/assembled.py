@@ -36,7 +36,7 @@ from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
 from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
-from assembly.model.point_results import Numbers, plain
+from assembly.model.point_results import N, plain
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from forcefit.inputs.display import (
@@ -57,7 +57,7 @@ _NOTHING = 1e-12  # [N m, N]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assembly(Solution):
+class Assembly(Solution[N]):
     """A manipulator forced together at least energy; or many, with a leading axis.
 
     ``[i]`` of many is one of them; where it has no solution that raises why.  The
@@ -69,10 +69,11 @@ class Assembly(Solution):
     def _figures(self) -> Figures:
         """What ``forcefit assembly solve`` prints of it."""
         if self.of_many:
-            solved = np.isfinite(self.energy)
+            energy = np.asarray(self.energy)
+            solved = np.isfinite(energy)
             return {
                 "points": f"{len(self)}, {np.count_nonzero(solved)} solved",
-                "energy": f"at most {self.energy[solved].max(initial=0.0):.6g} J",
+                "energy": f"at most {energy[solved].max(initial=0.0):.6g} J",
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
@@ -113,7 +114,7 @@ class Assembly(Solution):
         return plain(np.broadcast_to(acting, np.shape(self.energy_without_clearance)))
 
     @cached_property
-    def energy(self) -> Numbers:
+    def energy(self) -> N:
         """(...) [J] elastic, stored; 0 where the certificate cannot tell it from 0."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
@@ -122,18 +123,18 @@ class Assembly(Solution):
         return plain(np.where(nonzero, self.stored, 0.0))
 
     @property
-    def stored(self) -> Numbers:
+    def stored(self) -> N:
         """(...) [J] in the springs of the numerical solution."""
         return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
-    def potential(self) -> Numbers:
+    def potential(self) -> N:
         """(...) [J] energy minus the work of the loads."""
         on_errors = np.vecdot(self.frame_loads.body, _flat(self._errors))
         return plain(self.stored - self.work - on_errors)
 
     @cached_property
-    def work(self) -> Numbers:
+    def work(self) -> N:
         """(...) [J] of the loads on all small screws but the errors."""
         joints = self.clearance_screws + self.joint_screws
         on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
@@ -225,7 +226,7 @@ class Assembly(Solution):
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
     @cached_property
-    def bound(self) -> Numbers:
+    def bound(self) -> N:
         """(...) [J] certified lower bound of energy minus the load's work.
 
         The complementary energy of these wrenches, whatever they are: every assembly
@@ -258,16 +259,16 @@ class Assembly(Solution):
             other.joint, self.frame_loads.joint
         )
 
-    def closure_residual(self) -> Numbers:
+    def closure_residual(self) -> N:
         """(...) largest of abs(rad) and abs(m) / reference length open in a closure."""
         return self._residual
 
     @cached_property
-    def _residual(self) -> Numbers:
+    def _residual(self) -> N:
         residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
         return plain(residual.max(axis=-1, initial=0.0))
 
-    def clearance_excess(self, compliant: Compliant = "elastic") -> Numbers:
+    def clearance_excess(self, compliant: Compliant = "elastic") -> N:
         """(...) [-] by how much the worst clearance leaves its cone, of its size."""
         if compliant == "elastic" and "_excess" in vars(self):
             return self._excess
@@ -275,17 +276,17 @@ class Assembly(Solution):
         return plain(clearance_excess(self.clearance_screws, bounds))
 
     @cached_property
-    def _excess(self) -> Numbers:
+    def _excess(self) -> N:
         return self.clearance_excess()
 
     @cached_property
-    def rounding(self) -> Numbers:
+    def rounding(self) -> N:
         """(...) [rad, lengths] what rounding may leave open in a closure."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
-    def uncertainty(self) -> Numbers:
+    def uncertainty(self) -> N:
         """(...) [J] the duality gap without cancellation, rounding counted in.
 
         Energy minus its bound is |y - s|^2 / 2, with s the springs' deformations that
@@ -306,15 +307,15 @@ class Assembly(Solution):
             + ROUNDING * (sizes.sum(axis=-1) + np.abs(self.work))
         )  # fmt: skip
 
-    def duality_gap(self) -> Numbers:
+    def duality_gap(self) -> N:
         """(...) [J] certified: energy is at most this above the least possible."""
         return self._gap
 
     @cached_property
-    def _gap(self) -> Numbers:
+    def _gap(self) -> N:
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
-    def relative_gap(self) -> Numbers:
+    def relative_gap(self) -> N:
         """(...) [-] duality gap by energy, or by 1e-4 of that without clearance."""
         # inside an assembly zone the least energy is zero, and no gap relative to it
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)

@@ -7,7 +7,7 @@ solved by the reference (:mod:`assembly.linear.reference`), and the answer says 
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,29 @@ _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
 # arrays of k points by what they are; "tight" is the energy without clearance
 _Rows = dict[str, NDArray]
+
+
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, errors: None = None, method: Method = "compiled",
+) -> Assembly[float]: ...  # fmt: skip
+
+
+@overload
+def solve_assembly(
+    posture: Sequence[Posture], load: ArrayLike | None = None,
+    bodies: ArrayLike | None = None, gravity: ArrayLike | None = None,
+    errors: ArrayLike | None = None, method: Method = "compiled",
+) -> Assembly[NDArray]: ...  # fmt: skip
+
+
+@overload
+def solve_assembly(
+    posture: Posture, load: ArrayLike | None = None, bodies: ArrayLike | None = None,
+    gravity: ArrayLike | None = None, *, errors: ArrayLike,
+    method: Method = "compiled",
+) -> Assembly[NDArray]: ...  # fmt: skip
 
 
 def solve_assembly(
@@ -177,7 +200,10 @@ def _solve_one(
             return least_energy(posture, load, loads)
     else:
         return least_energy(posture, load, loads)
-    _drop_rounding(rows, rows["residual"] + rounding, acting is not None)
+    multipliers, residual = rows["multipliers"], rows["residual"] + rounding
+    drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
+    if acting is None and not np.count_nonzero(multipliers):
+        rows["elastic"][:] = 0.0  # no wrenches mean no deformation but rounding
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -422,13 +448,12 @@ def _record(
         rows["status"][i], rows["reason"][i] = SOLVER_FAILED, open_
 
 
-def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray | bool) -> None:
+def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
     """Set to zero, in place, energies, wrenches and springs that are only rounding."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
     # without loads no wrenches mean no deformation but rounding
-    if loaded is not True and np.count_nonzero(multipliers) < multipliers.size:
-        rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
+    rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:

@@ -107,16 +107,19 @@ def loads_on_frames(
         The loads; all zero where nothing is given.
 
     Raises:
-        BadInput: a number is not finite, or so large that its square overflows.
+        BadInput: a number is not finite, or so large that its square overflows; or a
+            shape does not fit.
     """
     for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
         _check(whose, given, _LARGEST_LOAD, "N m, N")
     robot, T = posture.robot, posture.transforms
     n = len(robot.frames)
     lead = T.shape[:-3]
-    for wrenches, axes in ((load, 1), (bodies, 2), (carried, 2)):
+    for whose, wrenches, axes in (
+        ("load", load, (6,)), ("bodies", bodies, (n, 6)), ("carried", carried, (n, 6)),
+    ):  # fmt: skip
         if wrenches is not None:
-            lead = np.broadcast_shapes(lead, np.shape(wrenches)[:-axes])
+            lead = _with_leading(lead, whose, np.shape(wrenches), axes)
     given = np.zeros((*lead, 2, n, 6))
     own, after = given[..., 0, :, :], given[..., 1, :, :]
     if bodies is not None:
@@ -137,6 +140,24 @@ def loads_on_frames(
         given = halves @ T[..., None, :, :3, :3]
     on = given.reshape(*lead, 2, 6 * n)
     return FrameLoads(on[..., 0, :], on[..., 1, :])
+
+
+def _with_leading(
+    lead: tuple[int, ...], whose: str, shape: tuple[int, ...], own: tuple[int, ...]
+) -> tuple[int, ...]:
+    """Leading dimensions together with those of an array; ``own`` are its last."""
+    if shape == own:  # as nearly always
+        return lead
+    try:
+        if shape[-len(own) :] != own:
+            raise ValueError
+        return np.broadcast_shapes(lead, shape[: -len(own)])
+    except ValueError:
+        one, many = str(own), str((*lead, *own) if lead else ("k", *own))
+        raise BadInput(
+            f"{whose}: found an array of shape {shape}, expected {one}"
+            f" or {many.replace(chr(39), '')}"
+        ) from None
 
 
 @lru_cache(maxsize=16)
@@ -168,11 +189,12 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
         Links given by a matrix, a mesh or a library have no weight here.
 
     Raises:
-        BadInput: gravity is not finite, or beyond 1e6 m/s^2.
+        BadInput: gravity is not finite, beyond 1e6 m/s^2, or of a shape that does not
+            fit.
     """
     _check("gravity", gravity, LARGEST_LENGTH, "m/s^2")
     robot, T = posture.robot, posture.transforms
-    lead = np.broadcast_shapes(T.shape[:-3], np.shape(gravity)[:-1])
+    lead = _with_leading(T.shape[:-3], "gravity", np.shape(gravity), (3,))
     g = np.broadcast_to(np.asarray(gravity, dtype=float), (*lead, 3))
     bodies, carried = np.zeros((2, *lead, len(robot.frames), 6))
     for i, (mass, *centre, beam_mass, x, y, z) in enumerate(_masses(robot).tolist()):
@@ -235,7 +257,7 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
     """
     table, R = _masses(posture.robot), posture.transforms[..., :3, :3]
     g = np.asarray(gravity, dtype=float)[..., None, :]
-    lead = np.broadcast_shapes(R.shape[:-1], g.shape)
+    lead = R.shape[:-1] if g.ndim == 2 else np.broadcast_shapes(R.shape[:-1], g.shape)
     W = np.einsum("...nji,...nj->...ni", R, np.broadcast_to(g, lead)) * table[:, 4:5]
     return np.concatenate([-np.cross(table[:, 5:], W) / 12, W / 2], axis=-1)
 

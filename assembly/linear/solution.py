@@ -5,7 +5,7 @@ What follows from them is :class:`assembly.linear.assembled.Assembly`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads
-from assembly.model.point_results import Numbers, PointResults, plain
+from assembly.model.point_results import N, PointResults, plain
 
+_VECTORS = ("elastic", "clearances", "motions", "multipliers")
 # what may be known beside a solution: properties, and parts of its certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
@@ -23,7 +24,7 @@ KNOWN = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution(PointResults):
+class Solution(PointResults, Generic[N]):
     """The numbers of a manipulator at least energy; or many, with a leading axis.
 
     Attributes:
@@ -57,7 +58,7 @@ class Solution(PointResults):
     clearances: NDArray
     motions: NDArray
     multipliers: NDArray
-    energy_without_clearance: Numbers
+    energy_without_clearance: N
     method: Any
     errors: Any = None
     status: Any = "ok"
@@ -183,15 +184,14 @@ class Solution(PointResults):
     def as_many(self) -> Self:
         """One point with a leading axis."""
         lin = self.linearisation
-        many = replace(
-            self, linearisation=replace(lin, posture=together([lin.posture])),
-            elastic=self.elastic[None], clearances=self.clearances[None],
-            motions=self.motions[None], multipliers=self.multipliers[None],
-            energy_without_clearance=np.array([self.energy_without_clearance]),
-            method=np.array([self.method], dtype=object),
-            status=np.array([self.status], dtype=object),
-            reason=np.array([self.reason], dtype=object),
-        )  # fmt: skip
+        rows: dict[str, Any] = {
+            name: np.asarray(getattr(self, name))[None]
+            for name in ("energy_without_clearance", *_VECTORS)
+        }
+        for name in ("method", "status", "reason"):
+            rows[name] = np.array([getattr(self, name)], dtype=object)
+        at = replace(lin, posture=together([lin.posture]))
+        many = replace(self, linearisation=at, **rows)
         names = ("energy", "platform_screw")
         known = {name: np.asarray(getattr(self, name))[None] for name in names}
         return with_known(many, known)

@@ -10,7 +10,7 @@ As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
 from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
 from assembly.model.clearance import Compliant
-from assembly.model.point_results import Numbers, PointResults
+from assembly.model.point_results import N, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 from forcefit.inputs.display import Figures
@@ -34,7 +34,7 @@ ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Zone(PointResults):
+class Zone(PointResults, Generic[N]):
     """Solution of problem (21) at one posture; or at many, with a leading axis.
 
     Attributes:
@@ -50,8 +50,8 @@ class Zone(PointResults):
         reason: (...) message where the solver failed; else empty.
     """
 
-    margin: Numbers
-    bound: Numbers
+    margin: N
+    bound: N
     method: Any
     forces: NDArray
     reason: Any
@@ -69,7 +69,8 @@ class Zone(PointResults):
         if not self.of_many:
             margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
             return {"margin": margin, "bound": bound, "method": self.method}
-        largest = self.margin[np.isfinite(self.margin)].max(initial=0.0)
+        margins = np.asarray(self.margin)
+        largest = margins[np.isfinite(margins)].max(initial=0.0)
         inside = np.count_nonzero(self.assemblable)
         points = f"{len(self)}, {inside} assemble rigidly"
         return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
@@ -98,6 +99,27 @@ class Zone(PointResults):
             least = f"{bound[i]:.9g}"
             text[i] = f"the margin {margin[i]:.9g} is proved down to {least} only"
         return text if self.of_many else text[0]
+
+
+@overload
+def zone_margin(
+    posture: Posture, compliant: Compliant = "rigid", errors: None = None,
+    method: Method = "compiled",
+) -> Zone[float]: ...  # fmt: skip
+
+
+@overload
+def zone_margin(
+    posture: Sequence[Posture], compliant: Compliant = "rigid",
+    errors: ArrayLike | None = None, method: Method = "compiled",
+) -> Zone[NDArray]: ...  # fmt: skip
+
+
+@overload
+def zone_margin(
+    posture: Posture, compliant: Compliant = "rigid", *, errors: ArrayLike,
+    method: Method = "compiled",
+) -> Zone[NDArray]: ...  # fmt: skip
 
 
 def zone_margin(

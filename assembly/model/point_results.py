@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from forcefit.inputs.display import html_table, short_repr
 
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# a number of one point, or an array (k,) of many
-Numbers = Any
+Numbers = Any  # a number of one point, or an array (k,) of many
+N = TypeVar("N", float, NDArray)  # the same, where it is known which of them
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -317,8 +317,8 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
     except (FreeMotion, SolverFailed):
         return None
     return {
-        "assumption": "frozen", "rotation": bound.rotation_error[1],
-        "translation": bound.translation_error[1],
+        "assumption": "frozen", "rotation": float(bound.rotation_error[1]),
+        "translation": float(bound.translation_error[1]),
     }  # fmt: skip
 
 

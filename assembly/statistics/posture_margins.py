@@ -63,7 +63,7 @@ class PostureMargins:
             open_ = left[no_factor] @ both[:, len(self.K) :].T
             errors = errors.copy()
             errors[no_factor] -= open_.reshape(-1, *errors.shape[1:])
-        found = zone_margin(self.posture, self.compliant, errors)
+        found = zone_margin(self.posture, self.compliant, errors=errors)
         found.margin[no_factor] = found.bound[no_factor] = np.inf
         return found
 

@@ -230,7 +230,7 @@ def _solve_reached(
     there = replace(conditions.postures, robot=robot)
     failed: dict[int, str] = {}
     for key, compliant in MARGINS.items():
-        zone = zone_margin(there, compliant, errors)
+        zone = zone_margin(there, compliant, errors=errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.unproved) if r} | failed
     wrenches = at_tips = None

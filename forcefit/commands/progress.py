@@ -26,19 +26,51 @@ def one_thread() -> AbstractContextManager:
     return threadpool_limits(1)
 
 
-class _Lines(logging.Handler):
-    """A line on stderr for each record, above the bars if there are any."""
+class _Links(logging.Handler):
+    """A line for each link whose finite elements run, and on a terminal a bar."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.done, self.total = 0, 0
+        self.bar: Any = None
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print the record's message."""
-        print(f"forcefit: {record.getMessage()}", file=sys.stderr)
+        """Move the bar where the record counts links, else print its message."""
+        if not hasattr(record, "total"):
+            self._begin()
+            print(f"forcefit: {record.getMessage()}", file=sys.stderr)
+            return
+        self.done, self.total = vars(record)["done"], record.total
+        if self.bar is not None:
+            self.bar.update(self.bar.task_ids[0], completed=self.done)
+            if self.done == self.total:
+                self.bar.stop()
+                self.bar = None
+
+    def _begin(self) -> None:
+        """A bar on stderr, if that is a terminal and shows no other one."""
+        from rich.console import Console
+        from rich.errors import LiveError
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        console = Console(stderr=True)
+        if self.bar is not None or not console.is_terminal:
+            return
+        columns = TextColumn("links"), BarColumn(), MofNCompleteColumn()
+        bar = Progress(*columns, console=console)
+        bar.add_task("links", total=self.total, completed=self.done)
+        try:
+            bar.start()
+        except LiveError:
+            return
+        self.bar = bar
 
 
 def report_loading() -> None:
-    """From now on, name each link whose finite elements run when a robot is loaded."""
+    """From now on, show progress where finite elements run when a robot is loaded."""
     log = logging.getLogger("assembly.files.solved_links")
-    log.setLevel(logging.INFO)
-    log.handlers = [_Lines()]
+    log.setLevel(logging.DEBUG)
+    log.handlers = [_Links()]
 
 
 @contextmanager

@@ -42,8 +42,8 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
                          "translation": None})  # fmt: skip
             continue
         rows.append({
-            "part": part, "what": what, "rotation": bound.rotation_error[1],
-            "translation": bound.translation_error[1],
+            "part": part, "what": what, "rotation": float(bound.rotation_error[1]),
+            "translation": float(bound.translation_error[1]),
         })  # fmt: skip
     return sorted(rows, key=_by_translation)
 

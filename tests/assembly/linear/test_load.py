@@ -11,6 +11,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.robots import load_robot
+from forcefit.inputs.errors import BadInput
 from tests.robots_for_tests import planar_four_bar
 
 L, RADIUS, E, RHO, G = 0.8, 0.02, 70e9, 2700.0, 9.81
@@ -237,3 +238,26 @@ def test_finite_motions_carry_the_same_weight_at_a_pin():
     row = posture.robot.index("b")
     assert np.abs(exact.tip_wrenches[row, :3]).max() < 1e-9 * Q * L**2
     assert exact.tip_wrenches[row, 4] == pytest.approx(Q * L / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"load": np.zeros(5)},
+            r"load: found an array of shape \(5,\), expected \(6,\)",
+        ),
+        ({"load": np.zeros((3, 6))}, r"load: .*\(3, 6\), expected \(6,\) or \(2, 6\)"),
+        ({"bodies": np.zeros((2, 6))}, r"bodies: .*\(2, 6\), expected \(8, 6\)"),
+        (
+            {"gravity": np.zeros((3, 3))},
+            r"gravity: .*\(3, 3\), expected \(3,\) or \(2, 3",
+        ),
+        ({"gravity": 9.81}, r"gravity: found an array of shape \(\), expected \(3,\)"),
+    ],
+)
+def test_loads_of_a_shape_that_does_not_fit_are_refused(given, message):
+    """At two postures of a robot of eight frames."""
+    posture = home_posture(load_robot("four_bar"))
+    with pytest.raises(BadInput, match=message):
+        solve_assembly([posture, posture], **given)

@@ -1,12 +1,19 @@
 """Progress of commands that are usually done at once."""
 
+import logging
+
 import numpy as np
+import pytest
 
 from assembly.exact.exact import solve_exact
+from assembly.files.solved_links import solve_links
 from assembly.kinematics.posture import home_posture
+from assembly.model.robot import Frame, MeshLink, Robot
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.robots import load_robot
 from forcefit.commands import progress
+from forcefit.commands.progress import report_loading
+from forcefit.inputs.errors import BadInput
 
 
 def test_line_of_progress_is_printed_every_two_seconds_and_no_oftener(
@@ -40,3 +47,39 @@ def test_every_load_of_a_curve_is_reported():
     )  # fmt: skip
     # beside those that bracket what happens on the way
     assert set(said) >= {f"steps at load {load}" for load in (0, -10, -20)}
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_links_that_are_solved_while_a_robot_is_loaded_are_shown(
+    terminal, monkeypatch, capsys
+):
+    """A line for each whose finite elements run; on a terminal a bar of all three."""
+    monkeypatch.setenv("FORCE_COLOR" if terminal else "NO_COLOR", "1")
+    log = logging.getLogger("assembly.files.solved_links")
+    before = log.level, log.handlers
+    try:
+        report_loading()
+        for done in range(4):
+            log.debug("%d of 3 links", done, extra={"done": done, "total": 3})
+            if done == 1:  # the others are known
+                log.info('finite elements of frame "arm", arm.stl')
+    finally:
+        log.level, log.handlers = before
+    shown = capsys.readouterr().err
+    assert 'forcefit: finite elements of frame "arm", arm.stl' in shown
+    assert ("1/3" in shown) == ("3/3" in shown) == terminal
+    assert "of 3 links" not in shown
+
+
+def test_a_bar_ends_where_a_link_is_refused(monkeypatch, tmp_path):
+    """Its count is complete whatever happens: nothing stays on the terminal."""
+    log, told = logging.getLogger("assembly.files.solved_links"), []
+    handler = logging.Handler()
+    handler.emit = lambda record: told.append((record.done, record.total))
+    link = MeshLink(tmp_path / "none.stl", "z=0", "z=0.1", 7e10, 0.3)
+    robot = Robot("r", "tip", (Frame("tip", translation=[0.1, 0, 0], link=link),))
+    monkeypatch.setattr(log, "handlers", [handler])
+    monkeypatch.setattr(log, "level", logging.DEBUG)
+    with pytest.raises(BadInput, match=r"none\.stl"):
+        solve_links(robot)
+    assert told == [(0, 1), (1, 1)]
