@@ -77,7 +77,7 @@ def stiffness_of(
         if state != "nominal":
             results["letting_go"] = values[1] if len(values) > 1 else None
         elif virtual_clearances(posture):
-            results["in_contact"] = _in_contact(posture, load, gravity, point, length)
+            results["contact"] = _in_contact(posture, load, gravity, point, length)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         results |= {"status": failure_status(error), "reason": str(error)}
     return results
@@ -228,7 +228,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
     lines += _share_lines(results["shares"])
     if "direction" in results:
         lines += _direction_lines(results["direction"])
-    for side in results.get("in_contact", ()):
+    for side in results.get("contact", ()):
         lines += ["", f"with clearances, {side['contacts']} pressed, {side['side']}:"]
         lines += _state_lines(side)
     if results.get("letting_go"):

@@ -45,7 +45,7 @@ def vibration_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "exact": state == "exact", "remarks": [],
+        "state": state, "remarks": [],
     }  # fmt: skip
     if state == "nominal" and (np.any(load) or np.any(gravity)):
         results["remarks"] = [_NOMINAL]

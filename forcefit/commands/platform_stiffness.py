@@ -90,8 +90,8 @@ def stiffness(
         )  # fmt: skip
         if by and "compliance" in results:
             states = {"slopes": word}
-            if "in_contact" in results:
-                states["slopes_in_contact"] = "contact"
+            if "contact" in results:
+                states["slopes_contact"] = "contact"
             asked = (applied.load, applied.gravity, point)
             for key, one in states.items():
                 results[key], results["cannot_change"] = _slopes(
@@ -136,7 +136,7 @@ def _slopes(
 
 def _print_slopes(results: dict[str, Any]) -> None:
     """A line for each derivative, and for each that there is not."""
-    for key in ("slopes", "slopes_in_contact"):
+    for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():
             text = f"dC/d({path}){name}"

@@ -41,7 +41,7 @@ def test_the_matrices_are_where_machines_expect_them(run):
         pytest.approx(1.0)
     )
     # the robot has clearances and no load: nothing is held
-    (side,) = answer["in_contact"]
+    (side,) = answer["contact"]
     assert len(side["free_motions"]) == 6
     np.testing.assert_array_equal(side["compliance"], np.full((6, 6), None))
 
