@@ -191,13 +191,14 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
     grid[:, [0, 2]] = [list(pose.values()) for pose in poses]
     calls: dict[str, tuple[Callable[..., object], list]] = {
         f"bound_pose_error, {reading}": (
-            partial(bound_pose_error, reading=reading), some
+            partial(bound_pose_error, assumption=reading), some
         )
         for reading in ("frozen", "free")
     }  # fmt: skip
     for reading in ("frozen", "free"):
         calls[f"the same in numpy, {reading}"] = (
-            partial(bound_pose_error, reading=reading, method="reference"), some[::12]
+            partial(bound_pose_error, assumption=reading, method="reference"),
+            some[::12],
         )  # fmt: skip
     calls["place_robot"] = partial(place_robot, robot), poses[::4]
     print("\nother calls, us")

@@ -121,7 +121,7 @@ FOREIGN = [
         "-o newfolder"),
     (4, "validation import timed.csv --targets smr.toml --commands commands.csv "
         "-o newfolder --json new.json"),
-    (3, "report compare rod.json other.json -o new.html"),
+    (3, "report compare rod.json other.json --report new.html"),
 ]  # fmt: skip
 
 MADE_FOREIGN = [

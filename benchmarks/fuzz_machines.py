@@ -29,10 +29,10 @@ VECTORS = {"A": (0, 0, 0.1), "B": (0.1, 0.02, 0), "C": (0, 0.07, 0.03)}
 MACHINES = [
     (5, "assembly zone delta.toml --json -"),
     (3, "assembly solve delta.toml --load fz=-100 --gravity z=-9.81"),
-    (3, "assembly stiffness delta.toml --direction tz=1 --json -"),
-    (2, "assembly deflection delta.toml --along fz=0:-100:50 -o new.svg"),
+    (3, "assembly stiffness delta.toml --along tz=1 --json -"),
+    (2, "assembly deflection delta.toml --along fz=0:-100:50 --figure new.svg"),
     (2, "assembly frequencies delta.toml --count 3 --json new.json"),
-    (3, "assembly sweep delta.toml --grid tx=0:0.01:0.01 -o new.nc --stiffness "
+    (3, "assembly sweep delta.toml --grid tx=0:0.01:0.01 -o new.nc --state nominal "
         "--csv new.csv"),
     (4, "assembly zone rounded.toml --rest coupler --json -"),
     (2, "assembly table swept.nc -o new.csv"),

@@ -152,16 +152,16 @@ COMMANDS = [
     (6, "assembly solve arm.toml --joint one=0.2,two=0.4 --under time=60 --json "
         "new.json"),
     (3, "assembly exact bar.toml --joint crank=1.1"),
-    (3, "assembly error bar.toml --reading frozen --point x=0.1 --direction tx=1"),
-    (1, "assembly show bar.toml -o new.png --exaggeration 20"),
+    (3, "assembly error bar.toml --assumption frozen --at x=0.1 --along tx=1"),
+    (1, "assembly show bar.toml --figure new.png --exaggeration 20"),
     (5, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --near 0.1"),
-    (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --reading none "
+    (5, "assembly sweep bar.toml --poses poses.csv -o new.nc --assumption none "
         "--wrench-of elbow"),
     (4, "assembly sweep bar.toml --grid q.crank=1:1.1:0.1 -o new.nc --errors "
-        "errors.toml --draws 3 --seed 2 --reading none --vary "
+        "errors.toml --draws 3 --seed 2 --assumption none --vary "
         "coupler.link.young=7e10,2e11"),
     (1, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o new.nc --figure new.svg "
-        "--yield-strength 2e8 --reading none"),
+        "--yield-strength 2e8 --assumption none"),
     (6, "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1"),
     (6, "assembly statistics bar.toml --errors errors.toml --draws 40 --seed 2 --limit "
         "energy=5 --confidence 0.9 -o new.nc --json new.json"),
@@ -169,10 +169,10 @@ COMMANDS = [
     (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
         "-o new.nc --json -"),
     (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --compliant rigid"),
-    (2, "assembly plot swept.nc -o new.svg"),
-    (1, "assembly plot draws.nc -o new.png --kind histogram"),
-    (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 --axis "
-        "1,0,2 --theory timoshenko --json -"),
+    (2, "assembly plot swept.nc --figure new.svg"),
+    (1, "assembly plot draws.nc --figure new.png --kind histogram"),
+    (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 "
+        "--along 1,0,2 --theory timoshenko --json -"),
     (4, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --section "
         "width=0.06,height=0.04,wall=0.003 --up z"),
     (7, "stiffness curve curve.toml --young 7e10 --poisson 0.3 --json new.json"),

@@ -20,7 +20,7 @@ most = 1e-4
 """
 COMMANDS = {
     "sweep": "assembly sweep five_bar --grid tx=-0.04:0.04:0.01,ty=0.1:0.15:0.01 "
-    "--errors errors.toml --draws 20 --reading none -o out.nc --json out.json",
+    "--errors errors.toml --draws 20 --assumption none -o out.nc --json out.json",
     "statistics": "assembly statistics five_bar --errors errors.toml --draws 4000 "
     "--pose ty=0.13 --no-margins -o out.nc --json out.json",
     "tolerances": "assembly tolerances five_bar --grid tx=0:0.01:0.01,ty=0.13 "

@@ -12,17 +12,15 @@ The same sweep on the command line, on two processes:
 
     forcefit assembly sweep hexapod --errors examples/hexapod_errors.toml --draws 10 \\
         --grid "tx=-0.05:0.05:0.025,ty=-0.05:0.05:0.025,tz=0.53,rx=0,ry=0,rz=0" \\
-        --vary ball_3.clearance.axial=8e-6,4e-6 --play-alone --workers 2 \\
+        --vary ball_3.clearance.axial=8e-6,4e-6 --workers 2 \\
+        --quantities default,rotation_error_clearance,translation_error_clearance \\
         -o hexapod.nc --figure hexapod.png
 """
 
 import argparse
 from pathlib import Path
 
-from assembly.sweeps.dataset import open_dataset
-from assembly.sweeps.maps import figure_of
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import run_sweep
+import forcefit as ff
 
 HERE = Path(__file__).parent
 CLEARANCE = "ball_3.clearance.axial"
@@ -36,24 +34,25 @@ def main():
     parser.add_argument("-o", "--output", type=Path, default=Path("hexapod.nc"))
     options = parser.parse_args()
     square = ",".join(f"{axis}=-0.05:0.05:{options.step}" for axis in ("tx", "ty"))
-    asked = ask_sweep(
+    data = ff.sweep(
         "hexapod",
-        SweepOptions(
-            grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
-            vary=[f"{CLEARANCE}=8e-6,4e-6"],
-            errors=HERE / "hexapod_errors.toml",
-            draws=options.draws,
-            play_alone=True,
-        ),
-    )
-    run_sweep(asked, options.output)
-    data = open_dataset(options.output).squeeze()
+        grid=f"{square},tz=0.53,rx=0,ry=0,rz=0",
+        vary=[f"{CLEARANCE}=8e-6,4e-6"],
+        errors=HERE / "hexapod_errors.toml",
+        draws=options.draws,
+        quantities=[
+            "default",
+            "rotation_error_clearance",
+            "translation_error_clearance",
+        ],
+        output=options.output,
+    ).squeeze()
     for place, part in data.groupby(CLEARANCE):
         print_errors(float(place), part.squeeze())
     near = data["singular_distance"].min(["tx", "ty", "draw", CLEARANCE])
     said = ", ".join(f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values)
     print(f"least distances to singularities in the square: {said}")
-    figure = figure_of(data, {CLEARANCE: 8e-6})
+    figure = ff.figure_of(data, {CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 
 
@@ -66,7 +65,7 @@ def print_errors(clearance, data):
     )
     for part, factor, unit in (("translation", 1e6, "um"), ("rotation", 1e6, "urad")):
         share = factor * upper[f"{part}_error"].quantile(0.9, "draw")
-        alone = factor * upper[f"{part}_error_play"].isel(draw=0)
+        alone = factor * upper[f"{part}_error_clearance"].isel(draw=0)
         middle = share.sel(tx=0, ty=0, method="nearest")
         print(f"  {part:11s} 90 % below {float(middle):.0f} {unit} in the middle, "
               f"{float(share.max()):.0f} {unit} at the worst posture; "

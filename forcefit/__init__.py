@@ -73,7 +73,7 @@ _OWNERS = {
     "stiffness.surface.interface": ("Interface", "parse_interface"),
     "assembly.exact.exact": ("solve_exact",),
     "assembly.exchange.convert": ("convert",),
-    "assembly.exchange.robot_files": ("load_robot", "read_robot", "write_robot"),
+    "assembly.exchange.robot_files": ("load_robot", "write_robot"),
     "assembly.kinematics.closing": ("preloaded", "rest_in"),
     "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
     "assembly.kinematics.singular_posture": ("is_singular",),
@@ -83,7 +83,7 @@ _OWNERS = {
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
     "assembly.model.random_errors": ("draw_errors",),
-    "assembly.platform_stiffness.deflection": ("load_deflection",),
+    "assembly.platform_stiffness.deflection": ("deflection_curve",),
     "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
@@ -97,12 +97,11 @@ _OWNERS = {
     "assembly.sweeps.dataset": ("open_dataset",),
     "assembly.sweeps.maps": ("figure_of",),
     "assembly.sweeps.point_table": ("point_table",),
-    "assembly.sweeps.request": ("SweepOptions", "ask_sweep"),
-    "assembly.sweeps.sweep": ("run_sweep", "sweep_in_memory"),
+    "assembly.sweeps.robot_sweep": ("sweep",),
     "validation.assumptions.assumptions": ("assumption_costs",),
     "validation.campaign.campaign_file": ("read_campaign", "read_commands"),
     "validation.correction.compensation": ("compensate",),
-    "validation.correction.prediction": ("foretell",),
+    "validation.correction.prediction": ("predict",),
     "validation.crosscheck.crosscheck": ("crosscheck",),
     "validation.diagnosis.diagnose": ("diagnose",),
     "validation.inspection.inspection": ("inspect_campaign",),
@@ -110,19 +109,36 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
+# public names of the last release, which work in this one: the new public name; and
+# module and name of the object, where that is another
+_RENAMED = {
+    "foretell": ("predict",), "load_deflection": ("deflection_curve",),
+    "read_robot": ("load_robot",),
+    "SweepOptions": ("sweep", "assembly.sweeps.robot_sweep", "options_by_old_names"),
+    "ask_sweep": ("sweep", "assembly.sweeps.request", "ask_sweep"),
+    "run_sweep": ("sweep", "assembly.sweeps.sweep", "run_sweep"),
+    "sweep_in_memory": ("sweep", "assembly.sweeps.sweep", "sweep_in_memory"),
+}  # fmt: skip
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first asked for."""
+    """Import a public name when it is first needed; an old one with a warning."""
     if name == "__version__":
         return _version()
-    if name not in _OWNER_OF:
+    if name not in _OWNER_OF and name not in _RENAMED:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_OWNER_OF[name]), name)
+    if name in _OWNER_OF:
+        return getattr(import_module(_OWNER_OF[name]), name)
+    from warnings import warn
+
+    new, *place = _RENAMED[name]
+    warn(f"forcefit.{name} is now forcefit.{new}", FutureWarning, stacklevel=2)
+    owner, attribute = place or (_OWNER_OF[new], new)
+    return getattr(import_module(owner), attribute)
 
 
 def __dir__() -> list[str]:

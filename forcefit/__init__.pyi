@@ -2,7 +2,7 @@
 
 from assembly.exact.exact import solve_exact
 from assembly.exchange.convert import convert
-from assembly.exchange.robot_files import load_robot, read_robot, write_robot
+from assembly.exchange.robot_files import load_robot, write_robot
 from assembly.kinematics.closing import preloaded, rest_in
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.posture import Posture, home_posture, place_robot
@@ -13,7 +13,7 @@ from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import read_sources
 from assembly.model.random_errors import draw_errors
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.matrices import PlatformStiffness
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
@@ -24,8 +24,7 @@ from assembly.statistics.summary import summarise
 from assembly.sweeps.dataset import open_dataset
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.point_table import point_table
-from assembly.sweeps.request import SweepOptions, ask_sweep
-from assembly.sweeps.sweep import run_sweep, sweep_in_memory
+from assembly.sweeps.robot_sweep import sweep
 from forcefit.inputs.errors import BadInput
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import Section, rectangular_section, round_section
@@ -38,7 +37,7 @@ from stiffness.surface.interface import Interface, parse_interface
 from validation.assumptions.assumptions import assumption_costs
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.compensation import compensate
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.crosscheck.crosscheck import crosscheck
 from validation.diagnosis.diagnose import diagnose
 from validation.inspection.inspection import inspect_campaign
@@ -64,9 +63,7 @@ __all__ = [
     "Posture",
     "Robot",
     "Section",
-    "SweepOptions",
     "allocate",
-    "ask_sweep",
     "assumption_costs",
     "beam_compliance",
     "bound_pose_error",
@@ -74,14 +71,13 @@ __all__ = [
     "compensate",
     "convert",
     "crosscheck",
+    "deflection_curve",
     "diagnose",
     "draw_errors",
     "figure_of",
-    "foretell",
     "home_posture",
     "inspect_campaign",
     "is_singular",
-    "load_deflection",
     "load_robot",
     "look_up",
     "mesh_link",
@@ -92,11 +88,11 @@ __all__ = [
     "place_robot",
     "platform_stiffness",
     "point_table",
+    "predict",
     "preloaded",
     "read_campaign",
     "read_commands",
     "read_library",
-    "read_robot",
     "read_sources",
     "read_study",
     "rectangular_section",
@@ -104,11 +100,10 @@ __all__ = [
     "round_section",
     "run_draws",
     "run_study",
-    "run_sweep",
     "solve_assembly",
     "solve_exact",
     "summarise",
-    "sweep_in_memory",
+    "sweep",
     "turn_link",
     "write_robot",
     "write_study",

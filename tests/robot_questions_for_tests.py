@@ -16,7 +16,7 @@ from assembly.kinematics.singularity import find_singularities
 from assembly.linear.certificate import bound_screw
 from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
-from assembly.linear.reference.pose_error import READINGS
+from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.linear.zone import zone_margin
 from assembly.model.error_distributions import tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
@@ -49,7 +49,7 @@ def of_any_kind(seed: int, nudge: float) -> Any:
             "bound": bound_screw(solved),
             "energy_lower_bound": solved.energy - solved.duality_gap(),
         }
-    for reading in READINGS:
+    for reading in ASSUMPTIONS:
         some = bound_pose_error(
             found["alone"]["solved"], reading, energy_budget=0.1, **CLOSE
         )

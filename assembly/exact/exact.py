@@ -77,7 +77,9 @@ if TYPE_CHECKING:
 _STEPS = 160  # at most; 3 to 5 are usual, metres of travel take 80
 _NEAR = 1e-2  # relative energy left to gain where Newton's method is tried
 _DECREMENT = 1e-14  # relative energy left to gain before the last step
-_RESTLESS = 100  # steps after which what is in balance counts, though it moves in play
+_RESTLESS = (
+    100  # steps after which what is in balance counts, though it moves in clearances
+)
 _STILL = 1e-9  # [rad, reference lengths] size of a last step that was not damped
 _STATIONARY = 1e-7  # relative imbalance of a solution; 1e-12 is usual
 _ROUNDING = 1e-30  # [J] energies of robots without errors are some 1e-48 J of rounding

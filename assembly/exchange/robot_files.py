@@ -70,22 +70,6 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
     return robot if close is None else close(robot)
 
 
-def read_robot(path: str | Path) -> Robot:
-    """The robot of a file of any kind; see :func:`load_robot`.
-
-    Args:
-        path: of a robot file, a URDF, MJCF or SDF file.
-
-    Returns:
-        The robot.
-
-    Raises:
-        BadInput: the file breaks a rule, or a mesh or a library that it names is not
-            usable.
-    """
-    return load_robot(Path(path).absolute() if not Path(path).suffix else path)
-
-
 def write_robot(robot: Robot, path: str | Path) -> None:
     """Write a robot to a file of the kind that its ending says.
 

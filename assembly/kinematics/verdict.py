@@ -14,10 +14,8 @@ from assembly.kinematics.posture import (
 )
 from assembly.kinematics.singular_posture import is_singular
 from assembly.model.robot import Robot
+from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
-SINGULAR = "singular"
-BEYOND_LIMITS = "beyond_limits"
-BEYOND_SINGULARITY = "beyond_singularity"
 SINGULAR_WORDS = "singular posture: first order decides nothing"
 _FAR_SIDE = "not connected to home without passing a singularity"
 _ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be passed

@@ -78,7 +78,7 @@ def virtual_joints(
         compliant: what passive joints with stiffness do: ``"elastic"``, all springs
             act; ``"hinged"``, all but the one about (or along) the joint's own z, which
             is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and the own
-            z is locked or free: the two readings of problem (21).
+            z is locked or free: the two margins of problem (21).
         bounded_motion: keep the bounds of passive joints' own motion, of all or of
             these frames.  They are large and almost never active, so they are left
             out first and checked afterwards.

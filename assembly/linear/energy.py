@@ -36,6 +36,7 @@ from assembly.linear.solution import with_known
 from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
+from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
@@ -45,9 +46,9 @@ __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 # and with these a bound of a passive joint's own motion, left out, may be the cause
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
-    CannotAssemble: "cannot assemble",
-    FreeMotion: "no equilibrium",
-    SolverFailed: "solver failed",
+    CannotAssemble: CANNOT_ASSEMBLE,
+    FreeMotion: NO_EQUILIBRIUM,
+    SolverFailed: SOLVER_FAILED,
 }
 _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
@@ -444,7 +445,7 @@ def _record(
         apart[i] = found
     open_ = unproved(found)
     if open_:
-        rows["status"][i], rows["reason"][i] = "solver failed", open_
+        rows["status"][i], rows["reason"][i] = SOLVER_FAILED, open_
 
 
 def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.linear.assembled import Assembly
 from assembly.linear.energy import with_free_own_axes
 from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
-from assembly.linear.reference.pose_error import READINGS
+from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.linear.robot_structure import Structure, structure_of
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
@@ -22,15 +22,15 @@ class Asked:
     """What is asked about the largest pose error.
 
     Attributes:
-        reading: see the head of :mod:`assembly.linear.pose_error`.
-        energy_budget: eta of reading ``budget``.
+        assumption: see the head of :mod:`assembly.linear.pose_error`.
+        energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
         offset: (3,) [m] from the platform's origin to the point whose error is meant.
         method: ``"compiled"`` or ``"reference"``.
     """
 
-    reading: str = "frozen"
+    assumption: str = "frozen"
     energy_budget: float = 0.05
     tolerance_rotation: float = 1e-6
     tolerance_translation: float = 1e-6
@@ -38,8 +38,10 @@ class Asked:
     method: Method = "compiled"
 
     def __post_init__(self) -> None:
-        if self.reading not in READINGS:
-            raise ValueError(f"reading is {self.reading!r}, expected one of {READINGS}")
+        if self.assumption not in ASSUMPTIONS:
+            raise ValueError(
+                f"assumption is {self.assumption!r}, expected one of {ASSUMPTIONS}"
+            )
         check_method(self.method)
 
 
@@ -48,7 +50,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
     Args:
         assembly: of k points.
-        asked: reading, widths and point.
+        asked: assumption, widths and point.
 
     Returns:
         ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2) [m], lower and
@@ -71,15 +73,15 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
     left[list(assembly.apart)] = True
     left |= ~np.isfinite(assembly.clearances).all(axis=1)
     outcome[left] = REFERENCE
-    if asked.reading == "budget" or asked.method == "reference" or left.all():
+    if asked.assumption == "budget" or asked.method == "reference" or left.all():
         return rows, np.ones(count, dtype=bool)
     solution = assembly
-    if asked.reading == "free":
+    if asked.assumption == "free":
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
-    places = _places_of(robot, asked.reading)
+    places = _places_of(robot, asked.assumption)
     motions = np.zeros((count, len(places.moving.free_bound)))
     motions[:, places.bounded] = assembly.motions[:, places.motions]
     centres = (
@@ -105,7 +107,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
 
 class _Places(NamedTuple):
-    """What a reading lets move, and where that is in (22).
+    """What an assumption lets move, and where that is in (22).
 
     Attributes:
         moving: what may move.
@@ -125,11 +127,11 @@ class _Places(NamedTuple):
 
 
 @lru_cache(maxsize=32)
-def _places_of(robot: Robot, reading: str) -> _Places:
-    """Places of one reading, once for each robot."""
-    rigid: Compliant = "free" if reading == "free" else "rigid"
+def _places_of(robot: Robot, assumption: str) -> _Places:
+    """Places of one assumption, once for each robot."""
+    rigid: Compliant = "free" if assumption == "free" else "rigid"
     moving, all_of = structure_of(robot, rigid)[1], structure_of(robot)[1]
-    loaded = structure_of(robot, "hinged")[1] if reading == "free" else all_of
+    loaded = structure_of(robot, "hinged")[1] if assumption == "free" else all_of
     own = _columns(moving.cone_frame, moving.cone_axis)
     in_loaded = _indices(own, _columns(loaded.cone_frame, loaded.cone_axis))
     cone_of = np.searchsorted(loaded.starts, in_loaded, side="right") - 1
@@ -151,5 +153,5 @@ def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
 
 
 def _indices(some: list[tuple[int, int]], among: list[tuple[int, int]]) -> NDArray:
-    """Where the same frames and axes are in another reading."""
+    """Where the same frames and axes are by another assumption."""
     return np.array([among.index(one) for one in some], dtype=np.int64)

@@ -1,7 +1,7 @@
 """Of all assemblies of least energy, the one whose platform is nearest to nominal.
 
 Springs and loaded clearances are the same in all of them
-(:mod:`assembly.linear.reference.pose_error`, reading ``frozen``); unloaded clearances
+(:mod:`assembly.linear.reference.pose_error`, ``frozen``); unloaded clearances
 may be anywhere in their cones as long as the closures hold.  The nearest pose is a
 second-order cone programme again,
 
@@ -10,7 +10,7 @@ second-order cone programme again,
 x the deviation at the solution u, X its derivative by the unloaded clearances.
 
 Sources:
-    Public format, exact reading 15: the pose of least energy and, among those, of
+    Public format, section 5, item 15: the pose of least energy and, among those, of
     least norm.
 """
 

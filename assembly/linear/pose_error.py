@@ -1,7 +1,7 @@
 """The largest pose error of the platform: problem (27) with certified bounds.
 
 As printed, (27) is degenerate: with the deformations frozen at the solution of (22),
-complementary slackness fixes every loaded clearance.  So there are three readings of
+complementary slackness fixes every loaded clearance.  So there are three assumptions on
 what may still move:
 
 ======== =================================================================
@@ -18,7 +18,7 @@ The set of platform screws (:mod:`assembly.linear.reference.pose_error`) is conv
 the method ``"compiled"`` its farthest one is bracketed by
 :func:`assembly.solvers.one_problem.farthest`, which asks Clarabel for single supports
 in doubt; by ``"reference"`` by :func:`assembly.solvers.outer_cuts.farthest`, in numpy,
-and Clarabel for every support.  The first two readings are compiled whole
+and Clarabel for every support.  The first two assumptions are compiled whole
 (:mod:`assembly.linear.moving_clearances`): some tenths of a millisecond a point.  For
 ``budget``, and a point that this does not cover, the set is set up in numpy, one by
 one.
@@ -41,9 +41,11 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import Numbers, PointResults
+from assembly.model.statuses import SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
 from forcefit.inputs.display import Figures, bracket, short_repr
+from forcefit.inputs.renamed import renamed_keywords, warn_renamed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +53,7 @@ class PoseError(PointResults):
     """Certified bounds of the largest pose error; of many points, with a leading axis.
 
     Attributes:
-        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
+        assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         rotation_error: (..., 2) [rad] lower and upper bound; of many NaN without a
             solution of (22).
         translation_error: (..., 2) [m] likewise.
@@ -67,7 +69,7 @@ class PoseError(PointResults):
         proof: says what of one point is not proved.
     """
 
-    reading: str
+    assumption: str
     rotation_error: NDArray
     translation_error: NDArray
     rotation_screw: NDArray
@@ -95,6 +97,12 @@ class PoseError(PointResults):
 
     summary = short_repr
 
+    @property
+    def reading(self) -> str:
+        """Old name of ``assumption``."""
+        warn_renamed("PoseError.reading", "PoseError.assumption")
+        return self.assumption
+
     @cached_property
     def unproved(self) -> Any:
         """(...) what of the solution of (22), or of the width asked, is not proved.
@@ -106,7 +114,7 @@ class PoseError(PointResults):
 
     def _figures(self) -> Figures:
         """What ``forcefit assembly error`` prints of it."""
-        figures = {"reading": self.reading}
+        figures = {"assumption": self.assumption}
         rotation, translation = self.rotation_error, self.translation_error
         if self.of_many:
             known = self.status == "ok"
@@ -121,9 +129,10 @@ class PoseError(PointResults):
         return figures
 
 
+@renamed_keywords(reading="assumption")
 def bound_pose_error(
     assembly: Assembly,
-    reading: str = "frozen",
+    assumption: str = "frozen",
     energy_budget: float = 0.05,
     tolerance_rotation: float = 1e-6,
     tolerance_translation: float = 1e-6,
@@ -133,9 +142,9 @@ def bound_pose_error(
     """Bracket the largest rotation and translation error of the platform.
 
     Args:
-        assembly: of least energy, one or many, without a load in reading ``budget``.
-        reading: see the head of this module.
-        energy_budget: eta of reading ``budget``.
+        assembly: of least energy, one or many, without a load for ``budget``.
+        assumption: see the head of this module.
+        energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] asked of upper minus lower bound.
         tolerance_translation: [m] likewise.
         offset: (3,) [m] from the platform's origin to the point whose error is meant,
@@ -150,12 +159,12 @@ def bound_pose_error(
         bounds says so and raises nothing.
 
     Raises:
-        ValueError: reading or method is unknown, or ``budget`` is asked under a load.
-        FreeMotion: a load drives a motion that nothing resists in this reading.
+        ValueError: assumption or method is unknown, or ``budget`` has a load.
+        FreeMotion: a load drives a motion that nothing resists by this assumption.
         SolverFailed: the cone solver gave up.
     """
     asked = Asked(
-        reading, energy_budget, tolerance_rotation, tolerance_translation, offset,
+        assumption, energy_budget, tolerance_rotation, tolerance_translation, offset,
         method,
     )  # fmt: skip
     if assembly.of_many:
@@ -167,7 +176,7 @@ def bound_pose_error(
             own = {name: values[0] for name, values in rows.items()}
             own["supports"] = int(own["supports"])
             return PoseError(
-                reading, **own, method=method, one_by_one=False,
+                assumption, **own, method=method, one_by_one=False,
                 proof=partial(unproved, assembly),
             )  # fmt: skip
     return _bounds_of_one(assembly, asked)
@@ -187,15 +196,15 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
         for name, values in rows.items():
             values[i] = getattr(one, name)
         if one.unproved:
-            status[i], reason[i] = "solver failed", one.unproved
+            status[i], reason[i] = SOLVER_FAILED, one.unproved
     method = np.full(len(assembly), asked.method, dtype=object)
-    return PoseError(asked.reading, **rows, method=method, one_by_one=left,
+    return PoseError(asked.assumption, **rows, method=method, one_by_one=left,
                      status=status, reason=reason)  # fmt: skip
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
     """The bounds of a set that is set up in numpy."""
-    reachable = reachable_screws(assembly, asked.reading, asked.energy_budget)
+    reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(
         0, asked.tolerance_rotation, asked.method
@@ -213,7 +222,7 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
         return "; ".join(filter(None, open_))
 
     return PoseError(
-        reading=asked.reading,
+        assumption=asked.assumption,
         rotation_error=np.array(rotation),
         translation_error=np.array(translation),
         rotation_screw=rotation_screw,

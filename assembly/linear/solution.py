@@ -73,7 +73,7 @@ class Solution(PointResults, Generic[N]):
     VARIABLES: ClassVar = {
         "energy": "energy",
         "duality_gap": "_gap",
-        "energy_without_play": "energy_without_clearance",
+        "energy_without_clearance": "energy_without_clearance",
         "platform_screw": "platform_screw",
         "closure_residual": "_residual",
         "clearance_excess": "_excess",

@@ -4,8 +4,8 @@ The margin t is the factor on all clearances at which the manipulator just assem
 with every link and joint rigid: it is assemblable where t <= 1.  The margin varies
 continuously, unlike a yes or no, and its inverse is the factor on the errors.
 
-As printed, (21) makes compliant joints rigid in every direction (``"rigid"``, the
-literal reading); ``"free"`` lets them turn about their own axis, as a hinge does.
+As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
+``"free"`` lets them turn about their own axis, as a hinge does.
 """
 
 from collections.abc import Sequence
@@ -28,8 +28,8 @@ from forcefit.inputs.display import Figures
 
 MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
 _GAP_ABSOLUTE = 1e-12  # .. plus this
-# readings of compliant joints, by the names of their margins
-MARGIN_READINGS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
+# what compliant joints do about their own axis, by the names of the two margins
+MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
 

@@ -31,7 +31,7 @@ def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
         robot: of n frames.
         compliant: what a passive joint with stiffness does about or along its own z:
             ``"elastic"``, only its spring moves (and ``spin``, if given, is a clearance
-            in series); ``"free"``, it moves freely: the second reading of problem (21);
+            in series); ``"free"``, it moves freely: the second margin of problem (21);
             ``"rigid"`` bounds are the elastic ones, ``"hinged"`` the free ones.
 
     Returns:

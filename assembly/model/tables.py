@@ -41,7 +41,7 @@ _OF_POINTS = {
     "duality_gap": ("J", (), "certified: energy is at most this too high"),
     "closure_residual": ("1", (), "largest closure error left"),
     "clearance_excess": ("1", (), "by how much a clearance is exceeded"),
-    "energy_without_play": ("J", (), "what closing would cost without clearances"),
+    "energy_without_clearance": ("J", (), "what closing would cost without clearances"),
     "margin": ("1", (), "factor on all clearances at which it just assembles"),
     "margin_bound": ("1", (), "certified: the margin is at least this"),
     "rotation_error": ("rad", ("bound",), "bounds of the largest rotation error, (27)"),

@@ -1,4 +1,4 @@
-"""Load against deflection: from free play through contacts to elastic, and to buckling.
+"""Load against deflection: clearances, contacts, elasticity, and buckling.
 
 One component of the load goes through a list of values while the rest stays.  At each
 the equilibrium is found, of problem (22) or with finite motions, the latter from the
@@ -45,7 +45,7 @@ _STAYS = 1e-6  # of the largest motion in a mode: rounding of a platform that st
 _STILL = 1e-12  # [characteristic lengths] motions that are rounding
 _JUMP = 5.0  # times what the tangents on both sides explain
 _BOUNDS = ("tilt", "tilt", "spin", "radial", "radial", "axial")  # by row of a screw
-_NO_LOAD = 1e-9  # of the largest load: where play may leave the pose open
+_NO_LOAD = 1e-9  # of the largest load: where clearances may leave the pose open
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class DeflectionCurve:
         energies: (k,) [J] elastic.
         stiffness: (k,) tangent along the component, the others free.
         pressed: (k,) names of the clearances that carry a force.
-        open_: (k,) bool, where play leaves the pose undetermined.
+        open_: (k,) bool, where clearances leave the pose undetermined.
         events: in the order met.
         method: of all equilibria, as asked: ``"compiled"`` or ``"reference"``.
     """
@@ -115,7 +115,7 @@ Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
-def load_deflection(
+def deflection_curve(
     posture: Posture,
     component: int,
     loads: Sequence[float],
@@ -152,7 +152,7 @@ def load_deflection(
     check_method(method)
     if component not in range(6) or not len(loads):
         raise BadInput(
-            f"load_deflection: found component {component} and {len(loads)} loads, "
+            f"deflection_curve: found component {component} and {len(loads)} loads, "
             "expected one of 0 to 5 and at least one load"
         )
     rest = np.zeros(6) if load is None else numbers_of("load", load, 6, "N m, N")
@@ -232,7 +232,7 @@ def _settled(
     point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None,
     method: Method,
 ) -> tuple[NDArray, bool]:  # fmt: skip
-    """Platform screw, where play leaves it open the one nearest to nominal."""
+    """Platform screw, where clearances leave it open the one nearest to nominal."""
     equilibrium = point.equilibrium
     idle = not rest.any() and gravity is None and abs(point.load) <= _NO_LOAD * largest
     if idle and isinstance(equilibrium, Assembly):
@@ -308,7 +308,7 @@ def _bracket(
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # as between free play and the least load: that near it is known
+            break  # as between free motion and the least load: that near it is known
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 

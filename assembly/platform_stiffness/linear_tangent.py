@@ -51,7 +51,7 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
         The stiffness at the platform's origin.
     """
     lin, joints = linearise(posture), virtual_joints(posture.robot)
-    return _stiffness(lin, "without clearance", joints.elastic, owners(joints),
+    return _stiffness(lin, "nominal", joints.elastic, owners(joints),
                       joints.free, "reference")  # fmt: skip
 
 
@@ -96,7 +96,7 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
                 names.append(Part(_frame(joints, rows[0]), "clearance"))
             else:
                 free.append(along[:, None] / np.linalg.norm(along))
-    return _stiffness(assembly.linearisation, "in contact", np.hstack(springs), names,
+    return _stiffness(assembly.linearisation, "contact", np.hstack(springs), names,
                       np.hstack(free), assembly.method)  # fmt: skip
 
 

@@ -39,7 +39,7 @@ class Stiffnesses:
         method: (k,) which gave it, or the equilibrium it belongs to: ``"compiled"`` or
             ``"reference"``.
         apart: by their row those whose own modes are kept: where a motion of the
-            platform is free, and all in other states than ``"without clearance"``.
+            platform is free, and all in other states than ``"nominal"``.
     """
 
     posture: Posture
@@ -215,7 +215,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
             apart[i] = one
     return Stiffnesses(
         posture=posture,
-        state="without clearance",
+        state="nominal",
         point=posture.platform[:, :3, 3],
         length=size,
         springs=springs,

@@ -90,7 +90,7 @@ class PlatformStiffness:
 
     Attributes:
         posture: where the robot stands nominally.
-        state: ``"without clearance"``, ``"in contact"`` or ``"exact"``.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``.
         point: (3,) [m] where screws and wrenches are read, base axes.
         length: [m] characteristic length.
         root: (6, k) [rad, m] per sqrt(2 J).

@@ -1,7 +1,7 @@
 """The platform's stiffness matrix K_C at a posture, in the state that is asked for."""
 
 from collections.abc import Sequence
-from typing import Literal, get_args, overload
+from typing import Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -21,13 +21,15 @@ from assembly.platform_stiffness.many_stiffnesses import (
 )
 from assembly.platform_stiffness.matrices import PlatformStiffness, numbers_of
 from assembly.solvers.method import Method, check_method
+from forcefit.inputs.renamed import current_value
 
-State = Literal["without clearance", "in contact", "exact"]
+State = Literal["nominal", "contact", "exact"]
+_OLD_STATES = {"without clearance": "nominal", "in contact": "contact"}
 
 
 @overload
 def platform_stiffness(
-    posture: Posture, state: State = "without clearance",
+    posture: Posture, state: State = "nominal",
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
     method: Method = "compiled",
@@ -36,7 +38,7 @@ def platform_stiffness(
 
 @overload
 def platform_stiffness(
-    posture: Sequence[Posture], state: State = "without clearance",
+    posture: Sequence[Posture], state: State = "nominal",
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0), side: Side = "holding",
     method: Method = "compiled",
@@ -45,7 +47,7 @@ def platform_stiffness(
 
 def platform_stiffness(
     posture: Posture | Sequence[Posture],
-    state: State = "without clearance",
+    state: State = "nominal",
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
@@ -56,8 +58,8 @@ def platform_stiffness(
 
     Args:
         posture: where the robot stands; or many postures of one robot.
-        state: ``"without clearance"``, the classical virtual-joint model of the nominal
-            robot, every clearance held at zero; ``"in contact"``, the tangent of
+        state: ``"nominal"``, the classical virtual-joint model of the nominal
+            robot, every clearance held at zero; ``"contact"``, the tangent of
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
             tangent of the exact equilibrium, with the stiffness that internal forces
             and loads add.
@@ -68,7 +70,7 @@ def platform_stiffness(
         side: of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
         method: ``"compiled"``, and the reference where that does not do; or
-            ``"reference"``, numpy and Clarabel alone.  Of the state ``"in contact"`` it
+            ``"reference"``, numpy and Clarabel alone.  Of the state ``"contact"`` it
             is that of :func:`assembly.linear.energy.solve_assembly`, of ``"exact"`` of
             :func:`assembly.exact.exact.solve_exact`.  The classical model of one
             posture is numpy by either, which its ``method`` says; that of many is
@@ -92,13 +94,14 @@ def platform_stiffness(
         load = numbers_of("load", load, 6, "N m, N")
     if side not in get_args(Side):
         raise ValueError(f"platform_stiffness: no side {side!r}")
+    state = cast(State, current_value("state", state, _OLD_STATES))
     if state not in get_args(State):
         raise ValueError(f"platform_stiffness: no state {state!r}")
     if not isinstance(posture, Posture):
         posture = together(posture)
     if posture.transforms.ndim == 3:
         return _of_one(posture, state, load, gravity, offset, side, method)
-    if state == "without clearance":
+    if state == "nominal":
         many = many_without_clearance(posture, method)
         turned = posture.platform[:, :3, :3] @ offset
         return many.at(many.point + turned) if offset.any() else many
@@ -114,9 +117,9 @@ def _of_one(
 ) -> PlatformStiffness:  # fmt: skip
     """The same of one posture."""
     platform = posture.platform
-    if state == "without clearance":
+    if state == "nominal":
         tangent = without_clearance(posture)
-    elif state == "in contact":
+    elif state == "contact":
         linear = solve_assembly(posture, load, gravity=gravity, method=method)
         tangent = in_contact(linear, side)
     else:

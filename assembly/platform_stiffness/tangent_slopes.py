@@ -68,14 +68,14 @@ class TangentState:
     """Of which tangent, and where it is read; see ``platform_stiffness``.
 
     Attributes:
-        state: ``"without clearance"``, ``"in contact"`` or ``"exact"``.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         at: (3,) [m] of the platform, in its axes.
         side: of a change of contact.
     """
 
-    state: State = "without clearance"
+    state: State = "nominal"
     load: ArrayLike | None = None
     gravity: ArrayLike | None = None
     at: ArrayLike = (0.0, 0.0, 0.0)
@@ -211,7 +211,7 @@ def _exact(
     return moved
 
 
-_STATES = {"without clearance": _classical, "in contact": _linear, "exact": _exact}
+_STATES = {"nominal": _classical, "contact": _linear, "exact": _exact}
 
 
 def _difference(

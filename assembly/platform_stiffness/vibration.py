@@ -17,6 +17,7 @@ Sources:
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +32,7 @@ from assembly.platform_stiffness.exact_tangent import part_owners, platform_move
 from assembly.platform_stiffness.matrices import Part
 from assembly.solvers.method import Method
 from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.renamed import renamed_keywords
 from forcefit.inputs.table import BadInput
 from stiffness.beam.beam import section_axes
 from stiffness.beam.sections import declared_section
@@ -64,12 +66,13 @@ class NaturalModes:
     __repr__, _repr_html_ = short_repr, html_table
 
 
+@renamed_keywords(exact=("state", {True: "exact", False: "nominal"}))
 def natural_modes(
     posture: Posture,
     count: int = 6,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
 ) -> NaturalModes:
     """Natural frequencies and modes of a robot, its drives held.
@@ -77,10 +80,11 @@ def natural_modes(
     Args:
         posture: where the robot stands.
         count: how many modes at most.
-        load: (6,) [N m, N] on the platform, of ``exact`` alone; it has no mass.
+        load: (6,) [N m, N] on the platform, in the state ``"exact"`` alone; it has no
+            mass.
         gravity: (3,) [m/s^2] likewise.
-        exact: whether around the equilibrium with errors, clearances and loads; else of
-            the nominal robot with clearances held at zero.
+        state: ``"nominal"``, of the nominal robot with clearances held at zero;
+            ``"exact"``, around the equilibrium with errors, clearances and loads.
         method: of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
@@ -91,9 +95,11 @@ def natural_modes(
         CannotAssemble: the errors cannot be closed.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found.
-        ValueError: no such method.
+        ValueError: no such state or method.
     """
-    if not exact:
+    if state not in {"nominal", "exact"}:
+        raise ValueError(f"natural_modes: no state {state!r}")
+    if state == "nominal":
         frames = (replace(f, clearance=None) for f in posture.robot.frames)
         tight = replace(posture.robot, frames=tuple(frames))
         posture = replace(posture, robot=tight.with_errors(0 * tight.errors))

@@ -1,11 +1,11 @@
-"""What is said of an exact equilibrium that the linear model does not foretell."""
+"""Remarks on an exact equilibrium that the linear model does not predict."""
 
 import numpy as np
 
 from assembly.exact.exact import ExactAssembly
 
 # of the platform's motion, and of the energy or the potential: links that turn by 0.1
-# rad are off by less, and where play is taken up these are not
+# rad are off by less, and where clearances are taken up these are not
 _FAR = 0.3
 
 

@@ -13,7 +13,7 @@ from assembly.platform_stiffness.arc_length import follow_load
 from assembly.platform_stiffness.deflection import (
     DeflectionCurve,
     Progress,
-    load_deflection,
+    deflection_curve,
 )
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
@@ -64,7 +64,7 @@ def deflection_of(
                 progress,
             )  # fmt: skip
         else:
-            curve = load_deflection(
+            curve = deflection_curve(
                 posture, component, loads, load, gravity, exact, progress
             )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -81,7 +81,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
         "energy": curve.energies,
         "stiffness": curve.stiffness,
         "contacts": [sorted(names) for names in curve.pressed],
-        "free_play": curve.open_,
+        "free_in_clearances": curve.open_,
         "events": [vars(event) for event in curve.events],
     }
 
@@ -105,7 +105,7 @@ def deflection_text(results: dict[str, Any]) -> str:
         lines.append(
             f"{results['loads'][i]:20.6g}{moved:20.6g}{results['stiffness'][i]:20.6g}"
             f"{len(results['contacts'][i]):20d}"
-            + ("  within clearances" if results["free_play"][i] else "")
+            + ("  within clearances" if results["free_in_clearances"][i] else "")
         )
     for event in results["events"]:
         at = f"{event['load']:.6g} {units[0]}"

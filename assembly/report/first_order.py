@@ -8,14 +8,10 @@ from numpy.typing import ArrayLike
 from assembly.exact.exact import ExactAssembly, solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.kinematics.singular_posture import is_singular
-from assembly.kinematics.verdict import (
-    BEYOND_LIMITS,
-    SINGULAR,
-    SINGULAR_WORDS,
-    limits_passed,
-)
+from assembly.kinematics.verdict import SINGULAR_WORDS, limits_passed
 from assembly.linear.energy import Assembly, CannotAssemble, failure_status
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import rounded, screw_text
 

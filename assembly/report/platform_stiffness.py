@@ -9,6 +9,7 @@ from assembly.exact.exact import solve_exact
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.active_set import contacts
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import (
@@ -17,6 +18,7 @@ from assembly.platform_stiffness.linear_tangent import (
     without_clearance,
 )
 from assembly.platform_stiffness.matrices import PlatformStiffness
+from assembly.platform_stiffness.platform_stiffness import State
 from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers, rounded
@@ -36,7 +38,7 @@ def stiffness_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
     at: ArrayLike = (0.0, 0.0, 0.0),
-    exact: bool = False,
+    state: State = "nominal",
     length: float | None = None,
     direction: ArrayLike | None = None,
 ) -> dict[str, Any]:
@@ -47,8 +49,8 @@ def stiffness_of(
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         at: (3,) [m] of the platform, in its axes, where screws and wrenches are read.
-        exact: whether the tangent is that of the exact equilibrium, else the classical
-            model's, and beside it that of problem (22) if the robot has clearances.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``; with the first also the
+            tangent of problem (22) if the robot has clearances.
         length: [m] by which rotations are multiplied; the longest body if absent.
         direction: (6,) unit, base axes: stiffness and shares along it.
 
@@ -62,16 +64,9 @@ def stiffness_of(
         "gravity": np.zeros(3) if gravity is None else np.asarray(gravity),
     }  # fmt: skip
     try:
-        if exact:
-            equilibrium = solve_exact(posture, load, gravity=gravity)
-            platform = equilibrium.placement.platform
-            sides = [exact_tangent(equilibrium)]
-            results["remarks"] = far_from_linear(equilibrium)
-            away = exact_tangent(equilibrium, "letting go")
-            if away.free.shape[1] > sides[0].free.shape[1]:
-                sides.append(away)
-        else:
-            platform, sides = posture.platform, [without_clearance(posture)]
+        platform, sides, remarks = _tangents(posture, load, gravity, state)
+        if remarks is not None:
+            results["remarks"] = remarks
         point = platform[:3, 3] + platform[:3, :3] @ np.asarray(at, dtype=float)
         values = [stiffness_values(side, point, length) for side in sides]
         results |= values[0] | {"status": _status(sides[0])}
@@ -79,13 +74,33 @@ def stiffness_of(
             results["reason"] = sides[0].free_text
         if direction is not None:
             results["direction"] = _along(sides[0].at(point, length), direction)
-        if exact:
+        if state != "nominal":
             results["letting_go"] = values[1] if len(values) > 1 else None
         elif virtual_clearances(posture):
-            results["in_contact"] = _in_contact(posture, load, gravity, point, length)
+            results["contact"] = _in_contact(posture, load, gravity, point, length)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         results |= {"status": failure_status(error), "reason": str(error)}
     return results
+
+
+def _tangents(
+    posture: Posture, load: Any, gravity: Any, state: State
+) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
+    """The platform's place, one tangent or both sides of a contact, and remarks."""
+    if state == "nominal":
+        return posture.platform, [without_clearance(posture)], None
+    if state == "contact":
+        linear = solve_assembly(posture, load, gravity=gravity)
+        sides = [in_contact(linear)]
+        if contacts(linear)[1].any():
+            sides.append(in_contact(linear, "letting go"))
+        return posture.platform, sides, None
+    equilibrium = solve_exact(posture, load, gravity=gravity)
+    sides = [exact_tangent(equilibrium)]
+    away = exact_tangent(equilibrium, "letting go")
+    if away.free.shape[1] > sides[0].free.shape[1]:
+        sides.append(away)
+    return equilibrium.placement.platform, sides, far_from_linear(equilibrium)
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
@@ -122,8 +137,8 @@ def _in_contact(
 def _status(stiffness: PlatformStiffness) -> str:
     """Whether the platform is held, and stable."""
     if not stiffness.stable:
-        return "unstable"
-    return "free motion" if stiffness.free.shape[1] else "ok"
+        return UNSTABLE
+    return FREE_MOTION if stiffness.free.shape[1] else "ok"
 
 
 def stiffness_values(
@@ -207,13 +222,13 @@ def stiffness_text(results: dict[str, Any]) -> str:
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if "compliance" not in results:
         return "\n".join([*lines, f"{results['status']}: {results['reason']}"])
-    if results["status"] == "unstable":
+    if results["status"] == UNSTABLE:
         lines.append("unstable: this equilibrium has a direction of negative stiffness")
     lines += _state_lines(results)
     lines += _share_lines(results["shares"])
     if "direction" in results:
         lines += _direction_lines(results["direction"])
-    for side in results.get("in_contact", ()):
+    for side in results.get("contact", ()):
         lines += ["", f"with clearances, {side['contacts']} pressed, {side['side']}:"]
         lines += _state_lines(side)
     if results.get("letting_go"):

@@ -21,7 +21,7 @@ def plot_assembly(
     assembly: Assembly,
     exaggeration: float | None = None,
     errors: str | None = None,
-    reading: str = "budget",
+    assumption: str = "budget",
     off_screen: bool = True,
 ) -> Any:
     """Plot an assembled robot and, if asked, the body of its platform's errors.
@@ -30,7 +30,7 @@ def plot_assembly(
         assembly: of the robot.
         exaggeration: factor on all displacements; chosen if absent.
         errors: ``"translation"`` or ``"rotation"``, or None for no body.
-        reading: of problem (27), for the body.
+        assumption: of problem (27), for the body.
         off_screen: False opens a window when the plotter is shown.
 
     Returns:
@@ -42,7 +42,7 @@ def plot_assembly(
     """
     plotter = robot_plotter(assembly, exaggeration, off_screen)
     if errors is not None:
-        reach = reachable_screws(assembly, reading)
+        reach = reachable_screws(assembly, assumption)
         if reach.unbounded(PARTS[errors].start):
             raise BadInput(
                 f"{assembly.posture.robot.name}: its platform moves freely, so its "
@@ -50,7 +50,9 @@ def plot_assembly(
             )
         body = error_body(reach, errors)
         size = 0.15 * float(np.ptp(assembly.posture.transforms[:, :3, 3], axis=0).max())
-        add_error_body(plotter, body, assembly.posture.platform[:3, 3], size, reading)
+        add_error_body(
+            plotter, body, assembly.posture.platform[:3, 3], size, assumption
+        )
         _fill_window(plotter)
     return plotter
 
@@ -128,7 +130,7 @@ def _fill_window(plotter: Any) -> None:
 
 
 def add_error_body(
-    plotter: Any, body: ErrorBody, origin: NDArray, size: float, reading: str
+    plotter: Any, body: ErrorBody, origin: NDArray, size: float, assumption: str
 ) -> None:
     """Add a body of translation or rotation errors to a plot, magnified.
 
@@ -137,7 +139,7 @@ def add_error_body(
         body: of the errors.
         origin: (3,) [m] of zero error, the platform's nominal origin.
         size: [m] of the largest error in the plot.
-        reading: of problem (27), written below with the largest error.
+        assumption: of problem (27), written below with the largest error.
     """
     import pyvista
 
@@ -150,7 +152,7 @@ def add_error_body(
     plotter.add_mesh(solid, color="gold", opacity=0.6, point_size=6)
     unit, scale = ("mm", 1e3) if body.part == "translation" else ("mrad", 1e3)
     caption = (
-        f"gold: {body.part} errors possible ({reading}), "
+        f"gold: {body.part} errors possible ({assumption}), "
         f"up to {largest * scale:.3g} {unit}"
     )
     plotter.add_text(caption, position="lower_left", font_size=9, name="body")

@@ -14,7 +14,7 @@ from assembly.linear.energy import (
     solve_assembly,
 )
 from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.reference.pose_error import READINGS, reachable_screws
+from assembly.linear.reference.pose_error import ASSUMPTIONS, reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.report.first_order import singular_status
 from assembly.report.results import proof_status, status_line
@@ -25,7 +25,7 @@ from forcefit.inputs.table import BadInput
 
 def pose_error_of(
     posture: Posture,
-    readings: Sequence[str] | None = None,
+    assumptions: Sequence[str] | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
     direction: ArrayLike | None = None,
     load: ArrayLike | None = None,
@@ -36,7 +36,7 @@ def pose_error_of(
 
     Args:
         posture: of the robot.
-        readings: of problem (27); all that are defined if absent, under a load without
+        assumptions: of problem (27); all that are defined if absent, under a load not
             ``budget``.
         point: (3,) [m] whose translation is bounded, platform axes.
         direction: (6,) along which the largest error is bounded too.
@@ -48,15 +48,15 @@ def pose_error_of(
         The keys of the public format; ``status`` as in :func:`solution_of`.
 
     Raises:
-        BadInput: reading ``budget`` is asked under a load.
+        BadInput: assumption ``budget`` is asked under a load.
     """
     loaded = bool(np.any(load) or np.any(gravity))
-    if loaded and "budget" in (readings or ()):
+    if loaded and "budget" in (assumptions or ()):
         raise BadInput(
-            "reading budget: found a load; expected frozen or free (the budget is a "
+            "assumption budget: found a load; expected frozen or free (the budget is a "
             "factor on the energy of closing alone)"
         )
-    readings = readings or (READINGS[:2] if loaded else READINGS)
+    assumptions = assumptions or (ASSUMPTIONS[:2] if loaded else ASSUMPTIONS)
     results: dict[str, Any] = {
         "robot": posture.robot.name,
         "status": "ok",
@@ -75,7 +75,7 @@ def pose_error_of(
         assembly = solve_assembly(posture, load, gravity=gravity)
         table: dict[str, Any] = {}
         unproved = []
-        for name in readings:
+        for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
             except FreeMotion as error:  # compliant joints without their own springs
@@ -97,7 +97,7 @@ def pose_error_of(
 
 
 def _bounds(bound: PoseError) -> dict[str, Any]:
-    """Both brackets of a reading."""
+    """Both brackets of an assumption."""
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
@@ -107,11 +107,11 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
 
 
 def _support(
-    assembly: Assembly, reading: str, offset: NDArray, direction: ArrayLike,
+    assembly: Assembly, assumption: str, offset: NDArray, direction: ArrayLike,
     energy_budget: float = 0.05, **_: float,
 ) -> dict[str, Any]:  # fmt: skip
     """Largest error along a direction: certified, attained, and the screw there."""
-    reach = reachable_screws(assembly, reading, energy_budget).at_point(offset)
+    reach = reachable_screws(assembly, assumption, energy_budget).at_point(offset)
     support = reach.support(direction)
     if support.height == np.inf:
         return _bracket((np.inf, np.inf), reach.centre)
@@ -125,16 +125,16 @@ def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Bounds for people: a line for each reading."""
+    """Bounds for people: a line for each assumption."""
     lines = [f"{results['robot']} at {numbers(results['pose'].values())} [m, rad]"]
     if results["status"] != "ok":
         lines.append(status_line(results))
-    for reading, bounds in (results["error"] or {}).items():
+    for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
-            lines.append(f"{reading:7s} no answer: {bounds['reason']}")
+            lines.append(f"{assumption:7s} no answer: {bounds['reason']}")
             continue
         lines.append(
-            f"{reading:7s} rotation {_bounds_text(bounds['rotation'], 'mrad')}, "
+            f"{assumption:7s} rotation {_bounds_text(bounds['rotation'], 'mrad')}, "
             f"translation {_bounds_text(bounds['translation'], 'mm')}"
         )
         if "along" in bounds:

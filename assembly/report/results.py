@@ -26,6 +26,7 @@ from assembly.linear.load import massless
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
+from assembly.model.statuses import NOT_PROVED, UNSTABLE
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.report.beyond_linear import far_from_linear
 from assembly.report.first_order import first_order_status, linearisation_of
@@ -37,11 +38,11 @@ _UNSTABLE = "the potential falls along a motion, as beyond a critical load"
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Margins of (21) in both readings of compliant joints, as plain values."""
+    """Margins of (21), compliant joints held and free, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
-        "status": "not proved" if unproved_parts else "ok",
+        "status": NOT_PROVED if unproved_parts else "ok",
         "assemblable": rigid.assemblable,
         "assemblable_free": free.assemblable,
         "margin": _finite(rigid.margin),
@@ -127,7 +128,7 @@ def solution_of(
 
 def proof_status(reason: str) -> dict[str, str]:
     """Status and reason of a solution with an incomplete proof; empty otherwise."""
-    return {"status": "not proved", "reason": reason} if reason else {}
+    return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
 def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
@@ -215,7 +216,7 @@ def exact_of(
     }
     loaded = assembly.load.any() or gravity is not None
     if loaded and not exact_tangent(assembly).stable:
-        results |= {"status": "unstable", "reason": _UNSTABLE}
+        results |= {"status": UNSTABLE, "reason": _UNSTABLE}
     return results | {
         **_screws_and_wrenches(assembly),
         "certificate": certificate,
@@ -302,7 +303,7 @@ def remark_lines(remarks: Sequence[str]) -> list[str]:
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Certified bounds of the largest pose error, reading ``frozen`` of (27).
+    """Certified bounds of the largest pose error, assumption ``frozen`` of (27).
 
     Args:
         assembly: at least energy.
@@ -316,13 +317,13 @@ def worst(assembly: Assembly) -> dict[str, Any] | None:
     except (FreeMotion, SolverFailed):
         return None
     return {
-        "reading": "frozen", "rotation": float(bound.rotation_error[1]),
+        "assumption": "frozen", "rotation": float(bound.rotation_error[1]),
         "translation": float(bound.translation_error[1]),
     }  # fmt: skip
 
 
 def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> str:
-    """How well the screw is known, and the certified largest error with play."""
+    """How well the screw is known, and the certified largest error with clearances."""
     turn, shift = 1e3 * bound["screw_rotation_error"], bound["screw_translation_error"]
     text = f"platform error proved to {turn:.1e} mrad, {1e6 * shift:.1e} um"
     loose = 1e3 * bound["screw_rotation_open"], 1e6 * bound["screw_translation_open"]
@@ -334,7 +335,7 @@ def _screw_bound_text(bound: dict[str, Any], largest: dict[str, Any] | None) -> 
     turn, shift = largest["rotation"], largest["translation"]
     return (
         f"{text}at most {1e3 * turn:.3g} mrad, {1e6 * shift:.4g} um from nominal "
-        "(certified, reading frozen of assembly error)"
+        "(certified, assumption frozen of assembly error)"
     )
 
 

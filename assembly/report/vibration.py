@@ -1,6 +1,6 @@
 """Natural frequencies for machines and for people."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,13 +8,14 @@ from numpy.typing import ArrayLike
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import FREE_MOTION, UNSTABLE
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import numbers
 
 _NOMINAL = (
     "load and gravity are left out: these are the frequencies of the nominal robot; "
-    "with --exact they count, and so does the stiffness that they give"
+    "with --state exact they count, and so does the stiffness that they give"
 )
 _NAMED = 3  # parts of a mode that people are told
 
@@ -24,7 +25,7 @@ def vibration_of(
     count: int = 6,
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
     """Everything ``assembly frequencies`` reports, as plain values.
 
@@ -33,7 +34,7 @@ def vibration_of(
         count: modes at most.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether around the equilibrium with errors, clearances and loads.
+        state: ``"exact"`` around the equilibrium with errors, clearances and loads.
 
     Returns:
         Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"`` or
@@ -44,18 +45,18 @@ def vibration_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "exact": exact, "remarks": [],
+        "state": state, "remarks": [],
     }  # fmt: skip
-    if not exact and (np.any(load) or np.any(gravity)):
+    if state == "nominal" and (np.any(load) or np.any(gravity)):
         results["remarks"] = [_NOMINAL]
     try:
-        modes = natural_modes(posture, count, load, gravity, exact)
+        modes = natural_modes(posture, count, load, gravity, state)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     if np.isnan(modes.frequencies).any():
-        results["status"] = "unstable"
+        results["status"] = UNSTABLE
     elif (modes.frequencies == 0.0).any():
-        results["status"] = "free motion"
+        results["status"] = FREE_MOTION
     return results | {
         "frequencies": modes.frequencies,
         "idle_motions": modes.idle,

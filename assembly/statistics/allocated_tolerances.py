@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.error_distributions import KINDS
-from assembly.statistics.clearance_positions import contact_length_of, play_means
+from assembly.statistics.clearance_positions import clearance_means, contact_length_of
 from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
 from assembly.sweeps.identity import robot_hash
@@ -97,7 +97,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
         },
         "proven_scale": allocation.proven_scale,
         "verification": allocation.verification,
-        "play": plan.clearance_model if plan.limits_pose else None,
+        "clearance": plan.clearance_model if plan.limits_pose else None,
         "contact_length": _contact_length(plan),
         **_distribution(plan),
         "draws": plan.draws,
@@ -176,9 +176,9 @@ def allocation_text(results: dict[str, Any]) -> str:
         lines.append(f"{line} ({note})")
     if lines:
         lines.append(f"in brackets: the share {_SHARE_OF[results['cost']]}")
-    if results["play"]:
-        means = play_means(results["play"], results["contact_length"])
-        lines.append(f"pose errors: play {results['play']}: {means}")
+    if results["clearance"]:
+        means = clearance_means(results["clearance"], results["contact_length"])
+        lines.append(f"pose errors: clearance {results['clearance']}: {means}")
     taken = results["perfect_parts"].items()
     lines += [_taken_text(key, one) for key, one in taken if one["reached"] > 0.0]
     lines.append(_price_text(results))
@@ -275,7 +275,7 @@ def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
             "price_alike": allocation.price_uniformly_scaled,
             "price_bound": allocation.price_bound,
             "said": text,
-            "play": results["play"] or "",
+            "clearance": results["clearance"] or "",
             "verified_yield": verification["yield"]["probability"]
             if verification
             else float("nan"),

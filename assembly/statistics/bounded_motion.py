@@ -2,7 +2,7 @@
 
 Those bounds are left out of the prepared posture: most are ranges that no clearance
 comes near.  Draws in which one may be reached are positioned one by one, in the set of
-platform screws of problem (27), reading ``frozen``, which has every bound that counts
+platform screws of problem (27), ``frozen``, which has every bound that counts
 as a cone (:mod:`assembly.linear.reference.pose_error`).
 """
 
@@ -19,7 +19,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.linear_response import LinearResponse
 
-READING = "frozen"  # every spring as in the solution of (22)
+ASSUMPTION = "frozen"  # every spring as in the solution of (22)
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
@@ -79,7 +79,7 @@ def bounded_position(
     from assembly.statistics.uniform_clearance import sample_uniform_position
 
     try:
-        reachable = reachable_screws(draws[i], READING)
+        reachable = reachable_screws(draws[i], ASSUMPTION)
         if wrench is not None:
             bounded = replace(reachable, free=np.zeros((6, 0)))
             return bounded.support(wrench).screw, True

@@ -29,7 +29,7 @@ from assembly.solvers.conic import minimise_energy
 from assembly.statistics.bounded_motion import bounded_position, draws_at_bounds
 from assembly.statistics.linear_response import LinearResponse
 
-# the option --play and its explanation
+# values of the option --clearance and their meaning
 CLEARANCE_MODELS = {
     "worst": "clearances anywhere they may be, the largest pose errors count, eq. (27)",
     "uniform": "clearances uniform over all places they may be",
@@ -65,7 +65,7 @@ def position_clearances(
     """
     if clearance_model not in CLEARANCE_MODELS or clearance_model == "worst":
         valid = tuple(name for name in CLEARANCE_MODELS if name != "worst")
-        raise ValueError(f"play is {clearance_model!r}, expected one of {valid}")
+        raise ValueError(f"clearance is {clearance_model!r}, expected one of {valid}")
     mixed = np.ones(len(draws.energy), dtype=bool)
     if clearance_model == "least":
         return draws.platform_screw, mixed
@@ -114,7 +114,7 @@ def contact_length_of(robot: Robot) -> float:
     return size_of(robot)
 
 
-def play_means(clearance_model: str, contact_length: float | None = None) -> str:
+def clearance_means(clearance_model: str, contact_length: float | None = None) -> str:
     """A clearance model in words, with the length that the contact model needs."""
     words = CLEARANCE_MODELS[clearance_model]
     if clearance_model != "contact" or contact_length is None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.assembled import without_rounding
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.linear.zone import MARGIN_READINGS
+from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import ErrorSources, draw_generator
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.statistics.clearance_positions import (
@@ -45,7 +45,7 @@ class Experiment:
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state of the platform's stiffness, one of
-            :data:`assembly.sweeps.point_stiffness.STATES`, not the classical one;
+            :data:`assembly.sweeps.point_stiffness.STATES`, not the nominal one;
             empty for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
             upper minus lower bound; inf for one that is not needed.
@@ -70,7 +70,7 @@ class Experiment:
     def __post_init__(self) -> None:
         if self.clearance_model not in CLEARANCE_MODELS:
             raise ValueError(
-                f"play is {self.clearance_model!r}, expected one of "
+                f"clearance is {self.clearance_model!r}, expected one of "
                 f"{tuple(CLEARANCE_MODELS)}"
             )
         if self.contact_length is not None and not 0 < self.contact_length < np.inf:
@@ -100,7 +100,7 @@ class Experiment:
         """The posture prepared for (21), by quantity."""
         if not self.margins:
             return {}
-        return {k: prepare_margins(self.posture, r) for k, r in MARGIN_READINGS.items()}
+        return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
 
     @cached_property
     def links(self) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ class Experiment:
         if self.stiffness:
             shapes |= {"stiffness": (6,), "free_motion": (6, 6)}
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
-        flags = ["play_mixed"] if self.clearance_model == "uniform" else []
+        flags = ["clearance_mixed"] if self.clearance_model == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
@@ -187,7 +187,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
             if self.clearance_model == "uniform":
-                rows["play_mixed"] = mixed
+                rows["clearance_mixed"] = mixed
         rows["platform_screw"] = screws
         wrenches = without_rounding(solved.wrenches)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):

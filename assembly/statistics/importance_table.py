@@ -215,8 +215,8 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
     }  # fmt: skip
     return {
         "base_draws": int(data.attrs["importance_draws"]),
-        "play": str(data.attrs["importance_clearance_model"]), "quantities": quantities,
-        "platform": platform,
+        "clearance": str(data.attrs["importance_clearance_model"]),
+        "quantities": quantities, "platform": platform,
     }  # fmt: skip
 
 
@@ -225,8 +225,8 @@ def importance_text(report: Mapping[str, Any]) -> str:
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
-        f"{report['play']} in the shares, least in what moves the platform (its slopes "
-        "are exact):"
+        f"{report['clearance']} in the shares, least in what moves the platform (its "
+        "slopes are exact):"
     ]
     for name, one in quantities.items():
         if "reason" in one:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from assembly.kinematics.posture import POSE
-from assembly.statistics.clearance_positions import play_means
+from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import (
     ImportanceOptions,
@@ -176,7 +176,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
         "robot_sha256": robot_hash(posture.robot),
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
-        "play": experiment.clearance_model,
+        "clearance": experiment.clearance_model,
         **({} if contact is None else {"contact_length": contact}),
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
@@ -206,12 +206,12 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
     meanings = MEANINGS | {
         k: f"{MEANINGS[k]}; "
-        f"{play_means(experiment.clearance_model, experiment.used_contact_length)}"
+        f"{clearance_means(experiment.clearance_model, experiment.used_contact_length)}"
         for k in POSE_ERRORS
     }
     if experiment.clearance_model == "worst":
         meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
-        meanings["platform_screw"] += f"; {play_means('least')}"
+        meanings["platform_screw"] += f"; {clearance_means('least')}"
     variables = {
         name: (
             dims.get(name, ("draw",)), rows[name],

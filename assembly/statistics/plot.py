@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import play_means
+from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.sweeps.panels import named_panels, quantity
@@ -57,7 +57,7 @@ def figure_of_draws(
     if kind == "histogram":
         return histogram_figure(data, quantities)
     if quantities:
-        raise BadInput(f"--quantity: found with {kind}, expected with a histogram")
+        raise BadInput(f"--quantities: found with {kind}, expected with a histogram")
     return tornado_figure(data) if kind == "tornado" else allocation_figure(data)
 
 
@@ -93,7 +93,7 @@ def histogram_figure(
     for panel, (name, scale, text) in zip(panels, shown, strict=False):
         _histogram(panel, text, scale * quantity(solved, name).values)
         if name in POSE_ERRORS:
-            panel.set_title(f"play {data.attrs['play']}", fontsize=9)
+            panel.set_title(f"clearance {data.attrs['clearance']}", fontsize=9)
         if name in _MARGINS:
             half = quantile(np.nan_to_num(data[name].values, nan=np.inf), 0.5)["value"]
             title = f"median of all {data.sizes['draw']} draws: {half:.3g}"
@@ -104,8 +104,8 @@ def histogram_figure(
         f"{plot_label(str(data.attrs.get('robot', '')))}: "
         f"of the {solved.sizes['draw']} of {data.sizes['draw']} draws that assemble, "
         f"seed {data.attrs.get('seed', '')}"
-        f"\npose errors: play {data.attrs['play']}: "
-        f"{play_means(data.attrs['play'], data.attrs.get('contact_length'))}"
+        f"\npose errors: clearance {data.attrs['clearance']}: "
+        f"{clearance_means(data.attrs['clearance'], data.attrs.get('contact_length'))}"
     )
     return figure
 
@@ -174,7 +174,7 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
         panel.set(xlabel=f"share of the variance: {NAMES[name]}")
         if name in POSE_ERRORS:
             panel.set_title(
-                f"play {data.attrs['importance_clearance_model']}", fontsize=9
+                f"clearance {data.attrs['importance_clearance_model']}", fontsize=9
             )
         panel.legend(fontsize=8, loc="lower right")
     for panel in panels[len(names) :]:

@@ -24,7 +24,7 @@ MEANINGS = {
     "stress": "largest von Mises stress in the link",
     "stiffness": "of the platform along each axis, the others free; 0 where free",
     "free_motion": "of the platform, that nothing resists: unit screws, else NaN",
-    "play_mixed": "1 where the walk that settles the clearances met its criterion",
+    "clearance_mixed": "1 where the walk that settles the clearances met its criterion",
     "status": "0 solved, 1 no answer",
 }
 POSE_ERRORS = ("rotation", "translation")

@@ -54,7 +54,7 @@ def draws_page(
             good=_share(summary)["probability"] >= _GOOD,
             tiles=_draws_tiles(summary),
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
-            f"play {summary['play']}: {summary['play_means']}.",
+            f"clearance {summary['clearance']}: {summary['clearance_means']}.",
             body=[
                 section("How often", _yields(summary)),
                 _perfect_parts(summary),
@@ -96,7 +96,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     ]  # fmt: skip
     if high95:
         answer = [part for one in high95 for part in (" and ", one)][1:]
-        note = f"of the platform's error; play {summary['play']}."
+        note = f"of the platform's error; clearance {summary['clearance']}."
         tiles.append(Tile("95 % stay below", answer, [note]))
     return tiles + tightening_tiles(summary)
 
@@ -149,10 +149,10 @@ def _quantities(summary: Mapping[str, Any]) -> str:
     for key, one in summary["quantities"].items():
         if "mean" not in one:
             continue
-        play = f" (play {one['play']})" if "play" in one else ""
+        clearance = f" (clearance {one['clearance']})" if "clearance" in one else ""
         values = [one["mean"]["value"], one["most_probable"]["value"]]
         values += [one["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
-        rows.append([NAMES[key] + play, *(Value(v, one["unit"]) for v in values)])
+        rows.append([NAMES[key] + clearance, *(Value(v, one["unit"]) for v in values)])
     head = ["", "mean", "most probable", "median", "95 % below", "99 % below"]
     text = f"Of the {summary['assembled']} of {summary['draws']} draws that assemble:"
     return paragraph(text) + table(head, rows, "sizes")
@@ -187,7 +187,7 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
             "type": "scatter", "mode": "lines", "x": [at, at], "name": words,
             "y": [0, int(counts.max())], "line": {"color": colour},
         })  # fmt: skip
-    caption = f"play {one['play']}" if "play" in one else ""
+    caption = f"clearance {one['clearance']}" if "clearance" in one else ""
     return chart(traces, Axis(name, one["unit"]), Axis("draws"), caption)
 
 
@@ -204,12 +204,13 @@ def _importance(summary: Mapping[str, Any]) -> str:
              rank_text(one["rank"].get(name))]
             for name, values in shares
         ]  # fmt: skip
-        play = f" (play {summary['importance']['play']})" if key in POSE_ERRORS else ""
+        model = summary["importance"]["clearance"]
+        title = NAMES[key] + (f" (clearance {model})" if key in POSE_ERRORS else "")
         axis = Axis(f"share of the variance: {NAMES[key]}")
         words = ("share, with others", "at least", "at most", "share alone")
         head: list[str | Column] = ["error", *map(Column, words), "rank"]
         pieces += [
-            bars({name: v[0] for name, v in shares}, axis, NAMES[key] + play, np.nan),
+            bars({name: v[0] for name, v in shares}, axis, title, np.nan),
             table(head, rows, "shares"),
         ]
     if pieces:

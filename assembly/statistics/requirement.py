@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.zone import MARGIN_READINGS
+from assembly.linear.zone import MARGINS
 from assembly.model.error_distributions import ErrorSources
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.posture_margins import prepare_margins
@@ -130,8 +130,8 @@ class Requirement:
     def prepared(self) -> dict[str, list]:
         """By limit, the prepared postures."""
         return {
-            key: [prepare_margins(p, MARGIN_READINGS[key]) for p in self.postures]
-            if key in MARGIN_READINGS else [e.energies for e in self.experiments]
+            key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
+            if key in MARGINS else [e.energies for e in self.experiments]
             for key in self.plan.limits
         }  # fmt: skip
 
@@ -285,7 +285,7 @@ class Requirement:
                 raise BadInput(
                     f"limit {key}: even perfect parts reach {value:.4g} {unit} by "
                     f"clearances alone at {where}; expected at most {limits[key]:g} "
-                    f"{unit} (or --play least, if clearances stay as solved)"
+                    f"{unit} (or --clearance least, if clearances stay as solved)"
                 )
 
     def check_taken_up(self) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.model.statuses import OUT_OF_REACH
 from assembly.report.scene import robot_scene
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.experiment import Experiment
@@ -103,7 +104,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
     at = tuple(np.searchsorted(ticks[name], v) for name, v in varied.items())
     margins = np.full([len(v) for v in ticks.values()], np.nan)
     margins[at] = present["margins"]
-    states = np.full(margins.shape, "out of reach", dtype=object)
+    states = np.full(margins.shape, OUT_OF_REACH, dtype=object)
     states[at] = np.where(
         np.asarray(present["margins"]) <= 1.0, "goes together", "needs force"
     )

@@ -1,6 +1,6 @@
 """The platform's stiffness of every draw: what errors and clearances spread it to.
 
-Errors do not change the classical K_C.  What they change is which clearances are
+Errors do not change the nominal K_C.  What they change is which clearances are
 pressed, so the tangent of (22) differs from draw to draw; and internal forces and
 turned parts, which the tangent of the exact equilibrium has besides.
 """

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.linear.zone import ASSEMBLABLE
-from assembly.statistics.clearance_positions import play_means
+from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.estimates import (
     bracketed,
     mean,
@@ -58,9 +58,10 @@ def summarise(
         level: of confidence of all intervals.
 
     Returns:
-        ``draws`` and how many of them are ``assembled``; ``play``, what it means and
-        its ``contact_length`` [m];
-        ``assembles`` (with any energy, rigidly in both readings), ``exceeds`` and
+        ``draws`` and how many of them are ``assembled``; ``clearance``, what it means
+        and its ``contact_length`` [m];
+        ``assembles`` (with any energy, rigidly with compliant joints held or free),
+        ``exceeds`` and
         ``within_limits`` with the probabilities among all draws; what perfect parts
         reach (``perfect_parts``) and which limits they break; mean, quantiles and
         most probable value of every quantity among those that assemble, of margins
@@ -72,12 +73,13 @@ def summarise(
     limits = dict(limits or {})
     if strength is not None:
         limits.setdefault("stress", strength)
-    count, play = data.sizes["draw"], str(data.attrs["play"])
+    count, clearance = data.sizes["draw"], str(data.attrs["clearance"])
     length = data.attrs.get("contact_length")
     solved = data["status"].values == 0
     report: dict[str, Any] = {
         "draws": count, "assembled": int(solved.sum()), "confidence": level,
-        "play": play, "play_means": play_means(play, length), "contact_length": length,
+        "clearance": clearance, "clearance_means": clearance_means(clearance, length),
+        "contact_length": length,
         "assembles": {"forced": proportion(int(solved.sum()), count, level)},
         "duality_gap": float(np.nanmax(data["duality_gap"].values, initial=0.0)),
     }  # fmt: skip
@@ -85,9 +87,9 @@ def summarise(
         if key in data:
             inside = int((data[key].values <= ASSEMBLABLE).sum())
             report["assembles"][name] = proportion(inside, count, level)
-    if "play_mixed" in data:
-        unmixed = int((data["play_mixed"].values[solved] == 0).sum())
-        report["play_not_mixed"] = unmixed
+    if "clearance_mixed" in data:
+        unmixed = int((data["clearance_mixed"].values[solved] == 0).sum())
+        report["clearance_not_mixed"] = unmixed
     report |= _yields(data, solved, limits, level)
     report["perfect_parts"] = json.loads(data.attrs.get("perfect_parts", "{}"))
     report["perfect_parts_break"] = limits_broken(report["perfect_parts"], limits)
@@ -101,7 +103,8 @@ def summarise(
     screws = screws[np.isfinite(screws).all(axis=1)]
     if len(screws) > 1:
         report["platform_screw"] = {
-            "play": "least" if play == "worst" else play, "draws": len(screws),
+            "clearance": "least" if clearance == "worst" else clearance,
+            "draws": len(screws),
             "mean": screws.mean(axis=0), "covariance": np.cov(screws.T),
             "most_probable": [most_probable(part, level) for part in screws.T],
         }  # fmt: skip
@@ -145,13 +148,13 @@ def _yields(
             **bracketed(int(surely.sum()), int((~over).sum()), count, level),
         }  # fmt: skip
         if key in POSE_ERRORS:
-            exceeds[key]["play"] = data.attrs["play"]
+            exceeds[key]["clearance"] = data.attrs["clearance"]
     report: dict[str, Any] = {"exceeds": exceeds}
     if limits:
         within = bracketed(int(met.sum()), int(failed.sum()), count, level)
         report["within_limits"] = within
         if set(POSE_ERRORS) & set(limits):
-            within["play"] = data.attrs["play"]
+            within["clearance"] = data.attrs["clearance"]
     return report
 
 
@@ -173,7 +176,7 @@ def _described(
         "draws": len(finite),
     }  # fmt: skip
     if key in POSE_ERRORS:
-        description["play"] = str(data.attrs["play"])
+        description["clearance"] = str(data.attrs["clearance"])
     if key in _MARGINS:
         every = np.where(np.isnan(every), np.inf, every)
         description["all_draws"] = {
@@ -200,17 +203,17 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
-        f"pose errors: play {summary['play']}: {summary['play_means']}",
+        f"pose errors: clearance {summary['clearance']}: {summary['clearance_means']}",
     ]
-    if summary["play"] == "contact" and not summary.get("load"):
+    if summary["clearance"] == "contact" and not summary.get("load"):
         lines.append(
             "the contact length decides which clearances close; with the load of "
             "service (--load) they close as it presses them"
         )
-    if summary.get("play_not_mixed"):
+    if summary.get("clearance_not_mixed"):
         lines.append(
-            f"warning: in {summary['play_not_mixed']} draws uniform clearances are not "
-            "mixed when their walk ends: their pose errors are too narrow"
+            f"warning: in {summary['clearance_not_mixed']} draws uniform clearances "
+            "are not mixed when their walk ends: their pose errors are too narrow"
         )
     lines += [f"{WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
     for key, results in summary["exceeds"].items():
@@ -244,7 +247,9 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
     """A name with its clearance model, if it has one."""
-    return f"{name} [play {results['play']}]" if "play" in results else name
+    return (
+        f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
+    )
 
 
 def _share(interval: Mapping[str, float]) -> str:

@@ -10,10 +10,11 @@ import numpy as np
 
 from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import Posture, place_many
-from assembly.kinematics.verdict import SINGULAR, SINGULAR_WORDS, verdicts
+from assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
+from assembly.model.statuses import OUT_OF_REACH, SINGULAR
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.posture_margins import prepare_margins
 from assembly.statistics.requirement import Plan
@@ -52,7 +53,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
     )  # fmt: skip
     usable = [p for p, (status, _) in zip(reached, said, strict=True) if not status]
     count = Counter(status for status, _ in said if status)
-    count["out of reach"] = len(postures) - len(reached)
+    count[OUT_OF_REACH] = len(postures) - len(reached)
     return usable, {status: n for status, n in count.items() if n}
 
 
@@ -76,7 +77,7 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
         "plan_and_postures_sha256": digest.hexdigest(),
         "limits": str(dict(plan.limits)),
         "cost": plan.cost,
-        "play": plan.clearance_model,
+        "clearance": plan.clearance_model,
         "contact_length": plan.contact_length or 0.0,
         "yield": plan.asked_yield,
         "draws": plan.draws,
@@ -96,7 +97,7 @@ def present_errors(
 
     Args:
         postures: of a robot with errors.
-        compliant: ``"free"`` or ``"rigid"``, reading of compliant joints.
+        compliant: ``"free"`` or ``"rigid"``, about the own axis of compliant joints.
         progress: called with postures done and their number.
 
     Returns:

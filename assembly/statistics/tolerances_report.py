@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from assembly.statistics.clearance_positions import play_means
+from assembly.statistics.clearance_positions import clearance_means
 from assembly.statistics.plot import NAMES
 from assembly.statistics.quantities import UNITS
 from forcefit.page.charts import Axis, bars, grid
@@ -169,7 +169,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
         for key, limit in allocation["limits"].items()
     ]
     asked = allocation["yield"]
-    play = allocation["play"]
+    model = allocation["clearance"]
     errors = "uniform within plus or minus their tolerance"
     if allocation["distribution"] == "truncated":
         errors = (
@@ -177,8 +177,9 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
             "deviations, where it is cut"
         )
     clearances = "no pose error is limited: their position does not matter"
-    if play is not None:
-        clearances = f"play {play}: {play_means(play, allocation['contact_length'])}"
+    if model is not None:
+        means = clearance_means(model, allocation["contact_length"])
+        clearances = f"clearance {model}: {means}"
     check = allocation["verification"]
     fresh = f"; {check['draws']} fresh ones verify" if check else ""
     rows += [

@@ -1,12 +1,12 @@
 """Largest pose errors over all clearance positions: problem (27) for many draws.
 
-The reading is ``frozen``: all springs as in the solution of (22), all clearances that
-carry no load anywhere within their bounds.  By strict convexity every solution of (22)
-has the same springs, and by complementary slackness the same loaded clearances.  So
-this is the set of *all* solutions of (22), inside a zone and outside.  The positions of
-the uniform and the contact model and the solver's own solution are points of it.  The
-other readings change the robot: ``free`` lets compliant joints turn without energy,
-``budget`` lets parts store more energy than the least.
+The assumption is ``frozen``: all springs as in the solution of (22), all clearances
+that carry no load anywhere within their bounds.  By strict convexity every solution of
+(22) has the same springs, and by complementary slackness the same loaded clearances.
+So this is the set of *all* solutions of (22), inside a zone and outside.  The positions
+of the uniform and the contact model and the solver's own solution are points of it.
+The other assumptions change the robot: ``free`` lets compliant joints turn without
+energy, ``budget`` lets parts store more energy than the least.
 
 Under a load the same holds for energy minus work: only clearances that no load holds
 are free.
@@ -28,7 +28,7 @@ from assembly.statistics.clearance_positions import (
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS
 
-READING = "frozen"
+ASSUMPTION = "frozen"
 PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
 _SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slopes
 
@@ -75,7 +75,7 @@ def _without_load(
 ) -> tuple[NDArray, NDArray]:
     """Bounds and screws of unloaded draws, compiled."""
     found = bound_pose_error(
-        draws, READING,
+        draws, ASSUMPTION,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
     )  # fmt: skip
     return (
@@ -90,7 +90,7 @@ def _under_load(
     """Bounds and screws of one loaded draw; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
-            draws[i], READING,
+            draws[i], ASSUMPTION,
             tolerance_rotation=precision[0], tolerance_translation=precision[1],
         )  # fmt: skip
     except (CannotAssemble, SolverFailed, FreeMotion):

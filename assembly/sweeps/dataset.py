@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.statuses import OF_POINTS
 from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_file
-from assembly.sweeps.quantities import STATUSES, TEXTS, variables
+from assembly.sweeps.quantities import TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
 
@@ -28,10 +29,17 @@ KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
 }  # fmt: skip
 _TEXT = {
-    "status": "ok, or why there is no answer: " + ", ".join(STATUSES[1:]),
+    "status": "ok, or why there is no answer: " + ", ".join(OF_POINTS[1:]),
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
+# names in files of older releases, and the present ones
+_OLD_NAMES = {
+    "rotation_error_play": "rotation_error_clearance",
+    "translation_error_play": "translation_error_clearance",
+    "play_mixed": "clearance_mixed",
+}
+_OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
 # blocks written together: a write takes as long as that of a hundred points
 _TOGETHER = 256
 
@@ -174,7 +182,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
     """(k,) of objects: a text variable of some points."""
     if name == "status":
-        return np.array(STATUSES, dtype=object)[records["status"]]
+        return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
     for row, text in texts[name].items():
         column[row] = text
@@ -275,7 +283,15 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     forgive_damaged_files()
     check_heaps(path)
     try:
-        return xarray.load_dataset(path, engine="h5netcdf")
+        data = xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # of a damaged file HDF5 raises whatever it meets
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
+    return _with_new_names(data)
+
+
+def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
+    """A data set of an older release under the present names."""
+    old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
+    data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
+    return data.rename_vars(old)

@@ -39,10 +39,10 @@ def figure_of(
     Raises:
         BadInput: an axis or a quantity is unknown, or more than two axes are left.
     """
-    if "energy" not in data or "status" not in data:
-        raise BadInput("figure: found no energy and status; expected those of a sweep")
+    if "status" not in data:
+        raise BadInput("figure: found no status; expected that of a sweep")
     view, note = part_of_sweep(data, at or {})
-    axes = {str(d): view.sizes[d] for d in view["energy"].dims}
+    axes = {str(d): view.sizes[d] for d in view["status"].dims}
     check_axes(axes)
     panels = named_panels(view, quantities) if quantities else None
     figure = (map_figure if len(axes) == 2 else path_figure)(view, panels)
@@ -86,7 +86,7 @@ def part_of_sweep(
     Raises:
         BadInput: an axis or a value is unknown.
     """
-    axes = [str(d) for d in data["energy"].dims]
+    axes = [str(d) for d in data["status"].dims]
     note = []
     for name, value in at.items():
         if name not in axes:
@@ -103,7 +103,7 @@ def part_of_sweep(
         data = data.isel({name: place})
         note.append(f"{name} = {labels[place]}")
     data = _squeezed(data)
-    if "draw" in data["energy"].dims:
+    if "draw" in data["status"].dims:
         note.append(f"median of {data.sizes['draw']} draws")
         data = _median(data)
     return data, "; ".join(note)
@@ -138,7 +138,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
     """Without the points' axes of one value."""
-    single = [d for d in data["energy"].dims if data.sizes[d] == 1]
+    single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
 
@@ -159,7 +159,7 @@ def map_figure(
         ValueError: the grid does not have two such axes.
     """
     data = _along_numbers(_squeezed(data))
-    names = [str(d) for d in data["energy"].dims]
+    names = [str(d) for d in data["status"].dims]
     if len(names) != 2:
         raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
     x, y = names
@@ -208,7 +208,7 @@ def path_figure(
         A figure with a panel for each quantity; crosses mark nearby singularities.
     """
     data = _along_numbers(_squeezed(data))
-    (x,) = (str(d) for d in data["energy"].dims)
+    (x,) = (str(d) for d in data["status"].dims)
     along = data[x].values
     near = _near(data)
     shown = panels or usual_panels(data)
@@ -236,7 +236,7 @@ def path_figure(
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
     """The same with increasing numbers on each axis: labels become 1, 2, .."""
-    for name in map(str, data["energy"].dims):
+    for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
         data = data.sortby(name)
@@ -246,8 +246,8 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 def _near(data: "xarray.Dataset") -> NDArray:
     """Bool: where a singularity is near."""
     if "near_singularity" not in data:
-        return np.zeros(data["energy"].shape, dtype=bool)
-    texts = data["near_singularity"].transpose(*data["energy"].dims)
+        return np.zeros(data["status"].shape, dtype=bool)
+    texts = data["near_singularity"].transpose(*data["status"].dims)
     return texts.values.astype(str) != ""
 
 
@@ -255,7 +255,7 @@ def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
     """Crosses where a singularity is near."""
     i, j = np.nonzero(_near(data))
     if len(i):
-        x_first = data["energy"].dims[0] == x
+        x_first = data["status"].dims[0] == x
         xs, ys = (i, j) if x_first else (j, i)
         panel.plot(data[x].values[xs], data[y].values[ys], "kx", markersize=3)
 

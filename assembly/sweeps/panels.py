@@ -51,9 +51,9 @@ _PAPER = (
     Panel("energy", 1.0, "minimum assembly energy [J]", "inferno"),
     Panel("rotation", 1e3, "platform orientation error [mrad]", "viridis"),
     Panel("translation", 1e3, "platform position error [mm]", "viridis"),
-    Panel("rotation_error_play.upper", 1e3,
+    Panel("rotation_error_clearance.upper", 1e3,
           "orientation error by clearances alone [mrad]", "viridis"),
-    Panel("translation_error_play.upper", 1e3,
+    Panel("translation_error_clearance.upper", 1e3,
           "position error by clearances alone [mm]", "viridis"),
 )  # fmt: skip
 _RIGID = Panel("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_r")
@@ -66,8 +66,39 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels of a sweep's figure for which no quantity is named."""
-    if "rotation_error_play" in data:
+    """The panels of a sweep's figure for which no quantity is named.
+
+    Args:
+        data: of a sweep.
+
+    Returns:
+        Those whose quantities are stored.
+
+    Raises:
+        BadInput: the sweep stored none of their quantities.
+    """
+    usual = _usual_panels(data)
+    panels = tuple(panel for panel in usual if _is_stored(data, panel.key))
+    if not panels:
+        raise BadInput(
+            "figure: found none of the usual quantities, such as energy; name one of "
+            "the file with assembly plot --quantities"
+        )
+    return panels
+
+
+def _is_stored(data: "xarray.Dataset", key: str) -> bool:
+    """Whether a quantity follows from what is stored."""
+    try:
+        quantity(data, key)
+    except KeyError:
+        return False
+    return True
+
+
+def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
+    """The same where everything is stored."""
+    if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
     if "frequency" in data:
@@ -96,18 +127,18 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
             variables = dict.fromkeys(k.partition(".")[0] for k in known)
             near = [k for k in known if k.partition(".")[0] == name.partition(".")[0]]
             raise BadInput(
-                f"--quantity: no {quoted(name)}{nearest(name, near or variables)}"
+                f"--quantities: no {quoted(name)}{nearest(name, near or variables)}"
             )
         if len(own) > _MOST:
             raise BadInput(
-                f"--quantity {quoted(name)}: found {len(own)} components, expected at "
-                f"most {_MOST}; name one, such as {own[0]}"
+                f"--quantities {quoted(name)}: found {len(own)} components, expected "
+                f"at most {_MOST}; name one, such as {own[0]}"
             )
         for key in own:
             scale, unit = _SHOWN.get(known[key], (1.0, known[key]))
             panels.append(Panel(key, scale, f"{plot_label(key)} [{unit}]", "viridis"))
     if len(panels) > _MOST:
-        raise BadInput(f"--quantity: found {len(panels)}, expected at most {_MOST}")
+        raise BadInput(f"--quantities: found {len(panels)}, expected at most {_MOST}")
     return tuple(panels)
 
 

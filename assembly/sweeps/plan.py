@@ -98,7 +98,7 @@ class Sweep:
             "robot_sha256": robot_hash(question.robot),
             "program": f"forcefit {version('forcefit')}",
             "program_sha256": program_hash(),
-            "reading": question.reading or "none",
+            "assumption": question.assumption or "none",
             "near": repr(question.near),
         }
         if question.sources is not None:

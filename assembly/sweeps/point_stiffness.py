@@ -1,6 +1,6 @@
-"""K_C at the points of a sweep: the classical one, or a tangent of what is there.
+"""K_C at the points of a sweep: nominal, or with errors, loads and clearances.
 
-Errors, loads and clearances do not change the classical K_C, so draws of a posture
+Errors, loads and clearances do not change the nominal K_C, so draws of a posture
 share it.  A tangent is found point by point: of problem (22), with its clearances free
 or pressed, or of the exact equilibrium, with its internal forces.
 """
@@ -27,7 +27,7 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.solvers.conic import SolverFailed
 
 STATES = {
-    "classical": "clearances held at zero",
+    "nominal": "clearances held at zero",
     "contact": "tangent of (22), clearances free or pressed as they are",
     "exact": "tangent of the exact equilibrium, with its internal forces",
 }
@@ -62,10 +62,10 @@ def _name(part: Part) -> str:
     return f"{part.frame} {part.kind}" if part.frame else "forces already there"
 
 
-def classical_stiffnesses(
+def nominal_stiffnesses(
     posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """The classical K_C of k postures, without errors and loads.
+    """The nominal K_C of k postures, without errors and loads.
 
     Args:
         posture: k postures.
@@ -95,7 +95,7 @@ def tangent_stiffnesses(
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        As :func:`classical_stiffnesses`; NaN where there is no equilibrium, 0 along
+        As :func:`nominal_stiffnesses`; NaN where there is no equilibrium, 0 along
         what nothing resists, and why.
     """
     parts = _parts(conditions.robot, state)

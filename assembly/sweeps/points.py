@@ -13,14 +13,21 @@ from numpy.typing import NDArray
 
 from assembly.exact.exact import ExactAssembly
 from assembly.kinematics.posture import Posture, place_many, place_many_joints
-from assembly.kinematics.verdict import BEYOND_SINGULARITY, SINGULAR
 from assembly.linear.energy import Assembly, CannotAssemble, solve_assembly
 from assembly.linear.pose_error import PoseError, bound_pose_error
-from assembly.linear.zone import MARGIN_READINGS, zone_margin
+from assembly.linear.zone import MARGINS, zone_margin
 from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.link_stress import peak_stresses, stressed_links
 from assembly.model.robot import Robot
+from assembly.model.statuses import (
+    BEYOND_SINGULARITY,
+    INVALID_ROBOT,
+    OF_POINTS,
+    OUT_OF_REACH,
+    SINGULAR,
+    SOLVER_FAILED,
+)
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.report.first_order import MOST_ENERGY, off_by
 from assembly.solvers.conic import SolverFailed
@@ -31,10 +38,16 @@ from assembly.sweeps.point_conditions import (
 )
 from assembly.sweeps.point_kinematics import note_geometry
 from assembly.sweeps.point_stiffness import (
-    classical_stiffnesses,
+    nominal_stiffnesses,
     tangent_stiffnesses,
 )
-from assembly.sweeps.quantities import STATUSES, TEXTS, Question, record_type
+from assembly.sweeps.quantities import (
+    TEXTS,
+    Question,
+    computed,
+    record_of,
+    record_type,
+)
 from assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
@@ -84,15 +97,20 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
         Rows in the order of the points.
     """
     count = len(points.rows)
-    solved = SolvedPoints(
-        np.zeros(count, record_type(question)), {t: {} for t in TEXTS}
-    )
+    whole = record_of(computed(question))
+    solved = SolvedPoints(np.zeros(count, whole), {t: {} for t in TEXTS})
     for name in solved.records.dtype.names or ():
         if name != "status":
             solved.records[name] = np.nan
     for run in _runs(points.values):
         _solve_variant(question, points.part(run), solved, run.start)
-    return solved
+    stored = record_type(question)
+    if stored == whole:
+        return solved
+    records = np.zeros(count, stored)
+    for name in stored.names or ():
+        records[name] = solved.records[name]
+    return SolvedPoints(records, solved.texts)
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:
@@ -125,7 +143,7 @@ def _solve_variant(
         place = place_many_joints if of_joints(question.components) else place_many
         postures, reasons = place(robot, goals)
     except BadInput as error:
-        _fail(solved, range(first, first + count), "invalid robot", str(error))
+        _fail(solved, range(first, first + count), INVALID_ROBOT, str(error))
         return
     rows = [range(first + run.start, first + run.stop) for run in runs]
     reached = [i for i, posture in enumerate(postures) if posture is not None]
@@ -137,7 +155,7 @@ def _solve_variant(
     reachable: list[tuple[int, Posture]] = []
     far: list[tuple[int, str]] = []
     for i, posture in enumerate(postures):
-        status, reason = status_of.get(i, ("out of reach", reasons[i]))
+        status, reason = status_of.get(i, (OUT_OF_REACH, reasons[i]))
         if posture is None or status not in ("", BEYOND_SINGULARITY):
             _fail(solved, rows[i], status, reason)
             continue
@@ -169,7 +187,7 @@ def _solve_or_split(
     except (np.linalg.LinAlgError, SolverFailed) as error:
         if len(rows) == 1:
             row = int(rows[0])
-            _fail(solved, range(row, row + 1), "solver failed", str(error))
+            _fail(solved, range(row, row + 1), SOLVER_FAILED, str(error))
             return
         for i in range(len(rows)):
             one = slice(i, i + 1)
@@ -181,7 +199,7 @@ def _solve_or_split(
 
 def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
     """Record the status of points without a solution."""
-    solved.records["status"][rows.start : rows.stop] = STATUSES.index(status)
+    solved.records["status"][rows.start : rows.stop] = OF_POINTS.index(status)
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
@@ -211,7 +229,7 @@ def _solve_reached(
         perfect = robot.with_errors(np.zeros_like(robot.errors))
     there = replace(conditions.postures, robot=robot)
     failed: dict[int, str] = {}
-    for key, compliant in MARGIN_READINGS.items():
+    for key, compliant in MARGINS.items():
         zone = zone_margin(there, compliant, errors=errors)
         out[key][rows] = zone.margin
         failed = {i: r for i, r in enumerate(zone.unproved) if r} | failed
@@ -238,8 +256,8 @@ def _solve_reached(
         _record_wrenches(question, robot, wrenches[ok], own[ok], solved, rows_ok)
     if question.clearance_only:
         _bound_clearance_only(replace(there, robot=perfect), solved, rows)
-    if question.reading is not None and ok:
-        bounds = bound_pose_error(energies, question.reading)
+    if question.assumption is not None and ok:
+        bounds = bound_pose_error(energies, question.assumption)
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
         tangents = replace(conditions, robot=robot)
@@ -259,7 +277,7 @@ def _solved_rows(
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
         if i in failed:
-            status, reason = "solver failed", failed[i]
+            status, reason = SOLVER_FAILED, failed[i]
         if status == "ok":
             ok.append(i)
         else:
@@ -288,12 +306,12 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """The classical K_C once a posture, its draws share it; a tangent at each point."""
+    """The nominal K_C once a posture, its draws share it; a tangent at each point."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
-    if state == "classical":
+    if state == "nominal":
         starts = [run.start for run in runs]
-        quantities, reasons = classical_stiffnesses(conditions.postures[starts])
+        quantities, reasons = nominal_stiffnesses(conditions.postures[starts])
     else:
         quantities, reasons = tangent_stiffnesses(conditions, state)
         runs = [slice(i, i + 1) for i in range(len(T))]
@@ -344,10 +362,10 @@ def _bound_clearance_only(
     starts = [run.start for run in runs]
     bounds = bound_pose_error(solve_assembly(perfect[starts]), "frozen")
     for i, run in enumerate(runs):
-        solved.records["rotation_error_play"][rows[run]] = bounds.rotation_error[i]
-        solved.records["translation_error_play"][rows[run]] = bounds.translation_error[
-            i
-        ]
+        solved.records["rotation_error_clearance"][rows[run]] = bounds.rotation_error[i]
+        solved.records["translation_error_clearance"][rows[run]] = (
+            bounds.translation_error[i]
+        )
         if bounds.status[i] != "ok":
             for row in rows[run].tolist():
                 reason = f"clearances alone: {bounds.reason[i]}"

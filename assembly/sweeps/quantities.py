@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assembly.kinematics.singularity import KINDS
-from assembly.kinematics.verdict import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design
@@ -18,12 +17,6 @@ from stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
 
-STATUSES = (
-    "ok", "out of reach", "cannot assemble", "solver failed", "invalid robot",
-    "no equilibrium", SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
-)  # fmt: skip
-# of points at which nothing was asked
-UNUSABLE = {"out of reach", "invalid robot", SINGULAR, BEYOND_LIMITS}
 TEXTS = ("reason", "near_singularity")
 
 
@@ -41,7 +34,7 @@ class Question:
         components: of the postures, see :mod:`assembly.sweeps.targets`.
         sources: of drawn errors; None for the robot's own.
         seed: of the draws.
-        reading: of problem (27), or None to leave its bounds out.
+        assumption: of problem (27), or None to leave its bounds out.
         clearance_only: bound (27) also for the robot without errors.
         wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -53,6 +46,7 @@ class Question:
         stiffness: also K_C and the shares of its parts, in a state of
             :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
         frequencies: how many natural frequencies, of the same K_C and declared masses.
+        kept: names of the variables that are stored; all that are computed if empty.
     """
 
     robot: Robot
@@ -61,7 +55,7 @@ class Question:
     components: tuple[str, ...] = ()
     sources: "ErrorSources | None" = None
     seed: int = 0
-    reading: str | None = None
+    assumption: str | None = None
     clearance_only: bool = False
     wrenches: tuple[str, ...] = ()
     linearisation: bool = False
@@ -72,6 +66,7 @@ class Question:
     under: Mapping[str, float | str] = field(default_factory=dict)
     stiffness: str = ""
     frequencies: int = 0
+    kept: tuple[str, ...] = ()
 
     __repr__, _repr_html_ = short_repr, html_table
 
@@ -101,7 +96,20 @@ class Variable:
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a question asks for, by name.
+    """The numeric quantities that a sweep stores, by name.
+
+    Args:
+        question: of a sweep.
+
+    Returns:
+        All but ``status`` and the texts.
+    """
+    table = computed(question)
+    return {k: v for k, v in table.items() if not question.kept or k in question.kept}
+
+
+def computed(question: Question) -> dict[str, Variable]:
+    """The numeric quantities that are computed, some perhaps not stored.
 
     Args:
         question: of a sweep.
@@ -207,16 +215,21 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
     """Suffix and meaning of each pair of bounds asked for."""
-    if question.reading is not None:
-        yield "", f", {question.reading}"
+    if question.assumption is not None:
+        yield "", f", {question.assumption}"
     if question.clearance_only:
-        yield "_play", ", frozen, by clearances alone: without errors"
+        yield "_clearance", ", frozen, by clearances alone: without errors"
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: its quantities, and ``status`` as a code."""
+    """Type of a point's record: what is stored, and ``status`` as a code."""
+    return record_of(variables(question))
+
+
+def record_of(table: Mapping[str, Variable]) -> np.dtype:
+    """Type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
-        for name, v in variables(question).items()
+        for name, v in table.items()
     ]
     return np.dtype([*fields, ("status", "u1")])

@@ -13,7 +13,7 @@ from assembly.effects.robot_effects import check_covariates
 from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.closing import closing_of
 from assembly.kinematics.posture import home_posture
-from assembly.linear.reference.pose_error import READINGS
+from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.platform_stiffness.vibration import check_masses
@@ -22,6 +22,7 @@ from assembly.sweeps.plan import Sweep
 from assembly.sweeps.point_conditions import is_loaded, point_conditions
 from assembly.sweeps.point_stiffness import STATES
 from assembly.sweeps.quantities import Question
+from assembly.sweeps.selection import select
 from assembly.sweeps.targets import (
     Targets,
     grid_targets,
@@ -44,33 +45,7 @@ _MODES = 100  # natural frequencies at most
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of ``forcefit assembly sweep``, by their names.
-
-    Attributes:
-        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
-        poses: a table of postures.
-        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``.
-        errors: file that says how errors are distributed, see docs/statistics.md.
-        draws: number of draws.
-        seed: of the draws.
-        reading: of problem (27), or ``"none"``.
-        play_alone: bound (27) also without errors.
-        wrench: frames whose wrench is recorded.
-        linearisation: compare each point with finite motions.
-        near: distance below which a singularity is named.
-        yield_strength: [Pa] of the links, for their stress and safety.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
-        under: covariates that effects of the robot's file depend on.
-        stiffness: also K_C and the shares of its parts, clearances held at zero.
-        tangent: ``"contact"`` or ``"exact"``: instead the K_C of what is there, its
-            errors, loads and clearances.
-        frequencies: how many natural frequencies.
-        rest: a frame that takes what a closure leaves open, as
-            :func:`assembly.kinematics.closing.rest_in`.
-        mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded,
-            as :func:`assembly.kinematics.closing.preloaded`.
-    """
+    """The options of :func:`assembly.sweeps.robot_sweep.sweep`, by their names."""
 
     grid: str | None = None
     poses: Path | str | None = None
@@ -78,27 +53,25 @@ class SweepOptions:
     errors: Path | str | None = None
     draws: int | None = None
     seed: int = 1
-    reading: str = "frozen"
-    play_alone: bool = False
-    wrench: Sequence[str] = ()
-    linearisation: bool = False
+    assumption: str = "frozen"
+    quantities: Sequence[str] = ()
+    wrench_of: Sequence[str] = ()
     near: float = 0.02
     yield_strength: float | None = None
     load: Sequence[float] = (0.0,) * 6
     gravity: Sequence[float] = (0.0,) * 3
     under: Mapping[str, float | str] = field(default_factory=dict)
-    stiffness: bool = False
-    tangent: str | None = None
+    state: str | None = None
     frequencies: int | None = None
     rest: str | None = None
     mismatch: str | None = None
 
 
-def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
+def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     """The sweep that ``forcefit assembly sweep`` would run.
 
     Args:
-        robot: a robot file, or a built-in name.
+        robot: a robot, a robot file, or a built-in name.
         options: of the command.
 
     Returns:
@@ -114,10 +87,20 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
             f"{option}: found --vary, which replaces the errors that it makes; "
             "expected one of them"
         )
-    machine = load_robot(robot, close)
+    if isinstance(robot, Robot):
+        if options.vary:
+            raise BadInput(
+                "--vary: found a robot in memory; expected a robot file or a built-in "
+                "name, whose numbers have paths"
+            )
+        machine = robot if close is None else close(robot)
+    else:
+        machine = load_robot(robot, close)
     check_covariates(machine, options.under)
     _check(options, machine)
-    design = load_design(robot) if options.vary else None
+    design = None
+    if options.vary and not isinstance(robot, Robot):
+        design = load_design(robot)
     varied = _vary(design, options.vary) if design is not None else {}
     sources = _sources(options, machine, varied)
     targets = _targets(machine, options.grid, options.poses)
@@ -133,20 +116,22 @@ def ask_sweep(robot: str | Path, options: SweepOptions) -> Sweep:
         components=targets.names,
         sources=sources,
         seed=options.seed,
-        reading=None if options.reading == "none" else options.reading,
-        clearance_only=options.play_alone,
-        wrenches=tuple(options.wrench),
-        linearisation=options.linearisation,
+        assumption=None if options.assumption == "none" else options.assumption,
+        wrenches=tuple(options.wrench_of),
         near=options.near,
         strength=options.yield_strength,
         load=tuple(options.load),
         gravity=tuple(options.gravity),
         under=dict(options.under),
-        stiffness=options.tangent or ("classical" if options.stiffness else ""),
+        stiffness=options.state or "",
         frequencies=options.frequencies or 0,
     )
-    _check_readings(question)
-    command = _command(robot, options)
+    if options.quantities:
+        question = select(question, options.quantities)
+    if question.frequencies:
+        check_masses(machine)
+    _check_assumption(question)
+    command = "" if isinstance(robot, Robot) else _command(robot, options)
     return Sweep(question, targets, tuple(varied.values()), options.draws or 0, command)
 
 
@@ -154,13 +139,14 @@ def _check(options: SweepOptions, machine: Robot) -> None:
     """Refuse options that contradict each other or the robot."""
     if (options.grid is None) == (options.poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
-    reading, near, strength = options.reading, options.near, options.yield_strength
-    if reading not in (*READINGS, "none"):
-        hint = nearest(reading, [*READINGS, "none"])
-        raise BadInput(f'--reading: found "{reading[:60]}"{hint}')
+    assumption, near = options.assumption, options.near
+    strength = options.yield_strength
+    if assumption not in (*ASSUMPTIONS, "none"):
+        hint = nearest(assumption, [*ASSUMPTIONS, "none"])
+        raise BadInput(f'--assumption: found "{assumption[:60]}"{hint}')
     if not 0 <= near <= 1:
         raise BadInput(f"--near: found {near:g}, expected a number from 0 to 1")
-    for name in options.wrench:
+    for name in options.wrench_of:
         machine.index(name)
     if strength is not None:
         if not 0 < strength < float("inf"):
@@ -170,18 +156,13 @@ def _check(options: SweepOptions, machine: Robot) -> None:
                 f"--yield-strength: no link of {machine.name} has a shape from which "
                 "its stress follows"
             )
-    tangents = [state for state in STATES if state != "classical"]
-    if options.tangent is not None and options.tangent not in tangents:
-        hint = nearest(options.tangent, tangents)
-        raise BadInput(f'--tangent: found "{options.tangent[:60]}"{hint}')
-    if options.tangent is not None and options.stiffness:
-        raise BadInput("sweep: found --stiffness and --tangent, expected one of them")
-    if options.frequencies is not None:
-        if not 1 <= options.frequencies <= _MODES:
-            raise BadInput(
-                f"--frequencies: found {options.frequencies}, expected 1 to {_MODES}"
-            )
-        check_masses(machine)
+    if options.state is not None and options.state not in STATES:
+        hint = nearest(options.state, list(STATES))
+        raise BadInput(f'--state: found "{options.state[:60]}"{hint}')
+    if options.frequencies is not None and not 1 <= options.frequencies <= _MODES:
+        raise BadInput(
+            f"--frequencies: found {options.frequencies}, expected 1 to {_MODES}"
+        )
 
 
 def _sources(
@@ -208,16 +189,16 @@ def _short(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _check_readings(question: Question) -> None:
+def _check_assumption(question: Question) -> None:
     """Refuse bounds of the pose error of a loaded robot: (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
-    if is_loaded(home) and (question.reading or question.clearance_only):
+    if is_loaded(home) and (question.assumption or question.clearance_only):
         raise BadInput(
-            "--reading: the robot is loaded (--load, --gravity or an effect), and the "
-            "bounds of the pose error are those of an unloaded one; expected "
-            "--reading none, and no --play-alone"
+            "--assumption: the robot is loaded (--load, --gravity or an effect), and "
+            "the bounds of the pose error are those of an unloaded one; expected "
+            "--assumption none, and no bounds by clearances alone"
         )
 
 

@@ -35,7 +35,7 @@ def stiffness_slopes(
         paths: of numbers; a frame's name without its leg moves all legs at once.
         pose: nominal platform pose, which is kept.
         joints: actuated coordinates, which are kept, instead.
-        asked: of which tangent; the classical one if absent.
+        asked: of which tangent; the nominal one if absent.
         under: covariates that effects depend on.
 
     Returns:

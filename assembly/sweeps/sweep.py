@@ -146,7 +146,7 @@ def sweep_poses(
     robot: Robot,
     axes: Mapping[str, NDArray],
     progress: Progress = lambda done, total: None,
-    reading: str | None = None,
+    assumption: str | None = None,
 ) -> "xarray.Dataset":
     """Solve (21) and (22), and if asked (27), at every pose of a grid.
 
@@ -155,17 +155,18 @@ def sweep_poses(
         axes: values [m or rad] by pose component or ``q.<frame>``; components not named
             are free.
         progress: called after each block with the number of points done, and of all.
-        reading: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None leaves
-            the bounds of the pose error out.
+        assumption: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None
+            leaves the bounds of the pose error out.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,
-        ``platform_screw``, with a reading ``rotation_error`` and ``translation_error``
-        (lower and upper), certificates, distances to singularities and ``status``; NaN
-        where there is no solution, with the reason as status.
+        ``platform_screw``, with an assumption ``rotation_error`` and
+        ``translation_error`` (lower and upper), certificates, distances to
+        singularities and ``status``; NaN where there is no solution, with the reason as
+        status.
     """
     targets = grid_targets(axes)
-    question = Question(robot, components=targets.names, reading=reading)
+    question = Question(robot, components=targets.names, assumption=assumption)
     return sweep_in_memory(Sweep(question, targets), progress)
 
 

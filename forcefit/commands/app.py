@@ -16,6 +16,7 @@ import typer
 from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
+from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
 from forcefit.inputs.errors import BadInput, one_line, quoted
@@ -105,6 +106,8 @@ def main() -> None:
     with _interrupts() as interrupts:
         try:
             with naming_packages():
+                # in place: a report's provenance then names the present options
+                sys.argv[1:] = with_new_names(sys.argv[1:])
                 status = app(prog_name="forcefit", standalone_mode=False)
         except BaseException as error:
             sys.exit(_status_after(error, interrupted=bool(interrupts)))

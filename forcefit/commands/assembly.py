@@ -10,6 +10,8 @@ import typer
 from forcefit.commands.deflection import deflection
 from forcefit.commands.frequencies import frequencies
 from forcefit.commands.options import (
+    AlongOption,
+    AtOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -22,7 +24,7 @@ from forcefit.commands.options import (
     declared_under,
     parse_direction,
     parse_load,
-    parse_vector,
+    parse_point,
     posture_of,
 )
 from forcefit.commands.platform_stiffness import stiffness
@@ -130,7 +132,7 @@ def error(
     joint: JointOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
-    reading: Annotated[
+    assumption: Annotated[
         list[str] | None,
         typer.Option(
             help="frozen | free | budget; default all, under a load the first two."
@@ -140,7 +142,7 @@ def error(
     gravity: GravityOption = None,
     under: UnderOption = None,
     energy_budget: Annotated[
-        float, typer.Option(help="eta of the budget reading: E <= (1 + eta) E*.")
+        float, typer.Option(help="eta of the budget assumption: E <= (1 + eta) E*.")
     ] = 0.05,
     tolerance_rotation: Annotated[
         float, typer.Option(help="[rad] upper minus lower bound.")
@@ -148,25 +150,19 @@ def error(
     tolerance_translation: Annotated[
         float, typer.Option(help="[m] upper minus lower bound.")
     ] = 1e-6,
-    point: Annotated[
-        list[str] | None,
-        typer.Option(help="Of the platform, in its axes [m], such as x=0.1,z=-0.05."),
-    ] = None,
-    direction: Annotated[
-        list[str] | None,
-        typer.Option(help="Also the largest error along it, such as tx=1,tz=-1."),
-    ] = None,
+    at: AtOption = None,
+    along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
     """Certified bounds of the largest pose error, problem (27)."""
-    from assembly.linear.reference.pose_error import READINGS
+    from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.report.pose_errors import pose_error_of, pose_error_text
 
-    for name in reading or ():
-        if name not in READINGS:
-            hint = nearest(name, READINGS)
-            raise BadInput(f'--reading: found "{name[:60]}"{hint}')
+    for name in assumption or ():
+        if name not in ASSUMPTIONS:
+            hint = nearest(name, ASSUMPTIONS)
+            raise BadInput(f'--assumption: found "{name[:60]}"{hint}')
     options = {
         "energy_budget": energy_budget,
         "tolerance_rotation": tolerance_rotation,
@@ -182,10 +178,10 @@ def error(
     )
     with one_thread():
         results = pose_error_of(
-            applied.posture, reading or None,
+            applied.posture, assumption or None,
             load=applied.load, gravity=applied.gravity,
-            point=parse_vector(point, "--point") or (0.0, 0.0, 0.0),
-            direction=parse_direction(direction), **options,
+            point=parse_point(at),
+            direction=parse_direction(along), **options,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":
@@ -197,10 +193,10 @@ def error(
 @app.command()
 def show(
     robot: RobotArgument,
-    output: Annotated[
+    figure: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="PNG, JPEG, BMP or TIFF; a window opens without."
+            "--figure", help="PNG, JPEG, BMP or TIFF; a window opens without."
         ),
     ] = None,
     pose: PoseOption = None,
@@ -215,7 +211,7 @@ def show(
         str | None,
         typer.Option(help="Also the body of possible errors: translation | rotation."),
     ] = None,
-    reading: Annotated[
+    assumption: Annotated[
         str | None,
         typer.Option(
             help="Of that body: frozen | free | budget; default budget, of a loaded "
@@ -225,19 +221,19 @@ def show(
 ) -> None:
     """Plot the nominal and the forced robot, and its errors."""
     from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
-    from assembly.linear.reference.pose_error import READINGS
+    from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.linear.reference.reduction import FreeMotion
     from assembly.report.error_body import PARTS
     from assembly.report.plot import plot_assembly
     from assembly.report.results import remark_lines
     from assembly.solvers.conic import SolverFailed
 
-    if output is not None:
-        check_writable(output, PIXELS)
+    if figure is not None:
+        check_writable(figure, PIXELS)
     elif not (os.environ.get("DISPLAY") or sys.platform in {"win32", "darwin"}):
-        raise BadInput("no display to open a window on; name a file with --output")
+        raise BadInput("no display to open a window on; name a file with --figure")
     for option, value, valid in (
-        ("--error-body", error_body, PARTS), ("--reading", reading, READINGS)
+        ("--error-body", error_body, PARTS), ("--assumption", assumption, ASSUMPTIONS)
     ):  # fmt: skip
         if value is not None and value not in valid:
             raise BadInput(f'{option}: found "{value[:60]}"{nearest(value, valid)}')
@@ -245,27 +241,27 @@ def show(
         checked("--exaggeration", exaggeration, "1", above=0)
     wrench = parse_load(load)
     loaded = wrench is not None and any(wrench)
-    if loaded and error_body is not None and reading == "budget":
+    if loaded and error_body is not None and assumption == "budget":
         raise BadInput(
-            "--reading: found budget with --load, and a loaded robot has no such "
-            "reading; expected frozen or free"
+            "--assumption: found budget with --load, and a loaded robot has no such "
+            "assumption; expected frozen or free"
         )
-    reading = reading or ("frozen" if loaded else "budget")
+    assumption = assumption or ("frozen" if loaded else "budget")
     posture = posture_of(robot, pose, joint, rest, mismatch)
     for line in remark_lines(posture.robot.remarks):
         print(line)
     try:
         assembly = solve_assembly(posture, wrench)
         plotter = plot_assembly(
-            assembly, exaggeration, error_body, reading, output is not None
+            assembly, exaggeration, error_body, assumption, figure is not None
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         print(f"{failure_status(error)}: {error}")
         raise typer.Exit(1) from None
-    if output is None:
+    if figure is None:
         plotter.show()
     else:
-        save_pixels(plotter.screenshot(return_img=True), output)
+        save_pixels(plotter.screenshot(return_img=True), figure)
     plotter.close()
 
 

@@ -49,10 +49,11 @@ def predict(
     """
     from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
-    from validation.correction.prediction import foretell, reading_table
+    from validation.correction.prediction import predict as predict_readings
+    from validation.correction.prediction import reading_table
 
     check_writable(output, TABLE)
-    prediction = foretell(read_commands(commands, load_robot(robot)))
+    prediction = predict_readings(read_commands(commands, load_robot(robot)))
     table = prediction.table() | _warned(prediction.commands)
     write_text(reading_table(prediction), output)
     write_json(table, json)

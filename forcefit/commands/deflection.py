@@ -1,12 +1,12 @@
 """The command ``forcefit assembly deflection``."""
 
 import math
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from forcefit.commands.options import (
+    FigureOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -54,9 +54,7 @@ def deflection(
             "clearances held at zero.",
         ),
     ] = False,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Plot the curve.")
-    ] = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """Load against deflection, up to critical loads.
@@ -71,8 +69,8 @@ def deflection(
 
     if follow and back:
         raise BadInput("--follow: not with --back; the path turns by itself")
-    if output is not None:
-        check_writable(output, PICTURE)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     component, loads = parse_along(along)
     loads = [*loads, *reversed(loads[:-1])] if back else loads
     applied = declared_under(
@@ -87,8 +85,8 @@ def deflection(
     write_json(results, json)
     if json != "-":
         print(deflection_text(results))
-    if output is not None and "deflection" in results:
-        save_figure(plot_deflection(results), output)
+    if figure is not None and "deflection" in results:
+        save_figure(plot_deflection(results), figure)
     if results["status"] != "ok":
         raise typer.Exit(1)
 

@@ -15,6 +15,7 @@ from forcefit.commands.options import (
     RobotArgument,
     UnderOption,
     declared_under,
+    parse_state,
 )
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.writing import write_json
@@ -29,12 +30,13 @@ def frequencies(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
-    exact: Annotated[
-        bool,
+    state: Annotated[
+        str,
         typer.Option(
-            "--exact", help="Around the equilibrium with errors, clearances and loads."
+            help="nominal (clearances at zero) | exact (around the equilibrium with "
+            "errors, clearances and loads)."
         ),
-    ] = False,
+    ] = "nominal",
     count: Annotated[int, typer.Option(help="Modes.", min=1, max=1000)] = 6,
     json: JsonOption = None,
 ) -> None:
@@ -44,13 +46,14 @@ def frequencies(
     """
     from assembly.report.vibration import vibration_of, vibration_text
 
+    word = parse_state(state, ("nominal", "exact"))
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,
         mismatch=mismatch,
     )  # fmt: skip
     with one_thread():
         results = vibration_of(
-            applied.posture, count, applied.load, applied.gravity, exact
+            applied.posture, count, applied.load, applied.gravity, word
         )
     write_json(results, json)
     if json != "-":

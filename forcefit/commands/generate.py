@@ -8,14 +8,18 @@ import typer
 from forcefit.commands.campaign_options import (
     CommandedIn,
     Force,
-    Point,
     PositionNoise,
     Reach,
     RotationNoise,
     Stroke,
     Temperature,
 )
-from forcefit.commands.options import JsonOption, RobotArgument, parse_point
+from forcefit.commands.options import (
+    AtOption,
+    JsonOption,
+    RobotArgument,
+    parse_point,
+)
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import check_json, check_new_folder, write_json
@@ -88,7 +92,7 @@ def generate(
     hidden_frame: Annotated[
         float, typer.Option(help="[rad, m] Size of an unknown measuring frame.")
     ] = 0.0,
-    point: Point = "0,0,0",
+    at: AtOption = None,
     program: Annotated[str, typer.Option(help="multibody | springs")] = "multibody",
     seed: Annotated[int, typer.Option(help="Of all draws.", min=0)] = 0,
     json: JsonOption = None,
@@ -117,7 +121,7 @@ def generate(
             f'--program: found "{program[:60]}", expected ' + " | ".join(PROGRAMS)
         )
     wanted = parse_effects(effect)
-    x, y, z = parse_point(point, "--point")
+    x, y, z = parse_point(at)
     design = CampaignDesign(
         configurations=configurations,
         rows=rows,

@@ -6,6 +6,7 @@ Every error message names its option.
 import math
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -53,6 +54,21 @@ LoadOption = Annotated[
 ]
 
 
+AtOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--at",
+        help="Point of the platform, in its axes [m], such as 0,0,-0.1 or z=-0.1.",
+    ),
+]
+
+
+AlongOption = Annotated[
+    list[str] | None,
+    typer.Option("--along", help="Direction of the platform, such as tx=1,tz=-1."),
+]
+
+
 GravityOption = Annotated[
     list[str] | None,
     typer.Option("--gravity", help="Gravity in base axes [m/s^2], such as z=-9.81."),
@@ -86,6 +102,12 @@ MismatchOption = Annotated[
         help="spring: redundant elastic drives take up what their coordinates "
         "(--joint, or those at home) leave open.",
     ),
+]
+
+
+FigureOption = Annotated[
+    Path | None,
+    typer.Option("--figure", help="Also a picture of it: PNG, SVG or PDF."),
 ]
 
 
@@ -163,35 +185,59 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
     return [given.get(name, 0.0) for name in "xyz"]
 
 
-def parse_point(text: str | None, option: str) -> list[float]:
-    """A point of the platform as ``x,y,z``; its origin if not given.
+def parse_state(
+    text: str, valid: Sequence[str] = ("nominal", "contact", "exact")
+) -> Any:
+    """State in which K_C is taken, from ``--state``.
 
     Args:
-        text: such as ``"0,0,-0.1"``.
-        option: whose it is, for messages.
+        text: what was given.
+        valid: states that the command knows.
+
+    Returns:
+        The word.
+
+    Raises:
+        BadInput: it is none of them.
+    """
+    if text not in valid:
+        raise BadInput(f"--state: found {describe(text)}{nearest(text, valid)}")
+    return text
+
+
+def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
+    """A point of the platform from ``--at``; its origin if not given.
+
+    Args:
+        texts: such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
 
     Returns:
         Three numbers [m].
 
     Raises:
-        BadInput: not three finite numbers of at most 1e6.
+        BadInput: neither three numbers nor numbers by component, or one is not finite
+            or larger than 1e6.
     """
-    if text is None:
-        return [0.0, 0.0, 0.0]
+    if not texts:
+        return 0.0, 0.0, 0.0
+    if "=" in texts[0]:
+        x, y, z = parse_vector(texts, "--at") or (0.0, 0.0, 0.0)
+        return x, y, z
     from assembly.model.largest import LARGEST_LENGTH
     from forcefit.inputs.number_arrays import comma_numbers
 
+    text = ",".join(texts)
     point = comma_numbers(text)
     if point.shape != (3,) or not (abs(point) <= LARGEST_LENGTH).all():
         raise BadInput(
-            f"{option}: found {describe(text)}, expected three numbers of size at most "
-            f"{LARGEST_LENGTH:g} [m] such as 0,0,-0.1"
+            f"--at: found {describe(text)}, expected three numbers of size at most "
+            f"{LARGEST_LENGTH:g} [m] such as 0,0,-0.1, or z=-0.1"
         )
-    return [float(x) for x in point]
+    return float(point[0]), float(point[1]), float(point[2])
 
 
 def parse_direction(texts: list[str] | None) -> list[float] | None:
-    """Direction of a platform screw from ``--direction``, as a unit vector.
+    """Direction of a platform screw from ``--along``, as a unit vector.
 
     Args:
         texts: such as ``["tx=1,tz=-1"]``.
@@ -208,11 +254,11 @@ def parse_direction(texts: list[str] | None) -> list[float] | None:
     from stiffness.screws import SCREW
 
     names = [name.lower() for name in SCREW]
-    given = _components(texts, "--direction", names, LARGEST_LENGTH)
+    given = _components(texts, "--along", names, LARGEST_LENGTH)
     length = math.hypot(*given.values())
     if length == 0.0 or len({name[0] for name, value in given.items() if value}) > 1:
         raise BadInput(
-            "--direction: expected components of a translation or of a rotation, not "
+            "--along: expected components of a translation or of a rotation, not "
             "all zero, not of both"
         )
     return [given.get(name, 0.0) / length for name in names]

@@ -8,14 +8,18 @@ import typer
 from forcefit.commands.campaign_options import (
     CommandedIn,
     Force,
-    Point,
     PositionNoise,
     Reach,
     RotationNoise,
     Stroke,
     Temperature,
 )
-from forcefit.commands.options import JsonOption, RobotArgument, parse_point
+from forcefit.commands.options import (
+    AtOption,
+    JsonOption,
+    RobotArgument,
+    parse_point,
+)
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import checked
 from forcefit.inputs.writing import check_new_folder, write_json
@@ -38,7 +42,7 @@ def plan(
     command: CommandedIn = "joints",
     rotation: RotationNoise = 1e-5,
     position: PositionNoise = 5e-6,
-    point: Point = "0,0,0",
+    at: AtOption = None,
     seed: Annotated[int, typer.Option(help="Of the rows to choose from.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
@@ -52,7 +56,7 @@ def plan(
     from validation.synthetic.design import CampaignDesign
     from validation.synthetic.generator import write_campaign
 
-    x, y, z = parse_point(point, "--point")
+    x, y, z = parse_point(at)
     checked("--rotation", rotation, "rad", above=0)
     checked("--position", position, "m", above=0)
     machine = load_robot(robot)

@@ -1,11 +1,13 @@
 """The command ``forcefit assembly stiffness``."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from forcefit.commands.options import (
+    AlongOption,
+    AtOption,
+    FigureOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -20,6 +22,7 @@ from forcefit.commands.options import (
     parse_covariates,
     parse_direction,
     parse_point,
+    parse_state,
 )
 from forcefit.commands.progress import one_thread
 from forcefit.inputs.errors import checked
@@ -38,22 +41,16 @@ def stiffness(
     load: LoadOption = None,
     gravity: GravityOption = None,
     under: UnderOption = None,
-    at: Annotated[
-        str | None,
-        typer.Option(help="Point of the platform, in its axes [m], such as 0,0,-0.1."),
-    ] = None,
-    direction: Annotated[
-        list[str] | None,
-        typer.Option(help="Such as tx=1,tz=-1: stiffness and shares along it."),
-    ] = None,
-    exact: Annotated[
-        bool,
+    at: AtOption = None,
+    along: AlongOption = None,
+    state: Annotated[
+        str,
         typer.Option(
-            "--exact",
-            help="The tangent of the exact equilibrium: internal forces and loads "
-            "stiffen or soften.",
+            help="nominal (clearances at zero; contact too if there are any) | contact "
+            "(errors, loads, clearances) | exact (internal forces and loads stiffen or "
+            "soften)."
         ),
-    ] = False,
+    ] = "nominal",
     length: Annotated[
         float | None,
         typer.Option(help="[m] by which angles are multiplied in eigen-stiffnesses."),
@@ -61,13 +58,11 @@ def stiffness(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also dC by a number of the robot file, by its path; with --exact at "
-            "the exact equilibrium."
+            help="Also dC by a number of the robot file, by its path; in "
+            "the state chosen."
         ),
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Bar chart of the shares.")
-    ] = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """How stiff the platform is, and which part gives way."""
@@ -77,36 +72,37 @@ def stiffness(
         stiffness_text,
     )
 
-    if output is not None:
-        check_writable(output, PICTURE)
+    if figure is not None:
+        check_writable(figure, PICTURE)
     if length is not None:
         checked("--length", length, "m", above=0)
-    point = parse_point(at, "--at")
-    way = parse_direction(direction)
+    point = parse_point(at)
+    way = parse_direction(along)
+    word = parse_state(state)
     applied = declared_under(
-        robot, pose, joint, load, gravity, under, finite=exact, rest=rest,
+        robot, pose, joint, load, gravity, under, finite=word == "exact", rest=rest,
         mismatch=mismatch,
     )  # fmt: skip
     with one_thread():
         results = stiffness_of(
-            applied.posture, applied.load, applied.gravity, point, exact, length,
+            applied.posture, applied.load, applied.gravity, point, word, length,
             way,
         )  # fmt: skip
         if by and "compliance" in results:
-            states = {"slopes": "exact" if exact else "without clearance"}
-            if "in_contact" in results:
-                states["slopes_in_contact"] = "in contact"
+            states = {"slopes": word}
+            if "contact" in results:
+                states["slopes_contact"] = "contact"
             asked = (applied.load, applied.gravity, point)
-            for key, state in states.items():
+            for key, one in states.items():
                 results[key], results["cannot_change"] = _slopes(
-                    robot, by, pose, joint, (state, *asked), under
+                    robot, by, pose, joint, (one, *asked), under
                 )
     write_json(results, json)
     if json != "-":
         print(stiffness_text(results))
         _print_slopes(results)
-    if output is not None and "shares" in results:
-        save_figure(plot_shares(results), output)
+    if figure is not None and "shares" in results:
+        save_figure(plot_shares(results), figure)
     if results["status"] != "ok" or results.get("cannot_change"):
         raise typer.Exit(1)
 
@@ -140,7 +136,7 @@ def _slopes(
 
 def _print_slopes(results: dict[str, Any]) -> None:
     """A line for each derivative, and for each that there is not."""
-    for key in ("slopes", "slopes_in_contact"):
+    for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():
             text = f"dC/d({path}){name}"

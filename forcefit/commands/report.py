@@ -24,7 +24,9 @@ def _checked(path: Path | None) -> Path | None:
 
 ReportOption = Annotated[
     Path | None,
-    typer.Option(help="Also write a report, one HTML file.", callback=_checked),
+    typer.Option(
+        "--report", help="Also write a report, one HTML file.", callback=_checked
+    ),
 ]
 _File = Annotated[
     Path, typer.Argument(metavar="FILE", help="A report, or JSON of a command.")
@@ -40,10 +42,7 @@ def report() -> None:
 def compare(
     first: _File,
     second: _File,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="HTML page.", callback=_checked),
-    ] = None,
+    page: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Two runs side by side: what changed, the largest change first."""
@@ -54,9 +53,9 @@ def compare(
         str(first), str(second)
     )  # fmt: skip
     comparison = compare_results(_results(first), _results(second), names)
-    if output is not None:
+    if page is not None:
         source = provenance(first, second)
-        write_text(comparison_page(comparison, source), output)
+        write_text(comparison_page(comparison, source), page)
     write_json(comparison.table(), json)
     if json != "-":
         print(comparison_text(comparison))

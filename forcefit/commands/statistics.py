@@ -39,7 +39,7 @@ from forcefit.inputs.writing import (
 if TYPE_CHECKING:
     from assembly.statistics.allocation import Allocation
 
-PlayOption = Annotated[
+ClearanceOption = Annotated[
     str,
     typer.Option(
         help="Clearance positions for pose errors: worst (any, the largest error "
@@ -50,7 +50,7 @@ PlayOption = Annotated[
 ContactLengthOption = Annotated[
     float | None,
     typer.Option(
-        help="[m] --play contact: a random moment over it is as large as a random "
+        help="[m] --clearance contact: a random moment over it is as large as a random "
         "force. Default: the longest body."
     ),
 ]
@@ -69,7 +69,7 @@ def statistics(
         int, typer.Option(help="Draws of all errors.", min=2, max=10**9)
     ] = 10_000,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
-    play: PlayOption = "worst",
+    clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
@@ -90,11 +90,11 @@ def statistics(
     margins: Annotated[
         bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
     ] = True,
-    stiffness: Annotated[
+    state: Annotated[
         str | None,
         typer.Option(
-            help="Spread of the platform's stiffness: contact (clearances pressed or "
-            "free) | exact (internal forces too)."
+            help="Spread of the platform's stiffness in a state: contact (clearances "
+            "pressed or free) | exact (internal forces too)."
         ),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
@@ -126,10 +126,10 @@ def statistics(
     from assembly.sweeps.dataset import check_dataset
     from assembly.sweeps.point_table import write_point_table
 
-    _check_clearance_model(play, contact_length)
+    _check_clearance_model(clearance, contact_length)
     _check_word("--by", by, ("source", "frame", "kind"))
-    if stiffness is not None:
-        _check_word("--stiffness", stiffness, ("contact", "exact"))
+    if state is not None:
+        _check_word("--state", state, ("contact", "exact"))
     if not 0 < confidence < 1:
         raise BadInput(f"--confidence: found {confidence}, expected between 0 and 1")
     if yield_strength is not None and not 0 < yield_strength < float("inf"):
@@ -155,9 +155,9 @@ def statistics(
             print(status_line(said))
         raise typer.Exit(1)
     experiment = Experiment(
-        posture, sources, seed, play, margins,
+        posture, sources, seed, clearance, margins,
         load=tuple(wrench) if wrench else None, gravity=tuple(g) if g else None,
-        stiffness=stiffness or "", precision=precision_for(limits),
+        stiffness=state or "", precision=precision_for(limits),
         contact_length=contact_length,
     )  # fmt: skip
     experiment.check_limits([*limits, *(["stress"] if yield_strength else [])])
@@ -197,16 +197,17 @@ def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
 
-def _check_clearance_model(play: str, contact_length: float | None) -> None:
+def _check_clearance_model(clearance: str, contact_length: float | None) -> None:
     """Refuse an unknown model, and a length that it does not need or cannot use."""
     from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 
-    _check_word("--play", play, tuple(CLEARANCE_MODELS))
+    _check_word("--clearance", clearance, tuple(CLEARANCE_MODELS))
     if contact_length is None:
         return
-    if play != "contact":
+    if clearance != "contact":
         raise BadInput(
-            f"--contact-length: found with --play {play}, expected --play contact"
+            f"--contact-length: found with --clearance {clearance}, expected "
+            "--clearance contact"
         )
     if not 0 < contact_length < float("inf"):
         raise BadInput(f"--contact-length: found {contact_length}, expected > 0 m")
@@ -234,7 +235,7 @@ def tolerances(
     compliant: Annotated[
         str, typer.Option(help="Present errors: compliant joints free | rigid.")
     ] = "free",
-    play: PlayOption = "worst",
+    clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     rest: RestOption = None,
     mismatch: MismatchOption = None,
@@ -263,7 +264,7 @@ def tolerances(
 
     from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import closing_of
-    from assembly.kinematics.verdict import SINGULAR
+    from assembly.model.statuses import SINGULAR
     from assembly.statistics.allocated_tolerances import allocation_of, allocation_text
     from assembly.statistics.allocation import allocate
     from assembly.statistics.replay import journalled
@@ -277,7 +278,7 @@ def tolerances(
     )
     from assembly.sweeps.dataset import check_dataset
 
-    _check_clearance_model(play, contact_length)
+    _check_clearance_model(clearance, contact_length)
     _check_word("--compliant", compliant, ("free", "rigid"))
     if plan is None and (output or figure or csv):
         raise BadInput("tolerances: --output, --figure and --csv need a --plan")
@@ -294,7 +295,7 @@ def tolerances(
         if plan is None
         else replace(
             read_plan(plan, machine),
-            clearance_model=play,
+            clearance_model=clearance,
             contact_length=contact_length,
         )
     )

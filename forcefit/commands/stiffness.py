@@ -136,7 +136,7 @@ def beam(
     width: Width = None,
     height: Height = None,
     section: SectionText = None,
-    axis: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
+    along: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
     up: Up = None,
     theory: Theory = "timoshenko",
     json: JsonOption = None,
@@ -152,8 +152,8 @@ def beam(
     options = BeamOptions(
         young, poisson, radius, inner_radius, width, height, section, theory
     )
-    along = parse_axis("--axis", axis)
-    tip = checked("--length", length, "m", above=0) * along / np.linalg.norm(along)
+    axis = parse_axis("--along", along)
+    tip = checked("--length", length, "m", above=0) * axis / np.linalg.norm(axis)
     link = options.link(np.zeros(3), tip, _up(up))
     write_json(link_results(link), json)
     if json != "-":

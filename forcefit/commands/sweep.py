@@ -54,6 +54,16 @@ CsvOption = Annotated[
 ]
 
 
+def _list_quantities(names: list[str] | None) -> list[str] | None:
+    """Print the data variables of sweeps where ``list`` is asked for."""
+    if names == ["list"]:
+        from assembly.sweeps.selection import quantities_text
+
+        print(quantities_text())
+        raise typer.Exit
+    return names
+
+
 def sweep(
     robot: RobotArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
@@ -83,27 +93,26 @@ def sweep(
         typer.Option(help="Draws of errors at each point.", min=1, max=10**9),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
-    reading: Annotated[
+    assumption: Annotated[
         str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
     ] = "frozen",
-    play_alone: Annotated[
-        bool, typer.Option("--play-alone", help="The pose error also without errors.")
-    ] = False,
+    quantities: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Names of data variables to compute and store, such as energy,margin; "
+            "default stands for those stored without it, list prints all.",
+            callback=_list_quantities,
+            is_eager=True,
+        ),
+    ] = None,
     wrench_of: Annotated[
         list[str] | None, typer.Option(help="A frame whose wrench is kept.")
     ] = None,
-    linearisation: Annotated[
-        bool,
-        typer.Option("--linearisation", help="What finite motions would change; slow."),
-    ] = False,
-    stiffness: Annotated[
-        bool,
-        typer.Option("--stiffness", help="K_C, and which part gives way."),
-    ] = False,
-    tangent: Annotated[
+    state: Annotated[
         str | None,
         typer.Option(
-            help="contact | exact: K_C of what is there, errors, loads, clearances."
+            help="Also K_C, and which part deforms: nominal (clearances at zero) | "
+            "contact | exact (both with errors, loads and clearances)."
         ),
     ] = None,
     frequencies: Annotated[
@@ -137,11 +146,11 @@ def sweep(
     Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
     you like, the same command goes on from there and ends in the same file.
     """
+    from assembly.model.statuses import UNUSABLE
     from assembly.sweeps.dataset import check_dataset, open_dataset
     from assembly.sweeps.maps import check_axes, figure_of
     from assembly.sweeps.netcdf import stored_dataset
     from assembly.sweeps.point_table import write_point_table
-    from assembly.sweeps.quantities import UNUSABLE
     from assembly.sweeps.request import (
         SweepOptions,
         ask_sweep,
@@ -163,12 +172,11 @@ def sweep(
             robot,
             SweepOptions(
                 grid=grid, poses=poses, vary=vary or (), errors=errors, draws=draws,
-                seed=seed, reading=reading, play_alone=play_alone,
-                wrench=wrench_of or (), linearisation=linearisation, near=near,
+                seed=seed, assumption=assumption, quantities=quantities or (),
+                wrench_of=wrench_of or (), near=near,
                 yield_strength=yield_strength, load=wrench or (0.0,) * 6,
-                gravity=g or (0.0,) * 3, under=covariates or {}, stiffness=stiffness,
-                tangent=tangent, frequencies=frequencies, rest=rest,
-                mismatch=mismatch,
+                gravity=g or (0.0,) * 3, under=covariates or {}, state=state,
+                frequencies=frequencies, rest=rest, mismatch=mismatch,
             ),
         )  # fmt: skip
         if figure is not None:
@@ -179,7 +187,7 @@ def sweep(
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(
             "forcefit: note: load and gravity are left out of the frequencies; "
-            "assembly frequencies --exact counts them",
+            "assembly frequencies --state exact counts them",
             file=sys.stderr,
         )
     done = [0]
@@ -228,9 +236,7 @@ def _solver(workers: int | None, scheduler: str | None) -> "Solver":
 
 def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Of a sweep.")],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="PNG, SVG or PDF file.")
-    ],
+    picture: Annotated[Path, typer.Option("--figure", help="PNG, SVG or PDF file.")],
     at: Annotated[
         list[str] | None,
         typer.Option(help="Where to stand on other axes, such as draw=3."),
@@ -239,11 +245,11 @@ def plot(
         str | None,
         typer.Option(help="histogram | tornado | allocation; else what the file is."),
     ] = None,
-    quantity: Annotated[
+    quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="What to show, such as stiffness.FX, frequency.1, translation, "
-            "wrench.leg1.link_a.FZ; may be repeated. A variable alone: all components."
+            help="What to show, such as stiffness.FX,translation or "
+            "wrench.leg1.link_a.FZ. A variable alone: all components."
         ),
     ] = None,
 ) -> None:
@@ -254,19 +260,20 @@ def plot(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f'--kind: found "{kind[:60]}"{nearest(kind, KINDS)}')
-    check_writable(output, PICTURE)
+    check_writable(picture, PICTURE)
     places = {}
     for text in at or ():
         name, equals, value = (piece.strip() for piece in text.rpartition("="))
         if not equals:
             raise BadInput(f'--at: found "{text[:60]}", expected AXIS=VALUE')
         places[name] = value
+    names = [part.strip() for text in quantities or () for part in text.split(",")]
     data = open_dataset(file)
     try:
-        figure = figure_of_draws(data, kind, quantity or ())
+        figure = figure_of_draws(data, kind, names)
     except ValueError as error:
         raise BadInput(f"{file}: {error}") from None
-    save_figure(figure or figure_of(data, places, quantity or ()), output)
+    save_figure(figure or figure_of(data, places, names), picture)
 
 
 def table(

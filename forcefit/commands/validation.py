@@ -125,10 +125,10 @@ def crosscheck(
     links: Annotated[
         str, typer.Option(help="How the simulation models links: beam | spring | fem.")
     ] = "beam",
-    clearances: Annotated[
+    with_clearance: Annotated[
         bool,
         typer.Option(
-            "--clearances", help="Keep the joints' clearances in both models."
+            "--with-clearance", help="Keep the joints' clearances in both models."
         ),
     ] = False,
     stiffness: Annotated[
@@ -166,8 +166,8 @@ def crosscheck(
 
     scales, wrench = parse_scales(scale), parse_load(load)
     g, covariates = parse_gravity(gravity), parse_covariates(under)
-    if clearances and figure is not None:
-        raise BadInput("--figure: with --clearances there is no slope to draw")
+    if with_clearance and figure is not None:
+        raise BadInput("--figure: with --with-clearance there is no slope to draw")
     if stiffness and (figure is not None or grid is not None):
         raise BadInput("--stiffness: not with --figure or --grid")
     if figure is not None:
@@ -188,7 +188,7 @@ def crosscheck(
                 links,
                 applied.gravity,
                 time_limit,
-                clearances,
+                with_clearance,
             )
         return compare_models(
             applied.posture,
@@ -197,7 +197,7 @@ def crosscheck(
             links,
             applied.gravity,
             time_limit,
-            clearances,
+            with_clearance,
         )
 
     if grid is not None:

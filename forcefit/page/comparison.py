@@ -15,7 +15,7 @@ _LISTED = 60  # changes on the page at once: some two sheets of paper
 # pure numbers that say how well, not what
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
-_HEADLINES = {"worst_play", "within_limits", "error", "allocation"}
+_HEADLINES = {"worst_clearance", "within_limits", "error", "allocation"}
 _FIGURES = {("solution", "energy"), ("zone", "margin"), ("zone", "margin_free")}
 
 

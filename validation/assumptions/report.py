@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.statuses import OUT_OF_REACH
 from validation.assumptions.over_poses import CostsOverPoses
 from validation.assumptions.platform_cost import PlatformCosts
 from validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
@@ -37,7 +38,7 @@ def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
     for asked, why in zip(costs.asked, costs.unreached, strict=True):
         row: dict[str, Any] = {"asked": asked, "status": "ok"}
         if why:
-            row |= {"status": "out of reach", "reason": why}
+            row |= {"status": OUT_OF_REACH, "reason": why}
         else:
             row |= _at(costs, sum(earlier["status"] == "ok" for earlier in poses))
         poses.append(row)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.effects import LIBRARY
-from assembly.exchange.robot_files import read_robot
+from assembly.exchange.robot_files import load_robot
 from assembly.kinematics.posture import POSE, Posture, place_many, place_many_joints
 from assembly.measurement.conditions import COVARIATES
 from assembly.model.robot import Robot
@@ -315,7 +315,7 @@ def _read_robot(root: Table, name: str) -> Robot:
             f"found {quoted(name)}, neither a built-in robot nor a file beside this"
         )
         raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
-    return read_robot(path)
+    return load_robot(path)
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:

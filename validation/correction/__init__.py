@@ -1,4 +1,4 @@
-"""A corrected robot at work: readings foretold, commands corrected, sessions carried.
+"""A corrected robot at work: readings predicted, commands corrected, sessions carried.
 
 Begin at ``prediction.py``; the docs are ``docs/correction.md``.
 """

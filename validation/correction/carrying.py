@@ -80,7 +80,7 @@ class Carried:
 
     @property
     def better(self) -> bool:
-        """Whether the robot foretells the other rows better than the declared one."""
+        """Whether the robot predicts the other rows better than the declared one."""
         error, declared = self.error.normalised, self.declared.normalised
         return math.isnan(declared) or error <= declared
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from assembly.effects.registration import BASE
 from assembly.measurement.conditions import Conditions
-from assembly.measurement.predict import Prediction, predict
+from assembly.measurement.predict import Prediction
+from assembly.measurement.predict import predict as predict_rows
 from assembly.model.robot import Robot
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput
@@ -25,7 +26,7 @@ _MOVED = 3.0  # times as large a residual: the measuring device has been moved
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class PredictedReadings:
     """Readings of commands.
 
     Attributes:
@@ -83,7 +84,7 @@ def _both(values: NDArray) -> dict[str, float]:
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 
-def foretell(commands: Campaign) -> Foretold:
+def predict(commands: Campaign) -> PredictedReadings:
     """What the robot of a campaign reads for its commands.
 
     Where the registration is unknown, it is that of the robot's file; if the file has
@@ -100,7 +101,7 @@ def foretell(commands: Campaign) -> Foretold:
         BadInput: the registration is unknown, and the rows do not tell it.
     """
     conditions, registration = _registered(commands, finite_conditions(commands))
-    prediction = predict(conditions)
+    prediction = predict_rows(conditions)
     robot = commands.robot
 
     def placed(other: Robot) -> Conditions:
@@ -111,7 +112,7 @@ def foretell(commands: Campaign) -> Foretold:
 
     identified = robot.reference_point
     same = identified is None or np.allclose(identified, commands.reference_point)
-    return Foretold(
+    return PredictedReadings(
         commands=commands,
         prediction=prediction,
         error=errors_of(commands, commands.measured - prediction.deviation),
@@ -142,7 +143,7 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
     except BadInput:
         return conditions, "of the robot file"
     errors = [
-        rms((commands.measured - predict(one).deviation) / commands.sigma)
+        rms((commands.measured - predict_rows(one).deviation) / commands.sigma)
         for one in (conditions, again)
     ]
     if errors[0] > _MOVED * errors[1]:
@@ -199,21 +200,21 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     return names
 
 
-def reading_table(foretold: Foretold) -> str:
+def reading_table(predicted: PredictedReadings) -> str:
     """Predicted readings as a table: ``id`` and the readings, under a campaign's names.
 
     Args:
-        foretold: of any commands.
+        predicted: of any commands.
 
     Returns:
         CSV; a cell is empty where the robot has no answer.  Where the robot's file
         says how uncertain it is, ``std.`` and ``noise.`` of every reading follow, and
         ``extrapolated``: what leaves the range in which the robot was identified.
     """
-    commands, deviations = foretold.commands, foretold.prediction.deviation
+    commands, deviations = predicted.commands, predicted.prediction.deviation
     columns = reading_names(commands)
-    more = {"std": foretold.spread, "noise": foretold.noise}
-    more = {k: v for k, v in more.items() if foretold.spread.any()}
+    more = {"std": predicted.spread, "noise": predicted.noise}
+    more = {k: v for k, v in more.items() if predicted.spread.any()}
     values: dict[str, dict[str, object]] = {}
     for i, label in enumerate(commands.labels):
         point = "" if commands.point is None else str(commands.point[i])
@@ -224,7 +225,7 @@ def reading_table(foretold: Foretold) -> str:
                 for kind, array in more.items():
                     row[name.replace("meas", kind, 1)] = float(array[i, k])
         if commands.robot.learned_range:
-            row["extrapolated"] = foretold.extrapolated[i]
+            row["extrapolated"] = predicted.extrapolated[i]
     names = [name for name, _, _ in columns]
     names += [name.replace("meas", kind, 1) for kind in more for name in names]
     if commands.robot.learned_range:

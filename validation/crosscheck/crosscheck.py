@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.kinematics.posture import Posture
-from assembly.linear.energy import CannotAssemble, solve_assembly
+from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
+from assembly.model.statuses import FAILS, OK, SIMULATION_FAILED, UNDECIDED
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
@@ -35,7 +36,7 @@ from validation.crosscheck.resolution import (
 )
 from validation.crosscheck.spread_weight import energy_between_ends
 from validation.crosscheck.verdict import (
-    NO_SIGNAL,
+    NOT_CHECKED,
     SCALES,
     Check,
     compare_scales,
@@ -140,7 +141,7 @@ class Crosscheck:
         outcome = verdict(self)
         return {
             "robot": robot.name,
-            "status": "ok",
+            "status": OK,
             "pose": self.posture.pose(),
             "load": self.load,
             "gravity": self.gravity,
@@ -154,7 +155,7 @@ class Crosscheck:
                     "tolerance": check.bound,
                     "uncertainty": check.uncertainty,
                     "verdict": check.verdict,
-                    "passed": check.verdict == "ok",
+                    "passed": check.verdict == OK,
                 }
                 for name, check in self.checks.items()
             },
@@ -179,11 +180,13 @@ class Crosscheck:
         lines = [f"{self.posture.robot.name}, {self.metric.notes()[0]}"]
         lines += self.metric.notes()[1:]
         lines += ["  ".join(f"{cell:>26}" for cell in row) for row in cells]
-        words = {"ok": "ok", "fails": "FAILS", "undecided": "NOT DECIDED"}
+        words = {OK: "ok", FAILS: "FAILS", UNDECIDED: "NOT DECIDED"}
         for name, check in self.checks.items():
             word = words.get(check.verdict)
             value = f"{check.value:.1e} (bound {check.bound:g})"
-            lines.append(f"{name}: {NO_SIGNAL if word is None else f'{value} {word}'}")
+            lines.append(
+                f"{name}: {NOT_CHECKED if word is None else f'{value} {word}'}"
+            )
         added = len(self.pairs) - self.asked
         if added:
             lines.append(f"scales added to tell: {added}")
@@ -289,12 +292,8 @@ def attempt(
     try:
         return check(), {}
     except SimulationFailed as error:
-        status, reason = "simulation failed", str(error)
-    except CannotAssemble as error:
-        status, reason = "cannot assemble", str(error)
-    except FreeMotion as error:
-        status, reason = "no equilibrium", str(error)
-    except SolverFailed as error:
-        status, reason = "solver failed", str(error)
+        status, reason = SIMULATION_FAILED, str(error)
+    except (CannotAssemble, FreeMotion, SolverFailed) as error:
+        status, reason = failure_status(error), str(error)
     failure = {"robot": robot, "status": status, "reason": reason}
     return None, failure | {"scales": [], "slope": None, "passed": False}

@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE, Posture, place_many
-from assembly.kinematics.verdict import BEYOND_LIMITS, limits_passed
+from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
+from assembly.model.statuses import BEYOND_LIMITS, NO_SIGNAL, OUT_OF_REACH
 from validation.crosscheck.crosscheck import Crosscheck, attempt
 
 _VERDICTS = {
     "passed": "passed",
     "not decided": "NOT DECIDED",
-    "no signal": "NOT CHECKED, nothing stands out of the noise",
+    NO_SIGNAL: "NOT CHECKED, nothing stands out of the noise",
 }
 
 
@@ -61,7 +62,7 @@ def _row(
 ) -> dict[str, Any]:
     """The result at one pose."""
     if posture is None:
-        return {"status": "out of reach", "reason": reason, "passed": None}
+        return {"status": OUT_OF_REACH, "reason": reason, "passed": None}
     if passed := limits_passed(robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed, "passed": None}
     result, failure = attempt(robot.name, lambda: check(posture))

@@ -15,11 +15,12 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
-NO_SIGNAL = "not checked, nothing to compare"
+NOT_CHECKED = "not checked, nothing to compare"
 _FEWEST, _MOST = 4, 6  # scales on which a check may fail; at which none is added
 
 
@@ -47,12 +48,12 @@ class Check:
         signal"`` if there is nothing to compare.
         """
         if self.value - self.uncertainty > self.bound:
-            return "fails"
+            return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
-            return "no signal"
+            return NO_SIGNAL
         # a value that is not a number is not known
         known = self.value <= self.bound and self.uncertainty <= self.bound
-        return "ok" if known else "undecided"
+        return "ok" if known else UNDECIDED
 
 
 class Judged(Protocol):
@@ -81,11 +82,11 @@ def verdict(comparison: Judged) -> str:
         had anything to compare.
     """
     outcomes = {check.verdict for check in comparison.checks.values()}
-    if "fails" in outcomes and len(comparison.pairs) >= _FEWEST:
+    if FAILS in outcomes and len(comparison.pairs) >= _FEWEST:
         return "failed"
-    if outcomes & {"fails", "undecided"}:
+    if outcomes & {FAILS, UNDECIDED}:
         return "not decided"
-    return "passed" if "ok" in outcomes else "no signal"
+    return "passed" if "ok" in outcomes else NO_SIGNAL
 
 
 def compare_scales(
@@ -143,11 +144,11 @@ def verdict_text(comparison: Judged) -> str:
         "failed": "FAILED",
         "not decided": "NOT DECIDED: the errors are too large for these scales; ask "
         "for smaller ones",
-        "no signal": "NOT CHECKED: nothing stands out of the noise; a robot without "
+        NO_SIGNAL: "NOT CHECKED: nothing stands out of the noise; a robot without "
         "errors and load compares zero with zero",
     }
     outcome = verdict(comparison)
-    silent = sum(check.verdict == "no signal" for check in comparison.checks.values())
+    silent = sum(check.verdict == NO_SIGNAL for check in comparison.checks.values())
     if outcome == "passed" and silent:
         count = len(comparison.checks)
         return f"passed; {silent} of {count} checks had nothing to compare"

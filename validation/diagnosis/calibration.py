@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from assembly.model.statuses import EXPLAINED
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.lack_of_fit import SIGNIFICANT
 from validation.diagnosis.select import select
@@ -63,8 +64,8 @@ def calibrate(
         z = fit.whiten.inverse(z + (best.fitted if present else 0.0))
         decision, claimed = _decided(select(traced.columns, z, cells), len(z))
         tally[present][decision] += 1
-        right += present and decision == "explained" and claimed == truth
-        wrong += decision == "explained" and claimed != (truth if present else ())
+        right += present and decision == EXPLAINED and claimed == truth
+        wrong += decision == EXPLAINED and claimed != (truth if present else ())
         update(k + 1, 2 * count)
     return Calibration(
         count, dict(tally[False]), dict(tally[True]),

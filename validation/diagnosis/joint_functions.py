@@ -64,7 +64,7 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
-    # play of a slide along its own axis is a clearance of the library
+    # clearance of a slide along its own axis is an effect of the library
     return forms.knees(np.abs(load), jump=frame.joint == "revolute")
 
 

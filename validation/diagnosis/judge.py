@@ -8,6 +8,14 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from assembly.measurement.predict import predict
+from assembly.model.statuses import (
+    AMBIGUOUS,
+    EXPLAINED,
+    LEARNED,
+    NONE_NEEDED,
+    NOT_ENOUGH_ROWS,
+    OUTSIDE_LIBRARY,
+)
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.fit import MachineFit, fit_machine
@@ -28,7 +36,7 @@ from validation.diagnosis.sequence import errors_of, joined, pooled, stages
 from validation.diagnosis.signatures import whiten
 from validation.diagnosis.text import text
 from validation.diagnosis.trace import FINITE, Traced
-from validation.diagnosis.verdict import NOT_ENOUGH, by_names, verdict
+from validation.diagnosis.verdict import by_names, verdict
 from validation.diagnosis.whitening import independent, size_of_noise, whitening_of
 
 _LOOSE = 1.25  # rms of held-out rows, in sigma, that is noise whatever its chance
@@ -87,15 +95,15 @@ def judge(
         traced.selected, names, functions=bool(fit.unknowns.functions),
         small=bool(fit.unknowns.small), more_than_noise=lack.significant,
     )  # fmt: skip
-    if decision in {"explained", "learned", "ambiguous"}:
+    if decision in {EXPLAINED, LEARNED, AMBIGUOUS}:
         fails = _fails(noisy, folds, after, rows, lack)
         if fails or errors[1].normalised > errors[0].normalised:
-            decision, claimed = "outside_library", ()
+            decision, claimed = OUTSIDE_LIBRARY, ()
         if _too_few(campaign, used, determined, fails):
-            decision, claimed = NOT_ENOUGH, ()
+            decision, claimed = NOT_ENOUGH_ROWS, ()
     remarks = implausible(campaign, fit)
-    if remarks and decision in {"explained", "learned"}:
-        decision, claimed = "outside_library", ()
+    if remarks and decision in {EXPLAINED, LEARNED}:
+        decision, claimed = OUTSIDE_LIBRARY, ()
     conditions = traced.conditions
     if FINITE in names:
         conditions = replace(conditions, second_order=0.0)
@@ -104,9 +112,9 @@ def judge(
         fit, correlated = _of_all_rows(believed, traced, fit, used | rows)
         left = residual_of(campaign, fit.robot)
     varies, following = [], None
-    if decision == "outside_library":
+    if decision == OUTSIDE_LIBRARY:
         varies = trends(campaign.take(used), traced.conditions.take(used), left[used])
-    if decision == "ambiguous":
+    if decision == AMBIGUOUS:
         rivals = [fit_machine(traced.campaign, u, used) for u in traced.rivals()]
         following = next_measurement(campaign, traced.conditions, fit, rivals)
     free = [predicted(campaign, robot).undetermined for robot in (None, fit.robot)]
@@ -121,7 +129,7 @@ def judge(
         alternatives=by_names(traced.selected),
         lack=lack,
         before=errors[0],
-        after=errors[0] if decision == "none_needed" else errors[1],
+        after=errors[0] if decision == NONE_NEEDED else errors[1],
         saved=errors_of(campaign, left, ~outliers),
         noise=errors_of(campaign, size_of_noise(noisy), rows),
         with_outliers=(
@@ -140,7 +148,7 @@ def judge(
         residual_after=left,
         trends=tuple(varies),
         next=following,
-        needed=_needed(campaign, fit) if decision == NOT_ENOUGH else "",
+        needed=_needed(campaign, fit) if decision == NOT_ENOUGH_ROWS else "",
         remarks=remarks + _impossible(campaign),
         wording=text,
     )

@@ -1,6 +1,6 @@
 """How well functions hold where their variable has not been.
 
-Each fifth of the range of a function's variable is foretold by a fit to the others, at
+Each fifth of the range of a function's variable is predicted by a fit to the others, at
 the model's prior sizes: without refits, by the leave-block-out identity
 (:mod:`.gaussian`).  Random rows lie between others; a wave that fits them may be
 anything beyond the range.
@@ -26,7 +26,7 @@ class RangeError:
 
     Attributes:
         variable: its public name.
-        without: [sigma] rms of all readings, foretold by the model without the
+        without: [sigma] rms of all readings, predicted by the model without the
             function.
         after: [sigma] the same with it.
     """

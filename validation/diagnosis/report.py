@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from assembly.model.statuses import AMBIGUOUS, EXPLAINED, LEARNED, NONE_NEEDED
 from forcefit.inputs.writing import write_text
 from forcefit.page.page import (
     Page,
@@ -90,7 +91,7 @@ def report_page(
         Page(
             title=f"Diagnosis of {campaign.name}",
             verdict=told["sentence"],
-            good=diagnosis.verdict in {"explained", "learned", "none_needed"},
+            good=diagnosis.verdict in {EXPLAINED, LEARNED, NONE_NEEDED},
             tiles=_tiles(diagnosis),
             about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
             f"{diagnosis.held.words}.",
@@ -165,7 +166,7 @@ def _parameters(told: Table) -> tuple[str, str]:
          *(Value(end, p["unit"], 6) for end in p["interval_90"])]
         for effect in told["effects"] for p in effect["parameters"]
     ]  # fmt: skip
-    title = "Parameters, if so" if told["verdict"] == "ambiguous" else "Parameters"
+    title = "Parameters, if so" if told["verdict"] == AMBIGUOUS else "Parameters"
     head = ["parameter", "value", "standard deviation", "at least (90 %)", "at most"]
     listed = told["verdict"] in results.LISTED
     return title, table(head, rows, "parameters") if listed else ""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from assembly.effects import LIBRARY
+from assembly.model import statuses
 from validation.campaign.campaign import READING
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.claims import Parameter, parameters_of
@@ -16,7 +17,8 @@ from validation.diagnosis.saving import functions_of
 from validation.diagnosis.sentence import WORDS, formula, sentence
 from validation.diagnosis.sequence import LEARNED
 
-LISTED = {"explained", "ambiguous", "learned"}  # verdicts that list effects
+# verdicts that list effects
+LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
 _HARDLY = 0.05  # of an unknown known: its frame is not listed
 _INTERVAL = 1.645  # standard deviations of a normal distribution: 90 % lie within
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}

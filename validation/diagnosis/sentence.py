@@ -7,11 +7,17 @@ from numpy.typing import NDArray
 
 from assembly.effects.functions import columns_of, parameters_of
 from assembly.model.function import Function
+from assembly.model.statuses import (
+    AMBIGUOUS,
+    EXPLAINED,
+    LEARNED,
+    NONE_NEEDED,
+    NOT_ENOUGH_ROWS,
+)
 from validation.diagnosis.calibration import Calibration
 from validation.diagnosis.diagnosis import Diagnosis
 from validation.diagnosis.nuisance import GEOMETRY, SPRINGS
 from validation.diagnosis.saving import functions_of
-from validation.diagnosis.verdict import NOT_ENOUGH
 
 WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
@@ -32,24 +38,24 @@ def sentence(diagnosis: Diagnosis) -> str:
     unsure = f" +- {diagnosis.uncertainty:.2f}" if known else ""
     after, noise = diagnosis.after.normalised, diagnosis.noise.normalised
     both = f"{kept}, {after:.2f}{unsure} after ({noise:.3g} is noise)"
-    if diagnosis.verdict == "none_needed":
+    if diagnosis.verdict == NONE_NEEDED:
         return (
             "The declared model is enough: the residual is noise as far as this design "
             f"can tell ({before} on {where})."
         )
-    if diagnosis.verdict == "explained":
+    if diagnosis.verdict == EXPLAINED:
         small = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
         names = " and ".join([*diagnosis.claimed, *small])
         return f"The declared model lacks {names}; {both}."
-    if diagnosis.verdict == "learned":
+    if diagnosis.verdict == LEARNED:
         names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
         return f"The library lacks what was learned: {names}; {both}."
-    if diagnosis.verdict == "ambiguous":
+    if diagnosis.verdict == AMBIGUOUS:
         sets = " or ".join(
             " + ".join(names) or "nothing" for names, _ in diagnosis.alternatives[:4]
         )
         return f"This design cannot tell which effect it is: {sets}; {kept}."
-    if diagnosis.verdict == NOT_ENOUGH:
+    if diagnosis.verdict == NOT_ENOUGH_ROWS:
         return f"These rows are too few to tell a cause from chance; {both}."
     seen = ", ".join(t.against for t in diagnosis.trends[:3])
     varies = f", which vary with {seen}" if seen else ""

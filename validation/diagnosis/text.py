@@ -96,7 +96,7 @@ def _function_lines(one: Table) -> list[str]:
     lines = [f"learned: {one['label']}", f"  {short}"]
     if parts is not None:
         lines.append(
-            "  foretold in parts of {variable} left out: {after:.3g} sigma, "
+            "  predicted in parts of {variable} left out: {after:.3g} sigma, "
             "without it {without:.3g}".format(**parts)
         )
     if one["equivalent_places"]:

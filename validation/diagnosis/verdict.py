@@ -1,9 +1,15 @@
 """From probabilities to a verdict."""
 
+from assembly.model.statuses import (
+    AMBIGUOUS,
+    EXPLAINED,
+    LEARNED,
+    NONE_NEEDED,
+    OUTSIDE_LIBRARY,
+)
 from validation.diagnosis.columns import FUNCTION
 from validation.diagnosis.selected import Selected
 
-NOT_ENOUGH = "not_enough_rows"
 CLAIM = 0.9  # probability from which an effect is claimed
 RIVAL = 0.5  # probability from which another one is a rival
 _LISTED = 0.02  # probability from which an alternative is listed
@@ -43,7 +49,7 @@ def verdict(
         ``"outside_library"``, and the names claimed.
     """
     if more_than_noise:
-        return "outside_library", ()
+        return OUTSIDE_LIBRARY, ()
     likely = sum(m.probability for m in selected.models if m.functions)
     sure = tuple(n for n in names if selected.probability.get(n, 0.0) >= CLAIM)
     rivals = [
@@ -52,12 +58,12 @@ def verdict(
     ]  # fmt: skip
     decided = set(sure) == set(names) and not rivals
     if functions:
-        return ("learned", sure) if decided and likely >= CLAIM else ("ambiguous", ())
+        return (LEARNED, sure) if decided and likely >= CLAIM else (AMBIGUOUS, ())
     if names:
-        return ("explained", sure) if decided else ("ambiguous", ())
+        return (EXPLAINED, sure) if decided else (AMBIGUOUS, ())
     nothing = sum(
         m.probability for m in selected.models if not m.effects and not m.functions
     )
     if likely >= RIVAL or (nothing < RIVAL and rivals):
-        return "ambiguous", ()
-    return ("explained" if small else "none_needed"), ()
+        return AMBIGUOUS, ()
+    return (EXPLAINED if small else NONE_NEEDED), ()

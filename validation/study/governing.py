@@ -17,7 +17,7 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 _KEYS = ("tilt", "spin", "radial", "axial")  # as the bounds of clearance_bounds
 
 
-def governing(posture: Posture, reading: str = "frozen") -> list[dict[str, Any]]:
+def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
     """Largest pose error (27) with one frame's error or one joint's clearance removed.
 
     The errors are those that the robot has: two of them may cancel each other, and then
@@ -25,7 +25,7 @@ def governing(posture: Posture, reading: str = "frozen") -> list[dict[str, Any]]
 
     Args:
         posture: of a robot with errors or clearances.
-        reading: of problem (27).
+        assumption: of problem (27).
 
     Returns:
         For each frame with errors and each joint with clearances its name (``part``),
@@ -36,7 +36,7 @@ def governing(posture: Posture, reading: str = "frozen") -> list[dict[str, Any]]
     for part, what, robot in _improved(posture.robot):
         try:
             assembly = solve_assembly(replace(posture, robot=robot))
-            bound = bound_pose_error(assembly, reading)
+            bound = bound_pose_error(assembly, assumption)
         except (CannotAssemble, FreeMotion, SolverFailed):
             rows.append({"part": part, "what": what, "rotation": None,
                          "translation": None})  # fmt: skip

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from assembly.kinematics.verdict import BEYOND_LIMITS, SINGULAR
+from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from validation.study.study import StudyResults
 
-WORST = "frozen"  # reading of (27): all clearance motions without spring deformation
+WORST = "frozen"  # assumption of (27): all clearance motions without spring deformation
 _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
@@ -26,14 +26,14 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
         results: of :func:`validation.study.study.run_study`.
 
     Returns:
-        ``rotation`` [rad] and ``translation`` [m], reading ``frozen`` of (27), at the
+        ``rotation`` [rad] and ``translation`` [m], by ``frozen`` of (27), at the
         study's pose (``pose``) and the largest over its ``map``, with the number of
         ``points`` they are over, ``of`` all; None where there is none.  Infinite where
         nothing bounds the platform.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
-    table: dict[str, Any] = {"reading": WORST, "pose": None, "map": None}
+    table: dict[str, Any] = {"assumption": WORST, "pose": None, "map": None}
     if error is not None:
         table["pose"] = {part: error[part]["upper"] for part in parts}
     if results.maps is not None:
@@ -124,21 +124,21 @@ def _pose_error_text(results: StudyResults) -> str:
         sentence.append(
             f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
         )
-    others = _other_readings(results)
+    others = _other_assumptions(results)
     return "".join(sentence) + (
-        f" (certified bounds of (27), reading {WORST}{others}); {at_rest}"
+        f" (certified bounds of (27), assumption {WORST}{others}); {at_rest}"
     )
 
 
-def _other_readings(results: StudyResults) -> str:
-    """Bounds of the other readings, where they are more than one per cent larger."""
+def _other_assumptions(results: StudyResults) -> str:
+    """Bounds of the other assumptions, where they are more than one per cent larger."""
     text = ""
     own = results.error[WORST]
-    for reading, error in results.error.items():
+    for assumption, error in results.error.items():
         parts = ("rotation", "translation")
         if any(error[p]["upper"] > 1.01 * own[p]["upper"] for p in parts):
             bounds = {part: error[part]["upper"] for part in parts}
-            text += f"; {reading}: {_bound_text(bounds)} at the study's pose"
+            text += f"; {assumption}: {_bound_text(bounds)} at the study's pose"
     return text
 
 

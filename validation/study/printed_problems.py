@@ -5,6 +5,7 @@ from typing import Any
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
+from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # relative, of energies and margins
@@ -44,19 +45,19 @@ def compare_printed(
         "margin_free": _margin_check(zone["margin_free"], free),
     }
     outcomes = {check.verdict for check in checks.values()}
-    bad, some = bool(outcomes & {"fails", "undecided"}), "ok" in outcomes
+    bad, some = bool(outcomes & {FAILS, UNDECIDED}), "ok" in outcomes
     return {
         "energy": energy,
         "platform_screw": screw,
         "margin": margin,
         "margin_free": free,
         "relative_difference": {
-            name: check.value if check.verdict != "no signal" else math.nan
+            name: check.value if check.verdict != NO_SIGNAL else math.nan
             for name, check in checks.items()
         },
         "tolerance": TOLERANCE,
         "checks": {name: check.verdict for name, check in checks.items()},
-        "verdict": "failed" if bad else "passed" if some else "no signal",
+        "verdict": "failed" if bad else "passed" if some else NO_SIGNAL,
         "passed": some and not bad,
     }
 

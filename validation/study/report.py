@@ -74,7 +74,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
         "passed": results.passed,
         "verdicts": results.verdicts,
         "unchecked": results.unchecked,
-        "worst_play": worst_clearance(results),
+        "worst_clearance": worst_clearance(results),
         "solution": results.solution,
         "error": results.error,
         "reference": results.reference,

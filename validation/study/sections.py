@@ -46,7 +46,8 @@ def robot_section(results: StudyResults) -> str:
     caption = (
         "Nominal (grey) and forced robot, its clearances at least energy. Red: elastic "
         "links; blue: rigid bodies; orange: driven joints; yellow: the errors that "
-        f"clearances leave its platform (reading {WORST}), as exaggerated as the rest."
+        f"clearances leave its platform (assumption {WORST}), as exaggerated as the "
+        "rest."
     )
     if results.closing is not None:
         caption += " The closing is simulated without clearances."
@@ -152,21 +153,21 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Bounds of (27) in each reading."""
+    """Bounds of (27) in each assumption."""
     rows = [
         [
-            reading,
+            assumption,
             *(
                 bounds[key][side] if bounds[key] else float("nan")
                 for key in ("rotation", "translation")
                 for side in ("lower", "upper")
             ),
-            _CLEARANCE_OF[reading],
+            _CLEARANCE_OF[assumption],
         ]
-        for reading, bounds in results.error.items()
+        for assumption, bounds in results.error.items()
     ]
     head: list[str | Column] = [
-        "reading", Column("turn at least", "rad", 6), Column("at most", "rad", 6),
+        "assumption", Column("turn at least", "rad", 6), Column("at most", "rad", 6),
         Column("shift at least", "m", 6), Column("at most", "m", 6), "clearances",
     ]  # fmt: skip
     return paragraph(

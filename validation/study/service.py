@@ -139,7 +139,7 @@ def over_grid(
     question = Question(
         robot, components=targets.names, load=tuple(service.load),
         gravity=tuple(service.gravity), frequencies=service.frequencies,
-        stiffness="classical" if service.stiffness else "",
+        stiffness="nominal" if service.stiffness else "",
     )  # fmt: skip
     data = sweep_in_memory(Sweep(question, targets), progress)
     new = {name: data[name] for name in _KEPT if name in data}

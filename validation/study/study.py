@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly.files.solved_links import solved_link
 from assembly.kinematics.posture import Posture, place_robot
 from assembly.linear.energy import Assembly, solve_assembly
-from assembly.linear.reference.pose_error import READINGS
+from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
@@ -57,7 +57,7 @@ class StudyResults:
         robot: with the links used.
         solution: keys of ``assembly solve`` at the study's pose.
         assembly: of the solution, None if it cannot be assembled.
-        error: bounds of (27) by reading, as ``assembly error`` gives them.
+        error: bounds of (27) by assumption, as ``assembly error`` gives them.
         reference: of :func:`validation.study.printed_problems.compare_printed`.
         stiffness: by frame: K_E of the beam and of the finite elements.
         maps: data set over the grid.
@@ -166,7 +166,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     solution = solution_of(posture) | posture_status(posture)
     solved = solution["status"] == "ok"
     assembly = solve_assembly(posture) if solved else None
-    error = pose_error_of(posture, READINGS)["error"] if solved else None
+    error = pose_error_of(posture, ASSUMPTIONS)["error"] if solved else None
     progress("assembly", 1, 1)
     reference = None
     if "reference" in wanted and assembly is not None:

@@ -146,12 +146,12 @@ def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
 def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
     """A gear's teeth touch on the side to which the drive's load pushes them."""
     robot, laws = machine.robot, dict(machine.laws)
-    for name, play in given.items():
+    for name, clearance in given.items():
         frame = robot.frame(name)
         turns = frame.joint == "revolute"
         K = sprung(frame, SENSOR[0 if turns else 1])
         robot = insert_after(robot, name, "teeth", joint_stiffness=K)
-        bound = Clearance(**{"spin" if turns else "axial": play})
+        bound = Clearance(**{"spin" if turns else "axial": clearance})
         laws[f"{name}~teeth"] = ClearanceLaw(bound)
     return replace(machine, robot=robot, laws=laws)
 

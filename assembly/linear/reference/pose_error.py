@@ -1,4 +1,4 @@
-"""The set of platform screws that a reading of problem (27) leaves possible.
+"""The set of platform screws that an assumption of problem (27) leaves possible.
 
 Clearances v move within their cones, free motions q follow the closures,
 
@@ -46,7 +46,7 @@ from assembly.solvers.method import Method
 from forcefit.inputs.display import html_table, short_repr
 from stiffness.screws import skew
 
-READINGS = ("frozen", "free", "budget")
+ASSUMPTIONS = ("frozen", "free", "budget")
 # by which squares of cones may be exceeded: solutions are hardly better, and a cone
 # that stays on its bound would end the step of all others
 _EXCESS = 1e-8
@@ -218,28 +218,28 @@ class ReachableSet:
 
 
 def reachable_screws(
-    assembly: Assembly, reading: str, energy_budget: float = 0.05
+    assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """The set of platform screws that a reading of (27) leaves possible.
+    """The set of platform screws that an assumption of (27) leaves possible.
 
     Args:
         assembly: of least energy.
-        reading: ``"frozen"``, ``"free"`` or ``"budget"``.
-        energy_budget: eta of reading ``"budget"``, >= 0.
+        assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
+        energy_budget: eta of assumption ``"budget"``, >= 0.
 
     Returns:
         The set, within all bounds of passive joints' own motion too.
 
     Raises:
-        ValueError: the reading is unknown, or ``budget`` is asked under a load.
+        ValueError: the assumption is unknown, or ``budget`` is asked under a load.
     """
-    if reading not in READINGS:
-        raise ValueError(f"reading is {reading!r}, expected one of {READINGS}")
-    if reading == "budget" and (assembly.frame_loads or energy_budget < 0):
-        raise ValueError("the budget reading needs no load and a budget >= 0")
-    compliant: Compliant = "free" if reading == "free" else "elastic"
+    if assumption not in ASSUMPTIONS:
+        raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
+    if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
+        raise ValueError("the budget assumption needs no load and a budget >= 0")
+    compliant: Compliant = "free" if assumption == "free" else "elastic"
     loaded = assembly
-    if reading == "free":
+    if assumption == "free":
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
         loaded = least_energy(
@@ -248,11 +248,11 @@ def reachable_screws(
 
     def moving(joints: VirtualJoints) -> MovingCones:
         held = np.zeros(joints.cones.shape[1], dtype=bool)
-        if reading != "budget":
+        if assumption != "budget":
             held = loaded_cones(loaded, joints)
         columns, group = joints.cones[:, ~held], joints.group[~held]
         start = clearances_in(assembly, joints)[~held]
-        if reading == "budget":
+        if assumption == "budget":
             radius = np.sqrt(2 * (1 + energy_budget) * assembly.stored)
             columns = np.hstack([columns, joints.elastic * radius])
             spring = assembly.elastic / max(radius, 1e-300)
@@ -318,7 +318,7 @@ class _Motion:
         """Frames whose own motion may pass a bound that is left out here."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # a joint without a spring here has its bound in every reading
+        # a joint without a spring here has its bound by every assumption
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]

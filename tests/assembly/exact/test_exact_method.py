@@ -12,7 +12,7 @@ from assembly.linear import lanes
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Clearance
 from assembly.platform_stiffness.arc_length import follow_load
-from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.robots import BUILT_IN
@@ -39,14 +39,14 @@ QUESTIONS = {
     "stiffness": lambda at, method: platform_stiffness(
         at, "exact", LOAD, method=method
     ),
-    "deflection": lambda at, method: load_deflection(at, 4, LOADS, method=method),
-    "deflection, finite": lambda at, method: load_deflection(
+    "deflection": lambda at, method: deflection_curve(at, 4, LOADS, method=method),
+    "deflection, finite": lambda at, method: deflection_curve(
         at, 4, LOADS, exact=True, method=method
     ),
     "path": lambda at, method: follow_load(at, 4, 0.0, 60.0, count=4, method=method),
     "modes": lambda at, method: natural_modes(at, method=method),
     "modes, finite": lambda at, method: natural_modes(
-        at, load=LOAD, exact=True, method=method
+        at, load=LOAD, state="exact", method=method
     ),
 }
 
@@ -123,7 +123,7 @@ def test_both_methods_end_at_equilibria(name):
 @pytest.mark.parametrize("exact", [False, True])
 def test_both_methods_follow_a_load_through_a_contact(exact):
     one, other = (
-        load_deflection(beams(), 4, LOADS, exact=exact, method=method)
+        deflection_curve(beams(), 4, LOADS, exact=exact, method=method)
         for method in METHODS
     )
     assert one.pressed == other.pressed
@@ -133,7 +133,7 @@ def test_both_methods_follow_a_load_through_a_contact(exact):
 
 def test_both_methods_find_the_same_modes_and_stiffness():
     one, other = (
-        natural_modes(beams(), load=LOAD, exact=True, method=method)
+        natural_modes(beams(), load=LOAD, state="exact", method=method)
         for method in METHODS
     )
     np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-6)

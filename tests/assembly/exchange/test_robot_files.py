@@ -18,12 +18,11 @@ def test_a_robot_is_written_and_read_by_the_ending(ending, tmp_path):
     robot, path = BUILT_IN["arm6"](), tmp_path / f"arm.{ending}"
     ff.write_robot(robot, path)
     assert path.read_text().startswith("<!-- Written by forcefit. -->")
-    again = ff.read_robot(path)
+    again = ff.load_robot(path)
     drives = {frame.name: 0.3 for frame in robot.frames if frame.actuated}
     assert {frame.name for frame in again.frames if frame.actuated} == set(drives)
     here, there = (ff.place_robot(one, joints=drives) for one in (robot, again))
     assert there.platform == pytest.approx(here.platform, abs=1e-12)
-    assert ff.load_robot(path).platform == again.platform
 
 
 def test_no_file_of_another_kind_is_written(tmp_path):

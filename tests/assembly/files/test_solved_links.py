@@ -24,7 +24,7 @@ from assembly.model.error_distributions import tolerance_sources
 from assembly.model.link_stress import peak_stresses
 from assembly.model.links import link_compliances
 from assembly.model.robot import MatrixLink, MeshLink
-from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from assembly.platform_stiffness.vibration import natural_modes
 from assembly.statistics.experiment import Experiment
@@ -106,7 +106,7 @@ SOLVERS = {
     "pose error": lambda at: bound_pose_error(solve_assembly(at)).translation_error,
     "exact": lambda at: solve_exact(at, LOAD).platform_screw,
     "platform stiffness": lambda at: platform_stiffness(at).compliance,
-    "deflection": lambda at: load_deflection(at, 5, [10.0, 20.0]).screws,
+    "deflection": lambda at: deflection_curve(at, 5, [10.0, 20.0]).screws,
     "prediction": lambda at: predict(as_declared(at, [LOAD])).deviation,
     "sweep": swept,
     "draws": drawn,

@@ -139,5 +139,5 @@ def test_points_under_a_load_that_a_reading_cannot_carry_say_so():
 def test_bad_arguments_are_named(grid):
     many = solve_assembly(grid[1][:2])
     for assembly in (many, many[0]):
-        with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
+        with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
             bound_pose_error(assembly, "loose")

@@ -53,7 +53,7 @@ def questions(posture):
         lambda method: zone_margin([posture], method=method),
         lambda method: bound_pose_error(assembly, method=method),
         lambda method: bound_pose_error(many, method=method),
-        lambda method: platform_stiffness(posture, "in contact", method=method),
+        lambda method: platform_stiffness(posture, "contact", method=method),
         lambda method: platform_stiffness([posture], method=method),
     )
 
@@ -88,7 +88,7 @@ def test_the_reference_calls_nothing_compiled(monkeypatch):
     found = solve_assembly(posture, method="reference")
     assert found.energy > 0.0
     assert zone_margin(posture, method="reference").margin > 0.0
-    for reading in reach.READINGS:
+    for reading in reach.ASSUMPTIONS:
         bounds = bound_pose_error(found, reading, method="reference")
         assert 0.0 < np.diff(bounds.translation_error) <= 1e-6
     many = solve_assembly([posture], method="reference")
@@ -130,7 +130,7 @@ def test_points_beside_one_that_is_not_proved_stay_compiled(monkeypatch):
 def test_brackets_of_both_methods_share_a_point_on_every_built_in_robot(name):
     """Of the same solution of (22); the searches have nothing in common."""
     answer = solve_assembly(home_posture(BUILT_IN[name]()))
-    for reading in reach.READINGS:
+    for reading in reach.ASSUMPTIONS:
         one, other = (
             bound_pose_error(answer, reading, method=method) for method in METHODS
         )

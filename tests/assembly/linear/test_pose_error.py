@@ -39,10 +39,10 @@ def serial(*clearances, arm=0.3):
     return Robot("serial", "tip", tuple(frames))
 
 
-def bounds(robot, reading="frozen", **options):
+def bounds(robot, assumption="frozen", **options):
     answer = solve_assembly(home_posture(robot))
     tight = {"tolerance_rotation": 1e-9, "tolerance_translation": 1e-9}
-    return bound_pose_error(answer, reading, **tight | options)
+    return bound_pose_error(answer, assumption, **tight | options)
 
 
 def assert_holds(bracket, value, tolerance):
@@ -236,9 +236,9 @@ def test_reading_must_be_known_and_budget_needs_no_load():
     answer = solve_assembly(
         home_posture(coaxial_beams(np.zeros(6))), [1, 0, 0, 0, 0, 0]
     )
-    with pytest.raises(ValueError, match="reading is 'loose', expected one of"):
+    with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
         bound_pose_error(answer, "loose")
-    with pytest.raises(ValueError, match="budget reading needs no load"):
+    with pytest.raises(ValueError, match="budget assumption needs no load"):
         bound_pose_error(answer, "budget")
 
 

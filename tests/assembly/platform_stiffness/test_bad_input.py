@@ -18,7 +18,7 @@ def test_a_load_that_nothing_resists_is_refused_with_the_motion_it_drives():
                    link=MatrixLink(np.eye(6)))  # fmt: skip
     posture = home_posture(Robot("slide", "tip", (spring, Frame("tip", "spring"))))
     named = r"it moves spring tz; the platform along \[0 0 0 1 0 0\] \[rad, m\]"
-    for state in ("in contact", "exact"):
+    for state in ("contact", "exact"):
         with pytest.raises(FreeMotion, match=named):
             platform_stiffness(posture, state, load=[0, 0, 0, 5.0, 1.0, 0])
 

@@ -8,7 +8,7 @@ import pytest
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.platform_stiffness import deflection
-from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.robots import load_robot
 
 FY, FZ = 4, 5
@@ -39,10 +39,10 @@ def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(exact):
         Frame("tip", "slide", rotation=[0, -np.pi / 2, 0]),
     )  # fmt: skip
     posture = home_posture(Robot("slide", "tip", frames))
-    curve = load_deflection(posture, FZ, np.arange(0.0, -101.0, -25.0), exact=exact)
+    curve = deflection_curve(posture, FZ, np.arange(0.0, -101.0, -25.0), exact=exact)
     assert np.isinf(curve.stiffness).all()
     assert curve.events == ()
-    along = load_deflection(posture, FZ - 2, np.arange(0.0, 101.0, 50.0), exact=exact)
+    along = deflection_curve(posture, FZ - 2, np.arange(0.0, 101.0, 50.0), exact=exact)
     np.testing.assert_allclose(along.stiffness, 1e5, rtol=1e-9)
 
 
@@ -50,7 +50,7 @@ def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(exact):
 def test_free_play_then_contact_then_a_spring(exact):
     """Deflection = sign(F) c + F / k; at no load anything within the play."""
     c, k = 1e-4, 1e5
-    curve = load_deflection(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), exact=exact)
+    curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), exact=exact)
     loaded = curve.loads != 0.0
     expected = np.sign(curve.loads) * c + curve.loads / k
     np.testing.assert_allclose(
@@ -79,7 +79,7 @@ def test_an_error_is_pressed_back_at_the_load_that_it_took():
         Frame("other", "two"),
     )
     posture = home_posture(Robot("pair", "tip", frames, (("tip", "other"),)))
-    curve = load_deflection(posture, FZ, np.arange(0.0, 60.0, 7.0))
+    curve = deflection_curve(posture, FZ, np.arange(0.0, 60.0, 7.0))
     assert curve.deflection[0] == pytest.approx((e - c) / 2, rel=1e-5)
     assert curve.stiffness[0] == pytest.approx(2 * k, rel=1e-6)
     first, *_ = curve.events
@@ -97,7 +97,7 @@ def test_the_tangent_is_the_slope_of_the_curve():
     """Central differences along a loaded robot's curve, error of second order."""
     posture = home_posture(load_robot("four_bar"))
     loads = 100.0 + np.array([-0.5, 0.0, 0.5])
-    curve = load_deflection(posture, FY, loads, exact=True)
+    curve = deflection_curve(posture, FY, loads, exact=True)
     slope = (curve.deflection[2] - curve.deflection[0]) / (loads[2] - loads[0])
     assert 1 / slope == pytest.approx(curve.stiffness[1], rel=1e-6)
 
@@ -109,7 +109,7 @@ def test_euler_s_column_is_found_to_buckle():
                     theory="euler")  # fmt: skip
     euler = np.pi**2 * E * width**4 / 12 / 4
     loads = -euler * np.array([0.0, 0.5, 0.9, 1.1])
-    (event,) = load_deflection(cantilever(link), 3, loads, exact=True).events
+    (event,) = deflection_curve(cantilever(link), 3, loads, exact=True).events
     assert event.kind == "critical"
     assert -event.load == pytest.approx(euler, rel=2e-3)
     assert "tip link" in event.what
@@ -128,7 +128,7 @@ def test_a_thin_cantilever_buckles_sideways():
     plain = 4.0126 * np.sqrt(E * 2e-10 * G * 1e-9)
     bent = plain / np.sqrt((1 - 0.01) * (1 - G * 1e-9 / (E * 2e-8)))
     loads = plain * np.array([0.0, 0.5, 0.9, 1.2])
-    (event,) = load_deflection(cantilever(link), FY, loads, exact=True).events
+    (event,) = deflection_curve(cantilever(link), FY, loads, exact=True).events
     assert event.kind == "critical"
     assert event.load == pytest.approx(bent, rel=5e-3)
 
@@ -160,7 +160,7 @@ def test_a_shallow_arch_snaps_through_at_its_limit_point():
     force = 2 * k * (length / np.hypot(half, heights) - 1) * heights
     limit = force.max()
     loads = -np.array([0.0, 0.5, 0.9, 0.99, 1.05, 1.2]) * limit
-    curve = load_deflection(
+    curve = deflection_curve(
         shallow_arch(), FY, [*loads, *reversed(loads[:-1])], exact=True
     )
     jump = next(event for event in curve.events if event.kind == "jump")
@@ -190,7 +190,7 @@ def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
     robot = Robot("column", "tip", frames, (("tip", "end"),))
     euler = np.pi**2 * E * height * width**3 / 12
     loads = [0.0, -0.9 * euler, -1.2 * euler]
-    curve = load_deflection(home_posture(robot), 3, loads, exact=True)
+    curve = deflection_curve(home_posture(robot), 3, loads, exact=True)
     (event,) = (e for e in curve.events if e.kind == "critical")
     assert event.load == pytest.approx(-euler, rel=0.01)
     assert (

@@ -150,7 +150,7 @@ def test_one_of_many_with_a_free_motion_names_it():
         many[2]
 
 
-@pytest.mark.parametrize("state", ["in contact", "exact"])
+@pytest.mark.parametrize("state", ["contact", "exact"])
 def test_a_tangent_of_many_postures_is_that_of_each(state):
     """To the last bit, whatever is asked of all."""
     play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)

@@ -63,7 +63,7 @@ def test_a_standing_pendulum_slows_down_under_its_weight():
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
     arm = Frame("arm", "hinge", [length, 0, 0], mass=m)
     posture = home_posture(Robot("arm", "arm", (hinge, arm)))
-    modes = natural_modes(posture, gravity=[-g, 0, 0], exact=True)
+    modes = natural_modes(posture, gravity=[-g, 0, 0], state="exact")
     expected = np.sqrt((k - m * g * length) / (m * length**2)) / (2 * np.pi)
     np.testing.assert_allclose(modes.frequencies, [expected], rtol=1e-9)
 

@@ -85,7 +85,7 @@ def test_the_slack_is_the_farthest_height_beyond_all_points():
 @pytest.mark.slow
 def test_the_picture_shows_the_body_and_says_its_size():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
-    plotter = plot_assembly(answer, errors="translation", reading="frozen")
+    plotter = plot_assembly(answer, errors="translation", assumption="frozen")
     said = plotter.actors["body"].GetText(0)
     pixels = plotter.screenshot(return_img=True).astype(int)
     plotter.close()

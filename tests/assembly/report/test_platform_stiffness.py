@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.report.platform_stiffness import (
     DIRECTIONS,
@@ -27,7 +28,7 @@ def total(shares):
 def test_shares_add_up_to_one_in_every_direction(exact):
     load = [0, 0, 0, 10.0, -20.0, -50.0]
     posture = home_posture(load_robot("hexapod"))
-    results = stiffness_of(posture, load, exact=exact)
+    results = stiffness_of(posture, load, state="exact" if exact else "nominal")
     assert results["status"] == "ok"
     for name in DIRECTIONS:
         assert total(results["shares"][name]) == pytest.approx(1.0, rel=1e-9)
@@ -50,7 +51,7 @@ def test_a_free_motion_is_named_and_leaves_the_other_entries():
 def test_a_load_that_nothing_carries_is_said_to_be_one():
     slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
     posture = home_posture(Robot("slider", "tip", (slide, Frame("tip", "slide"))))
-    results = stiffness_of(posture, [0, 0, 0, 0, 0, 1.0], exact=True)
+    results = stiffness_of(posture, [0, 0, 0, 0, 0, 1.0], state="exact")
     assert results["status"] == "no equilibrium"
     assert "no equilibrium" in stiffness_text(results)
 
@@ -60,3 +61,19 @@ def test_the_chart_has_a_bar_for_each_part_and_direction():
     (axes,) = plot_shares(results).axes
     heights = [bar.get_height() for bar in axes.patches]
     np.testing.assert_allclose(sum(heights), 600.0)
+
+
+def test_the_contact_state_is_how_the_least_energy_moves_with_the_load():
+    """Central differences of (22), the load pressing clearances of two legs."""
+    posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
+    load, step = np.array([0, 0, 0, 20.0, 50.0, -100.0]), np.eye(6)[5]
+    ahead, back = (
+        solve_assembly(posture, load + sign * step).platform_screw for sign in (1, -1)
+    )
+    results = stiffness_of(posture, load, state="contact")
+    assert results["state"] == "contact"
+    moved = (ahead[5] - back[5]) / 2
+    assert results["compliance"][5, 5] == pytest.approx(moved, rel=1e-4)
+    # other than the nominal one, which clearances have no part in
+    nominal = stiffness_of(posture, load)
+    assert (nominal["compliance"][5, 5] / moved - 1) ** 2 > 1e-6

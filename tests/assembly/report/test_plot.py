@@ -72,11 +72,13 @@ def test_the_picture_shows_the_axes_of_driven_and_passive_joints():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-o", "x.xyz"], 'x.xyz: found the ending ".xyz", expected a picture: .png'),
-        (["-o", "x.png", "--load", "fx=1", "--error-body", "translation", "--reading",
-          "budget"], "--reading: found budget with --load"),
-        (["-o", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
-        (["-o", "x.png", "--exaggeration", "1e300"], "--exaggeration: found 1e+300"),
+        (["--figure", "x.xyz"],
+         'x.xyz: found the ending ".xyz", expected a picture: .png'),
+        (["--figure", "x.png", "--load", "fx=1", "--error-body", "translation",
+          "--assumption", "budget"], "--assumption: found budget with --load"),
+        (["--figure", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
+        (["--figure", "x.png", "--exaggeration", "1e300"],
+         "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
 def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
@@ -108,7 +110,7 @@ def test_a_loaded_robot_shows_the_errors_that_a_load_leaves(run, tmp_path, monke
     monkeypatch.setattr(assembly.report.plot, "reachable_screws", noted)
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
-             "translation", "-o", tmp_path / "x.jpg"]  # fmt: skip
+             "translation", "--figure", tmp_path / "x.jpg"]  # fmt: skip
     for load in (["--load", "fx=10"], []):
         assert run("assembly", "show", *words, *load) == (0, "", "")
     assert readings == ["frozen", "budget"]
@@ -122,7 +124,7 @@ def test_a_robot_that_does_not_go_together_is_not_drawn_and_says_so(run, tmp_pat
         'name = "b"\nparent = "base"\ngeometric_error = [0, 0, 0, 1e-3, 0, 0]\n'
         '[[closure]]\nframes = ["a", "b"]\n'
     )
-    status, out, err = run("assembly", "show", path, "-o", tmp_path / "x.png")
+    status, out, err = run("assembly", "show", path, "--figure", tmp_path / "x.png")
     assert (status, err) == (1, "")
     assert out.startswith("cannot assemble: ")
     assert [p.name for p in tmp_path.iterdir()] == ["stuck.toml"]

@@ -61,7 +61,7 @@ def test_every_variable_has_a_unit_and_a_meaning(answer, batches):
 
 
 def test_units_and_dimensions_are_those_of_sweeps(answer, batches):
-    asked = variables(Question(answer.posture.robot, reading="frozen"))
+    asked = variables(Question(answer.posture.robot, assumption="frozen"))
     seen = set()
     for one in batches:
         for name, variable in one.to_xarray().data_vars.items():

@@ -94,11 +94,11 @@ def test_draws_that_are_undecided_are_told_with_the_looks():
 def test_the_play_is_told_where_a_pose_error_is_limited():
     for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
         plain = allocation_of(allocation(limits=limits))
-        assert plain["play"] == play
-        said = f"pose errors: play worst: {CLEARANCE_MODELS['worst']}"
+        assert plain["clearance"] == play
+        said = f"pose errors: clearance worst: {CLEARANCE_MODELS['worst']}"
         assert (said in allocation_text(plain).splitlines()) == (play is not None)
         attributes = allocation(limits=limits).to_xarray().attrs
-        assert attributes["play"] == (play or "")
+        assert attributes["clearance"] == (play or "")
 
 
 @pytest.mark.parametrize(

@@ -278,7 +278,7 @@ def test_the_least_clearances_are_those_of_the_solution(drawn):
 def test_an_unknown_way_is_refused(drawn, play):
     """The worst is no one place, but many."""
     one, found = drawn
-    with pytest.raises(ValueError, match=f"play is '{play}'") as error:
+    with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
     assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
 

@@ -113,9 +113,9 @@ def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
         size = np.sqrt((screws[:, part] ** 2).sum(axis=1))
         np.testing.assert_allclose(rows[name], size, rtol=1e-12)
         assert size.min() > 0.0
-    assert ("play_mixed" in rows.dtype.names) == (model == "uniform")
+    assert ("clearance_mixed" in rows.dtype.names) == (model == "uniform")
     if model == "uniform":
-        assert rows["play_mixed"].all()
+        assert rows["clearance_mixed"].all()
     assert "translation_lower" not in rows.dtype.names
 
 

@@ -221,7 +221,7 @@ def test_random_play_is_not_taken_for_importance():
         found = said["importance"]["platform"]["tip.TX"]
         assert found["translation_gain"] == pytest.approx(1.0, rel=0.1)
         expected = "worst" if play == "worst" else "least"
-        assert said["importance"]["play"] == expected
+        assert said["importance"]["clearance"] == expected
 
 
 @pytest.mark.slow

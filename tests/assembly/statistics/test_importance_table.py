@@ -60,7 +60,7 @@ def test_a_platform_that_follows_each_error_has_gains_of_one():
         assert one[f"{moved}_gain"] == pytest.approx(1.0, rel=1e-12)
         assert one[f"{still}_part"] == pytest.approx(0.0, abs=1e-3 * size)
         assert one[f"{still}_gain"] == pytest.approx(0.0, abs=1e-12)
-    assert (report["base_draws"], report["play"]) == (400, "least")
+    assert (report["base_draws"], report["clearance"]) == (400, "least")
     quantities = report["quantities"]
     assert set(quantities) == {"energy", "rotation", "translation", "force"}
     # an open chain is never pressed
@@ -181,7 +181,7 @@ def told(units, left_out=0.0, rank=(1, 1)):
         "rank": dict.fromkeys(platform, rank),
     }  # fmt: skip
     lines = importance_text({
-        "base_draws": 64, "play": "least", "platform": platform,
+        "base_draws": 64, "clearance": "least", "platform": platform,
         "quantities": {
             "translation": one, "energy": one | {"largest_share_left_out": left_out},
             "stress": one | {"reason": "it does not vary"},
@@ -237,7 +237,7 @@ def test_the_largest_error_of_all_legs_is_named_as_one():
     }  # fmt: skip
     one = {"total_index": index, "largest_share_left_out": 0.0, "rank": ranks}
     text = importance_text({
-        "base_draws": 64, "play": "least", "platform": platform,
+        "base_draws": 64, "clearance": "least", "platform": platform,
         "quantities": {"translation": one},
     })  # fmt: skip
     assert text.splitlines()[-1] == "largest: hinge.RX of all legs"

@@ -228,7 +228,9 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
     assert said["draws"] == 200
     assert 0 < said["within_limits"]["probability"] < 1
     assert len(said["safety"]) == 4
-    assert said["play"] == said["quantities"]["translation"]["play"] == "worst"
+    assert (
+        said["clearance"] == said["quantities"]["translation"]["clearance"] == "worst"
+    )
     assert "link_a.TX" in said["importance"]["platform"]
     status, _, _ = run(
         "assembly", "tolerances", "irsbot2", "--grid", "tx=-0.1:0.1:0.2,tz=-0.5",
@@ -240,9 +242,11 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
     with xarray.open_dataset(tmp_path / "d.nc", engine="h5netcdf") as data:
         figure = histogram_figure(data)
         assert len(figure.axes) == 8
-        assert "pose errors: play worst: clearances anywhere" in figure.get_suptitle()
+        assert (
+            "pose errors: clearance worst: clearances anywhere" in figure.get_suptitle()
+        )
         assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
-        assert sum(panel.get_title() == "play worst" for panel in figure.axes) == 2
+        assert sum(panel.get_title() == "clearance worst" for panel in figure.axes) == 2
         assert len(tornado_figure(data).axes) == 6
         with pytest.raises(ValueError, match="need a data set of draws"):
             histogram_figure(data.drop_vars("energy"))
@@ -256,10 +260,12 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
     ("arguments", "message"),
     [
         (["--errors", "none.toml"], "none.toml: cannot be read"),
-        (["--errors", "errors.toml", "--play", "mots"], "--play"),
+        (["--errors", "errors.toml", "--clearance", "mots"], "--clearance"),
         (["--errors", "errors.toml", "--contact-length", "0.3"],
-         "--contact-length: found with --play worst, expected --play contact"),
-        (["--errors", "errors.toml", "--play", "contact", "--contact-length", "0"],
+         "--contact-length: found with --clearance worst, expected --clearance "
+         "contact"),
+        (["--errors", "errors.toml", "--clearance", "contact",
+          "--contact-length", "0"],
          "--contact-length: found 0.0, expected > 0 m"),
         (["--errors", "errors.toml", "--seed", "9" * 40], "--seed"),
         (["--errors", "errors.toml", "--limit", "enrgy=3"], 'quantity "enrgy"'),

@@ -146,7 +146,7 @@ def test_runs_that_give_other_numbers_share_no_journal(arm, change):
     before, after = provenance(arm), provenance(replace(arm, **change))
     assert before == provenance(replace(arm))
     (name,) = change
-    named = "play" if name == "clearance_model" else name
+    named = "clearance" if name == "clearance_model" else name
     assert {
         k for k in before.keys() | after.keys() if before.get(k) != after.get(k)
     } == {named}

@@ -112,7 +112,7 @@ def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
     page, written = tmp_path / "page.html", tmp_path / "s.json"
     status, _, err = run(
         "assembly", "statistics", "delta", "--errors", tmp_path / "errors.toml",
-        "--draws", 40, "--importance", 256, "--by", "source", "--play", "least",
+        "--draws", 40, "--importance", 256, "--by", "source", "--clearance", "least",
         "--report", page, "--json", written,
     )  # fmt: skip
     assert status == 0, err

@@ -43,7 +43,7 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
     status, _, err = run(
         "assembly", "statistics", "hexapod", "--errors", ERRORS, "--draws", 100,
         "--limit", "translation=2.5e-4", "--importance", 16, "--report", page,
-        "--json", written, "--play", "least", "--no-margins",
+        "--json", written, "--clearance", "least", "--no-margins",
     )  # fmt: skip
     assert status == 0, err
     summary = json.loads(written.read_text())
@@ -55,7 +55,7 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
         limits[k] for k in ("probability", "lower", "upper")
     ]
     translation = summary["quantities"]["translation"]
-    cells = rows["platform position error (play least)"]
+    cells = rows["platform position error (clearance least)"]
     expected = [translation["mean"]["value"], translation["most_probable"]["value"]]
     expected += [translation["quantiles"][q]["value"] for q in ("0.5", "0.95", "0.99")]
     assert [c.value for c in cells] == expected

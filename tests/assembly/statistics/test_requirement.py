@@ -177,8 +177,8 @@ def test_a_limit_within_the_play_of_perfect_parts_is_refused(
         requirement.perfect_parts()
     assert str(error.value) == (
         "limit translation: even perfect parts reach 0.0001 m by clearances alone at "
-        "tx = 0.4; expected at most 9e-05 m (or --play least, if clearances stay as "
-        "solved)"
+        "tx = 0.4; expected at most 9e-05 m (or --clearance least, if clearances stay "
+        "as solved)"
     )
 
 

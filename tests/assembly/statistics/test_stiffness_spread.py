@@ -66,10 +66,9 @@ def test_a_draw_s_stiffness_is_that_of_its_robot(state):
     )
     data = run_draws(experiment, 2)
     values = sources.errors(sources.draw(0, 2, 3))
-    names = {"contact": "in contact", "exact": "exact"}
     for found, errors in zip(data["stiffness"].values, values, strict=True):
         forced = replace(posture, robot=robot.with_errors(errors))
-        tangent = platform_stiffness(forced, names[state], load)
+        tangent = platform_stiffness(forced, state, load)
         expected = [tangent.along(axis)[0] for axis in np.eye(6)]
         np.testing.assert_allclose(found, expected, rtol=1e-6)
     assert np.ptp(data["stiffness"].values, axis=0).min() > 0.0
@@ -95,8 +94,8 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     errors = tmp_path / "errors.toml"
     errors.write_text(ERRORS)
     words = ["assembly", "statistics", "irsbot2", "--errors", str(errors), "--pose",
-             "tx=0.1,tz=-0.5", "--draws", "20", "--no-margins", "--play", "least",
-             "--stiffness"]  # fmt: skip
+             "tx=0.1,tz=-0.5", "--draws", "20", "--no-margins", "--clearance", "least",
+             "--state"]  # fmt: skip
     file = tmp_path / "draws.nc"
     status, out, _ = run(*words, "contact", "-o", str(file), "--json", "-")
     axes = json.loads(out)["stiffness"]["axes"]
@@ -108,7 +107,7 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     assert quantiles["0.05"]["value"] <= half <= quantiles["0.95"]["value"]
     status, out, err = run(*words, "linear")
     assert status == 2
-    assert '--stiffness: found "linear"' in err
+    assert '--state: found "linear"' in err
 
 
 def test_what_resists_a_little_is_not_free():

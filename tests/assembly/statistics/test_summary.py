@@ -23,7 +23,7 @@ def draws(play="least", status=None, screws=None, **values):
     variables |= {
         "status": (("draw",), status), "platform_screw": (("draw", "screw"), screws),
     }  # fmt: skip
-    return xarray.Dataset(variables, attrs={"play": play})
+    return xarray.Dataset(variables, attrs={"clearance": play})
 
 
 def test_draws_without_an_answer_count_in_every_probability():
@@ -43,22 +43,22 @@ def test_draws_without_an_answer_count_in_every_probability():
     assert "rigid_compliant_free" not in said["assembles"]
     assert said["duality_gap"] == 3e-9
     assert said["confidence"] == 0.95
-    assert said["play_means"] == CLEARANCE_MODELS["least"]
+    assert said["clearance_means"] == CLEARANCE_MODELS["least"]
     none = draws(energy=[NAN] * 3, status=[1] * 3, duality_gap=[-1.0, NAN, NAN])
     assert summarise(none)["duality_gap"] == 0.0
 
 
 def test_walks_that_are_not_mixed_are_counted_among_the_draws_that_assemble():
     data = draws("uniform", status=[0, 0, 0, 1], energy=[1.0, 1, 1, NAN],
-                 play_mixed=[0, 1, 0, 0])  # fmt: skip
+                 clearance_mixed=[0, 1, 0, 0])  # fmt: skip
     said = summarise(data)
-    assert said["play_not_mixed"] == 2
+    assert said["clearance_not_mixed"] == 2
     text = summary_text(said)
     assert "warning: in 2 draws uniform clearances are not mixed when their" in text
-    mixed = summarise(data.assign(play_mixed=("draw", [1, 1, 1, 0])))
-    assert mixed["play_not_mixed"] == 0
+    mixed = summarise(data.assign(clearance_mixed=("draw", [1, 1, 1, 0])))
+    assert mixed["clearance_not_mixed"] == 0
     assert "warning" not in summary_text(mixed)
-    assert "play_not_mixed" not in summarise(draws(energy=[1.0]))
+    assert "clearance_not_mixed" not in summarise(draws(energy=[1.0]))
 
 
 def test_a_limit_is_met_up_to_itself_and_by_no_draw_without_an_answer():
@@ -75,7 +75,7 @@ def test_a_limit_is_met_up_to_itself_and_by_no_draw_without_an_answer():
     low, high = stats.binomtest(1, 5).proportion_ci(0.9)
     assert said["within_limits"]["lower"] == pytest.approx(low)
     assert said["within_limits"]["upper"] == pytest.approx(high)
-    assert "play" not in said["within_limits"] | over["energy"]
+    assert "clearance" not in said["within_limits"] | over["energy"]
     assert "within_limits" not in summarise(data)
 
 
@@ -87,11 +87,11 @@ def test_a_draw_whose_bounds_enclose_a_limit_is_undecided():
     over, within = said["exceeds"]["translation"], said["within_limits"]
     assert (over["probability"], over["undecided"]) == (2 / 5, 2)
     assert (within["probability"], within["undecided"]) == (1 / 5, 2)
-    assert within["play"] == over["play"] == "worst"
+    assert within["clearance"] == over["clearance"] == "worst"
     assert within["upper"] == pytest.approx(stats.binomtest(3, 5).proportion_ci()[1])
     lines = summary_text(said).splitlines()
     assert any(
-        line.startswith("translation [play worst] above 2 m: 0.4 (")
+        line.startswith("translation [clearance worst] above 2 m: 0.4 (")
         and line.endswith(", 2 draws undecided")
         for line in lines
     )
@@ -140,7 +140,8 @@ def test_two_draws_at_least_have_a_mean_and_a_mean_screw(known, described):
 def test_the_screws_of_the_worst_clearances_are_those_of_the_least():
     for play, named in (("worst", "least"), ("contact", "contact")):
         assert (
-            summarise(draws(play, energy=[1.0, 2]))["platform_screw"]["play"] == named
+            summarise(draws(play, energy=[1.0, 2]))["platform_screw"]["clearance"]
+            == named
         )
 
 
@@ -193,16 +194,16 @@ def test_the_summary_s_lines_name_quantities_units_and_intervals():
     """A pure number has no unit; a pose error is given with its clearance model."""
     one = {"value": 1.0, "lower": 0.5, "upper": 2.0}
     described = {
-        "unit": "m", "play": "worst", "mean": one,
+        "unit": "m", "clearance": "worst", "mean": one,
         "most_probable": one | {"value": 1.25},
         "quantiles": {"0.5": one, "0.95": one | {"value": 3.0, "upper": 4.0}},
     }  # fmt: skip
     share = {"probability": 0.25, "lower": 0.1234567, "upper": 0.5}
     lines = summary_text({
-        "draws": 40, "assembled": 30, "confidence": 0.9, "play": "worst",
-        "play_means": "anywhere", "assembles": {"forced": share},
+        "draws": 40, "assembled": 30, "confidence": 0.9, "clearance": "worst",
+        "clearance_means": "anywhere", "assembles": {"forced": share},
         "exceeds": {"margin": share | {"limit": 1.5, "unit": "1", "undecided": 0}},
-        "within_limits": share | {"undecided": 7, "play": "worst"},
+        "within_limits": share | {"undecided": 7, "clearance": "worst"},
         "quantities": {
             "translation": described, "force": {"unit": "N"},
             "margin": described | {"unit": "1", "all_draws": described},
@@ -212,13 +213,13 @@ def test_the_summary_s_lines_name_quantities_units_and_intervals():
     quantiles = "median 1 (0.5 to 2), 95 % below 3 (0.5 to 4)"
     assert lines == [
         "40 draws; in brackets 90% intervals",
-        "pose errors: play worst: anywhere",
+        "pose errors: clearance worst: anywhere",
         f"goes together, by force if need be: {shown}",
         f"margin above 1.5: {shown}",
-        f"yield [play worst], all limits met: {shown}, 7 draws undecided",
+        f"yield [clearance worst], all limits met: {shown}, 7 draws undecided",
         "of the 30 of 40 draws that assemble:",
-        f"  translation [play worst]: most probable 1.25 m, {quantiles}",
-        f"  margin [play worst]: most probable 1.25, {quantiles}",
+        f"  translation [clearance worst]: most probable 1.25 m, {quantiles}",
+        f"  margin [clearance worst]: most probable 1.25, {quantiles}",
         f"margin of all 40 draws: {quantiles}",
     ]
 

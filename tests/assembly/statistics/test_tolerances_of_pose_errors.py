@@ -80,4 +80,4 @@ def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
         )
         assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
         said = allocation_text(allocation_of(found))
-        assert f"pose errors: play {play}" in said
+        assert f"pose errors: clearance {play}" in said

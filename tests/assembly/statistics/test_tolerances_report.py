@@ -125,7 +125,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert asked["errors"].text == "uniform within plus or minus their tolerance"
     assert asked["price"].text == "sum of cost / tolerance [rad or m]"
     assert asked["postures"].text == "1: tx=0.4"
-    assert asked["clearances"].text.startswith("play worst: clearances anywhere")
+    assert asked["clearances"].text.startswith("clearance worst: clearances anywhere")
     assert asked["yield"].text == "1: every robot within tolerance"
 
 

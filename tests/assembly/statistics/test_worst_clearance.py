@@ -160,9 +160,12 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
         )
         said = summarise(data, limits)
         share[play] = said["within_limits"]["probability"]
-        assert said["within_limits"]["play"] == said["exceeds"]["translation"]["play"]
-        assert f"yield [play {play}], all limits met" in summary_text(said)
-        assert said["play_means"] in data["translation"].attrs["long_name"]
+        assert (
+            said["within_limits"]["clearance"]
+            == said["exceeds"]["translation"]["clearance"]
+        )
+        assert f"yield [clearance {play}], all limits met" in summary_text(said)
+        assert said["clearance_means"] in data["translation"].attrs["long_name"]
     assert share["least"] > 0.99
     assert share["worst"] == 0.0
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
@@ -239,5 +242,5 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
 
 
 def test_an_unknown_play_is_refused():
-    with pytest.raises(ValueError, match="play is 'most', expected one of"):
+    with pytest.raises(ValueError, match="clearance is 'most', expected one of"):
         papers(0.1, clearance_model="most")

@@ -43,10 +43,10 @@ def test_an_arm_on_a_spring_sags_by_hand(tmp_path):
         str(path),
         SweepOptions(
             grid=grid,
-            reading="none",
+            assumption="none",
             load=[0, 0, 0, 0, 10, 0],
             gravity=[0, -G, 0],
-            wrench=["drive"],
+            wrench_of=["drive"],
         ),
     )
     data = sweep_in_memory(asked)
@@ -144,7 +144,7 @@ def test_a_load_that_nothing_resists_is_a_status():
 
 
 def test_bounds_of_a_loaded_robot_and_missing_covariates_are_refused(tmp_path):
-    with pytest.raises(BadInput, match="--reading none"):
+    with pytest.raises(BadInput, match="--assumption none"):
         ask_sweep("irsbot2", SweepOptions(grid=GRID, load=[0, 0, 0, 0, 0, 1.0]))
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
     path = str(arm_with(tmp_path, warm))

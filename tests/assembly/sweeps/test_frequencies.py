@@ -17,7 +17,7 @@ def test_each_point_has_the_frequencies_of_its_posture():
     options = SweepOptions(
         grid="tx=0:0.1:0.1,tz=-0.9",
         vary=[f"leg1.elbow.link.{rods}"],
-        reading="none",
+        assumption="none",
         frequencies=3,
     )
     data = sweep_in_memory(ask_sweep("delta", options))
@@ -42,5 +42,5 @@ def test_what_has_no_frequencies_is_refused(robot, count, message):
     with pytest.raises(BadInput, match=message):
         ask_sweep(
             robot,
-            SweepOptions(grid="tx=0,tz=-0.5", reading="none", frequencies=count),
+            SweepOptions(grid="tx=0,tz=-0.5", assumption="none", frequencies=count),
         )

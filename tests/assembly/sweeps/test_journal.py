@@ -252,7 +252,7 @@ def test_the_file_is_what_memory_holds(whole, tmp_path):
     [
         (small_sweep("tx=-0.04:0.04:0.02,ty=0.10:0.14:0.04"),
          "found points 'tx 5 x ty 3', values_sha256 '"),
-        (small_sweep(reading="free"), "found reading 'none', asked 'margin"),
+        (small_sweep(assumption="free"), "found assumption 'none', asked 'margin"),
         (small_sweep(near=0.5), "found near '0.02'; expected near '0.5'"),
     ],
 )  # fmt: skip
@@ -291,12 +291,16 @@ def test_block_size_changes_no_number():
     """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
     from dataclasses import replace
 
-    options = {"reading": "frozen", "wrenches": ("left.elbow",), "clearance_only": True}
+    options = {
+        "assumption": "frozen",
+        "wrenches": ("left.elbow",),
+        "clearance_only": True,
+    }
     small = small_sweep(**options)
     one = sweep_in_memory(small)
     other = sweep_in_memory(replace(small, block_size=15))
     assert one.identical(other)
-    assert np.isfinite(one.rotation_error_play).any()
+    assert np.isfinite(one.rotation_error_clearance).any()
 
 
 @pytest.mark.slow

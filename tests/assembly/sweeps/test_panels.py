@@ -10,10 +10,10 @@ from assembly.sweeps.dataset import save_dataset
 
 @pytest.fixture(scope="module")
 def data():
-    return ff.sweep_in_memory(ff.ask_sweep("five_bar", ff.SweepOptions(
-        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", stiffness=True, reading="none",
-        wrench=("left.elbow",), load=(0, 0, 0, 10, 0, 0),
-    )))  # fmt: skip
+    return ff.sweep(
+        "five_bar", grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", state="nominal",
+        assumption="none", wrench_of=("left.elbow",), load=(0, 0, 0, 10, 0, 0),
+    )  # fmt: skip
 
 
 def shown(panel):
@@ -76,8 +76,10 @@ def test_unknown_and_too_many_quantities_are_one_line(run, data, tmp_path):
         ("stiffness.FQ", 'no "stiffness.FQ"; did you mean "stiffness.F'),
         ("compliance", "found 36 components, expected at most 12"),
     ):
-        status, _, err = run("assembly", "plot", tmp_path / "s.nc", "--quantity", name,
-                             "-o", tmp_path / "p.png")  # fmt: skip
+        status, _, err = run(
+            "assembly", "plot", tmp_path / "s.nc", "--quantities", name,
+            "--figure", tmp_path / "p.png",
+        )  # fmt: skip
         assert (status, err.count("\n")) == (2, 1)
         assert said in err
     assert not (tmp_path / "p.png").exists()
@@ -106,5 +108,5 @@ def arm_draws(rng):
             "platform_screw": (("draw", "screw"), screw, {"units": "rad, m"}),
         },
         {"screw": ["RX", "RY", "RZ", "TX", "TY", "TZ"]},
-        {"play": "least", "sources_and_posture_sha256": "0"},
+        {"clearance": "least", "sources_and_posture_sha256": "0"},
     )  # fmt: skip

@@ -14,10 +14,10 @@ from stiffness.screws import WRENCH
 
 @pytest.fixture(scope="module")
 def data():
-    return ff.sweep_in_memory(ff.ask_sweep("five_bar", ff.SweepOptions(
-        grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", stiffness=True,
-        vary=["elbow.link.young=7e10,2.1e11"], wrench=("left.elbow", "right.elbow"),
-    )))  # fmt: skip
+    return ff.sweep(
+        "five_bar", grid="tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01", state="nominal",
+        vary=["elbow.link.young=7e10,2.1e11"], wrench_of=("left.elbow", "right.elbow"),
+    )  # fmt: skip
 
 
 def read(path):
@@ -49,9 +49,7 @@ def test_components_of_listed_postures_are_columns(tmp_path):
     """They are not axes: of three postures there are three rows, not nine."""
     poses = tmp_path / "poses.csv"
     poses.write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0.01,0.14\nc,0.02,0.13\n")
-    data = ff.sweep_in_memory(
-        ff.ask_sweep("five_bar", ff.SweepOptions(poses=poses, draws=None))
-    )
+    data = ff.sweep("five_bar", poses=poses, draws=None)
     table = ff.point_table(data)
     assert list(table.index) == ["a", "b", "c"]
     assert list(table["ty", ""]) == [0.13, 0.14, 0.13]
@@ -63,8 +61,7 @@ def test_table_of_a_robot_without_joints_has_its_rows(tmp_path):
         'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
         "translation = [1.0, 0, 0]\n"
     )
-    options = ff.SweepOptions(grid="tx=1", reading="none")
-    data = ff.sweep_in_memory(ff.ask_sweep(tmp_path / "bar.toml", options))
+    data = ff.sweep(tmp_path / "bar.toml", grid="tx=1", assumption="none")
     assert list(ff.point_table(data)["energy", ""]) == [0.0]
 
 
@@ -121,7 +118,7 @@ def test_draws_and_importance_have_tables_of_their_own(run, tmp_path, monkeypatc
     )
     status, *_ = run(
         "assembly", "statistics", "five_bar", "--errors", "errors.toml", "--pose",
-        "tx=0,ty=0.13", "--draws", 20, "--importance", 16, "--play", "least",
+        "tx=0,ty=0.13", "--draws", 20, "--importance", 16, "--clearance", "least",
         "-o", "d.nc", "--csv", "d.csv",
     )  # fmt: skip
     assert status == 0

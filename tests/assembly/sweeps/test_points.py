@@ -18,6 +18,7 @@ from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.request import SweepOptions, ask_sweep, summary_of
+from assembly.sweeps.selection import BY_CLEARANCE
 from assembly.sweeps.sweep import sweep_in_memory, sweep_poses
 from assembly.sweeps.targets import grid_targets, parse_grid
 from forcefit.inputs.table import BadInput
@@ -43,7 +44,7 @@ def data(robot):
     """Everything that can be asked for, at six postures."""
     axes = parse_grid(GRID)
     question = Question(
-        robot, None, (), tuple(axes), reading="free", clearance_only=True,
+        robot, None, (), tuple(axes), assumption="free", clearance_only=True,
         wrenches=("leg1.link_a", "leg2.elbow_b_first"), linearisation=True,
     )  # fmt: skip
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
@@ -73,19 +74,20 @@ def test_bounds_and_finite_motions_are_those_of_one_posture(robot, data):
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_play_alone_is_symmetric_where_the_robot_is(data):
+def test_clearance_alone_is_symmetric_where_the_robot_is(data):
     """Without errors x and -x are one: within the bounds' own gap of 1e-6."""
-    for name in ("rotation_error_play", "translation_error_play"):
+    for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
         assert values == pytest.approx(values[::-1], abs=2e-6)
         assert values == pytest.approx(data[name].sel(bound="lower").values, abs=2e-6)
-    assert (data.rotation_error_play < data.rotation_error).all()
+    assert (data.rotation_error_clearance < data.rotation_error).all()
 
 
 def test_a_design_that_varies_is_that_robot_bit_for_bit():
     path = "link_a.link.beam.radius"
     asked = ask_sweep(
-        "irsbot2", SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], reading="none")
+        "irsbot2",
+        SweepOptions(grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none"),
     )
     data = sweep_in_memory(asked)
     assert data.energy.dims == (path, "tx", "tz")
@@ -111,7 +113,7 @@ def test_draws_are_robots_with_those_errors_bit_for_bit(tmp_path):
     for i in range(3):
         one = sweep_poses(
             robot.with_errors(errors[i]), parse_grid("tx=0:0.02:0.02,ty=0.14"),
-            reading="frozen",
+            assumption="frozen",
         )  # fmt: skip
         there = data.isel(draw=i)
         for name in ("margin", "margin_free", "energy", "rotation_error"):
@@ -129,7 +131,7 @@ def test_a_list_and_a_grid_of_one_robot_agree(robot, tmp_path):
     (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
     asked = ask_sweep(
         str(tmp_path / "robot.toml"),
-        SweepOptions(poses=tmp_path / "path.csv", reading="none"),
+        SweepOptions(poses=tmp_path / "path.csv", assumption="none"),
     )
     found = sweep_in_memory(asked)
     assert found.energy.dims == ("posture",)
@@ -162,7 +164,7 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
     asked = ask_sweep(
         "irsbot2",
         SweepOptions(
-            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], reading="none"
+            grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"], assumption="none"
         ),
     )
     data = sweep_in_memory(asked).squeeze()
@@ -200,7 +202,8 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
     ("options", "message"),
     [
         ({}, "sweep: expected --grid or --poses, one of them"),
-        ({"grid": "tx=0", "reading": "fozen"}, '--reading: found "fozen"; did you'),
+        ({"grid": "tx=0", "assumption": "fozen"},
+         '--assumption: found "fozen"; did you'),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius"]},
          '--vary: found "link_a.link.beam.radius", expected PATH=VALUE,..'),
         ({"grid": "tx=0", "vary": ["link_a.link.beam.radius=0.03,-1"]},
@@ -211,7 +214,7 @@ def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypat
                                    "leg1.link_a.link.beam.radius=0.04"]},
          "leg1.link_a.link.beam.radius varies already"),
         ({"grid": "tx=0", "draws": 3}, "sweep: --errors and --draws go together"),
-        ({"grid": "tx=0", "wrench": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
+        ({"grid": "tx=0", "wrench_of": ["leg1.link_q"]}, 'no frame "leg1.link_q"'),
         ({"grid": "tx=0", "near": -1.0}, "--near: found -1, expected a number from 0"),
         ({"grid": "tx=0:1:1e-5,tz=0:1:0.1", "vary": ["tip.mass=1:100:1"]},
          "sweep: 110001100 points; expected at most 10000000"),
@@ -229,7 +232,13 @@ def test_figures_need_only_the_data_set(tmp_path):
     grid = "tx=-0.02:0.02:0.02,ty=0.12:0.14:0.02"
     asked = ask_sweep(
         "five_bar",
-        SweepOptions(grid=grid, errors=path, draws=3, near=0.6, play_alone=True),
+        SweepOptions(
+            grid=grid,
+            errors=path,
+            draws=3,
+            near=0.6,
+            quantities=["default", *BY_CLEARANCE],
+        ),
     )
     data = sweep_in_memory(asked)
     figure = figure_of(data)

@@ -1,7 +1,5 @@
 """K_C as quantities of sweeps, over postures and designs, and on maps."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -20,7 +18,9 @@ def test_each_point_has_the_stiffness_of_its_posture():
         ask_sweep(
             "irsbot2",
             SweepOptions(
-                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1", reading="none", stiffness=True
+                grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
+                assumption="none",
+                state="nominal",
             ),
         )
     )
@@ -52,8 +52,8 @@ def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
             SweepOptions(
                 grid="tx=0,tz=-0.5",
                 vary=["link_a.link.beam.radius=0.03,0.04,0.05"],
-                reading="none",
-                stiffness=True,
+                assumption="none",
+                state="nominal",
             ),
         )
     )
@@ -64,13 +64,11 @@ def test_a_thicker_link_is_stiffer_in_a_sweep_of_designs():
 LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 
-@pytest.mark.parametrize(
-    ("tangent", "state"), [("contact", "in contact"), ("exact", "exact")]
-)
-def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(tangent, state):
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
     """Of its own errors and of draws; loads and draws change it, the classical not."""
     options = SweepOptions(
-        grid="tx=0.1,tz=-0.5", reading="none", tangent=tangent, load=LOAD,
+        grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],
     )  # fmt: skip
     data = sweep_in_memory(ask_sweep("irsbot2", options)).squeeze()
@@ -86,22 +84,19 @@ def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(tangent, st
     )  # fmt: skip
     np.testing.assert_allclose(data.share.sum("part"), 1.0)
     assert np.ptp(data.stiffness.values, axis=0).max() > 0.0
-    assert tangent != "exact" or "forces already there" in data.part.values
+    assert state != "exact" or "forces already there" in data.part.values
 
 
 def test_a_tangent_names_the_motions_that_nothing_resists():
     data = sweep_in_memory(
-        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", reading="none",
-                                          tangent="contact", load=LOAD))
+        ask_sweep("irsbot2", SweepOptions(grid="tx=0,tz=-0.5", assumption="none",
+                                          state="contact", load=LOAD))
     )  # fmt: skip
     assert "nothing resists the platform's motion" in str(data.reason.values.ravel()[0])
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
 
 
-def test_a_wrong_tangent_is_refused():
-    options = SweepOptions(grid="tx=0,tz=-0.5", reading="none", tangent="exakt")
-    with pytest.raises(BadInput, match='--tangent: found "exakt"'):
-        ask_sweep("irsbot2", options)
-    options = replace(options, tangent="exact", stiffness=True)
-    with pytest.raises(BadInput, match="expected one of them"):
+def test_a_wrong_state_is_refused():
+    options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
+    with pytest.raises(BadInput, match='--state: found "exakt"'):
         ask_sweep("irsbot2", options)

@@ -65,7 +65,7 @@ def test_the_command_gives_them(run):
 def test_the_command_gives_them_at_the_exact_equilibrium(run):
     """The load's own stiffness is in them: they are not those without it."""
     slopes = {}
-    for words in ([], ["--exact", "--load", "fx=-300"]):
+    for words in ([], ["--state", "exact", "--load", "fx=-300"]):
         status, out, _ = run(
             "assembly", "stiffness", "four_bar", "--by", "crank_pin.link.young",
             "--json", "-", *words,
@@ -73,9 +73,9 @@ def test_the_command_gives_them_at_the_exact_equilibrium(run):
         answer = json.loads(out)
         assert status == 0
         slopes[len(words)] = np.array(answer["slopes"]["crank_pin.link.young"])
-    assert slopes[3][3, 3] < 0.0
+    assert slopes[4][3, 3] < 0.0
     # entries beside it are zero or its rounding
-    assert abs(slopes[3][3, 3] / slopes[0][3, 3] - 1) > 1e-4
+    assert abs(slopes[4][3, 3] / slopes[0][3, 3] - 1) > 1e-4
 
 
 def test_an_unknown_number_is_named():

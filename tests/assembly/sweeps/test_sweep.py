@@ -125,7 +125,7 @@ def test_maps_show_each_quantity_of_the_grid(data):
 def test_pose_errors_are_bounded_where_a_reading_is_asked_for():
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = sweep_poses(robot, parse_grid("tx=-0.2:0.2:0.2,tz=-0.9:-0.45:0.45"),
-                       reading="frozen")  # fmt: skip
+                       assumption="frozen")  # fmt: skip
     assert data.rotation_error.dims == ("tx", "tz", "bound")
     assert data.bound.values.tolist() == ["lower", "upper"]
     assert data.translation_error.attrs["units"] == "m"

@@ -21,8 +21,8 @@ ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
 def test_a_point_of_the_platform_and_a_direction(run):
     status, out, _ = run(
-        "assembly", "error", *ROBOT, "--reading", "free", "--point", "x=0.1,z=-0.05",
-        "--direction", "tx=1,tz=-1", "--json", "-",
+        "assembly", "error", *ROBOT, "--assumption", "free", "--at", "x=0.1,z=-0.05",
+        "--along", "tx=1,tz=-1", "--json", "-",
     )  # fmt: skip
     assert status == 0
     found = json.loads(out)
@@ -47,10 +47,10 @@ def test_a_point_of_the_platform_and_a_direction(run):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (["--point", "tx=1"], '--point: unknown component "tx"; valid: x, y, z'),
-        (["--direction", "mx=1"], '--direction: unknown component "mx"'),
-        (["--direction", "tx=0"], "expected components of a translation or of a rot"),
-        (["--direction", "tx=1,rz=1"], "expected components of a translation or of"),
+        (["--at", "tx=1"], '--at: unknown component "tx"; valid: x, y, z'),
+        (["--along", "mx=1"], '--along: unknown component "mx"'),
+        (["--along", "tx=0"], "expected components of a translation or of a rot"),
+        (["--along", "tx=1,rz=1"], "expected components of a translation or of"),
     ],
 )
 def test_what_is_no_point_or_direction_is_refused(run, option, message):
@@ -109,9 +109,9 @@ mass = 3.0
     sag = 2e-5 + (20 + 3.0 * 10) / 1e6
     screw = json.loads(out)["platform_screw"]
     assert screw[5] == pytest.approx(-sag, rel=1e-9)
-    status, out, err = run(*words, "--reading", "budget")
+    status, out, err = run(*words, "--assumption", "budget")
     assert (status, out) == (2, "")
-    assert "reading budget: found a load; expected frozen or free" in err
+    assert "assumption budget: found a load; expected frozen or free" in err
 
 
 HINGE = """
@@ -141,7 +141,7 @@ def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
     assert free.startswith("free    no answer: the load drives a motion")
     _, out, _ = run("assembly", "error", file, "--load", "mz=0.1", "--json", "-")
     assert json.loads(out)["error"]["free"]["rotation"] is None
-    _, out, _ = run("assembly", "error", file, "--reading", "free")
+    _, out, _ = run("assembly", "error", file, "--assumption", "free")
     assert "rotation without bound, translation 0.0360555 to" in out
 
 
@@ -158,8 +158,8 @@ def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
         (["zone", "--pose", "rz=1e160"], "--pose rz: found 1e+160"),
         (["solve", "--joint", "left.drive=1e300"], "--joint left.drive: found 1e+300"),
         (["solve", "--under", "temperature=1e300"], "--under temperature: found"),
-        (["error", "--point", "x=1e300"], "--point x: found 1e+300"),
-        (["error", "--direction", "tx=1e300"], "--direction tx: found 1e+300"),
+        (["error", "--at", "x=1e300"], "--at x: found 1e+300"),
+        (["error", "--along", "tx=1e300"], "--along tx: found 1e+300"),
         (["error", "--energy-budget", "1e300"], "--energy-budget: found 1e+300"),
     ],
 )  # fmt: skip

@@ -175,7 +175,9 @@ def test_gravity_pulls_an_arm_down(run):
 
 
 def test_show_draws_a_picture(run, robot_file, tmp_path):
-    status, _, _ = run("assembly", "show", robot_file, "-o", tmp_path / "robot.png")
+    status, _, _ = run(
+        "assembly", "show", robot_file, "--figure", tmp_path / "robot.png"
+    )
     assert status == 0
     assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
 
@@ -197,7 +199,8 @@ def test_show_draws_a_picture(run, robot_file, tmp_path):
         (["assembly", "solve", "irsbot2", "--json", "/nowhere/x.json"],
          "/nowhere/x.json: "),
         (["assembly", "solve", "irsbot2", "--gravity", "w=1"], "--gravity: unknown"),
-        (["assembly", "error", "irsbot2", "--reading", "fre"], '--reading: found'),
+        (["assembly", "error", "irsbot2", "--assumption", "fre"],
+         '--assumption: found'),
         (["assembly", "error", "irsbot2", "--tolerance-rotation", "-1"],
          "--tolerance-rotation: found -1.0, expected a finite number > 0"),
         (["assembly", "sweep", "irsbot2", "--grid", "tx=0:1:0", "-o", "x.nc"],
@@ -294,7 +297,7 @@ def test_the_version_is_that_of_the_package(run):
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [("forcefit asse", "assembly"), ("forcefit assembly so", "solve"),
-     ("forcefit validation crosscheck --clear", "--clearances"),
+     ("forcefit validation crosscheck --with", "--with-clearance"),
      ("forcefit assembly zone arm", "arm6")],
 )  # fmt: skip
 def test_a_shell_completes_commands_options_and_robots(typed, offered):

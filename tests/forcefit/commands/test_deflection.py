@@ -12,12 +12,12 @@ def test_a_curve_goes_through_play_to_a_spring(run, tmp_path):
     picture = tmp_path / "curve.svg"
     status, out, _ = run(
         "assembly", "deflection", "hexapod", "--along", "fz=-100:100:50", "--json",
-        "-", "-o", str(picture),
+        "-", "--figure", str(picture),
     )  # fmt: skip
     answer = json.loads(out)
     assert status == 0
     assert answer["loads"] == [-100.0, -50.0, 0.0, 50.0, 100.0]
-    assert answer["free_play"] == [False, False, True, False, False]
+    assert answer["free_in_clearances"] == [False, False, True, False, False]
     assert answer["stiffness"][4] == pytest.approx(7.144e7, rel=1e-3)
     assert answer["deflection"][4] == pytest.approx(-answer["deflection"][0], rel=1e-6)
     assert {event["kind"] for event in answer["events"]} == {"contact", "release"}
@@ -43,7 +43,7 @@ def test_a_path_is_followed_past_its_limit_point(run, tmp_path):
     picture = tmp_path / "path.svg"
     status, out, _ = run(
         "assembly", "deflection", str(column), "--along", "fy=0:-300:15", "--follow",
-        "--json", "-", "-o", str(picture),
+        "--json", "-", "--figure", str(picture),
     )  # fmt: skip
     answer = json.loads(out)
     assert status == 0

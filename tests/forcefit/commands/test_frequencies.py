@@ -39,7 +39,7 @@ def test_frequencies_without_exact_say_that_gravity_is_left_out(run, tmp_path):
     words = ["frequencies", tmp_path / "p.toml", "--gravity", "z=-9.81", "--count", "1"]
     _, out, _ = run("assembly", *words)
     assert "load and gravity are left out" in out
-    _, out, _ = run("assembly", *words, "--exact")
+    _, out, _ = run("assembly", *words, "--state", "exact")
     assert "left out" not in out
     assert float(out.split("\n")[1].split()[0]) == pytest.approx(
         np.sqrt(9.81) / (2 * np.pi), rel=1e-3

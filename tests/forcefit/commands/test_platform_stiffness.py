@@ -41,7 +41,7 @@ def test_the_matrices_are_where_machines_expect_them(run):
         pytest.approx(1.0)
     )
     # the robot has clearances and no load: nothing is held
-    (side,) = answer["in_contact"]
+    (side,) = answer["contact"]
     assert len(side["free_motions"]) == 6
     np.testing.assert_array_equal(side["compliance"], np.full((6, 6), None))
 
@@ -62,11 +62,11 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        ["stiffness", "--exact", "--load", "fz=5"],
+        ["stiffness", "--state", "exact", "--load", "fz=5"],
         ["deflection", "--along", "fz=0:5:5"],
         ["deflection", "--along", "fz=0:5:5", "--exact"],
         ["deflection", "--along", "fz=0:5:5", "--follow"],
-        ["frequencies", "--exact", "--load", "fz=5"],
+        ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],
 )
 def test_a_load_that_nothing_resists_is_exit_1_with_the_motion_named(
@@ -86,7 +86,7 @@ def test_a_sweep_names_the_motion_that_is_free(tmp_path):
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
-        SweepOptions(grid="tz=0:0:1", reading="none", stiffness=True),
+        SweepOptions(grid="tz=0:0:1", assumption="none", state="nominal"),
     )
     data = sweep_in_memory(asked).squeeze()
     assert str(data.reason.values) == (
@@ -116,8 +116,8 @@ def test_what_is_no_point_length_or_load_is_refused(run, option, message):
 def test_the_chart_is_written(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
-        "assembly", "stiffness", "irsbot2", "--exact", "--load", "fz=-100",
-        "-o", str(picture),
+        "assembly", "stiffness", "irsbot2", "--state", "exact", "--load", "fz=-100",
+        "--figure", str(picture),
     )  # fmt: skip
     assert picture.stat().st_size > 1000
     assert "stiffness exact" in out
@@ -127,7 +127,7 @@ def test_the_chart_is_written(run, tmp_path):
 def test_a_direction_has_its_stiffness_and_shares(run):
     """Along fz it is what stands there already; of any length it is the same."""
     status, out, _ = run(
-        "assembly", "stiffness", "orthoglide", "--direction", "tz=-2", "--json", "-"
+        "assembly", "stiffness", "orthoglide", "--along", "tz=-2", "--json", "-"
     )
     answer = json.loads(out)
     assert status == 0
@@ -141,8 +141,8 @@ def test_a_direction_has_its_stiffness_and_shares(run):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--direction", "tx=0"], "--direction: expected components of a translation"),
-        (["--direction", "tx=nan"], "--direction tx: found nan"),
+        (["--along", "tx=0"], "--along: expected components of a translation"),
+        (["--along", "tx=nan"], "--along tx: found nan"),
         (["--at", "1,2"], "--at: found '1,2', expected three numbers"),
         (["--length", "0"], "--length: found 0, expected a finite number > 0"),
         (["--load", "fz=nan"], "--load fz: found nan, expected a finite number"),
@@ -163,7 +163,8 @@ def test_a_load_that_no_equilibrium_carries_is_exit_1(run):
         "assembly",
         "stiffness",
         "four_bar",
-        "--exact",
+        "--state",
+        "exact",
         "--load",
         "fx=1e9",
         "--json",
@@ -179,7 +180,15 @@ def test_a_platform_pushed_through_its_legs_is_said_to_be_far(run):
     """By 10 MN, from 0.5 m below the base to above it; by 300 N by micrometres."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
         _, out, _ = run(
-            "assembly", "stiffness", "irsbot2", "--exact", "--load", load, "--json", "-"
+            "assembly",
+            "stiffness",
+            "irsbot2",
+            "--state",
+            "exact",
+            "--load",
+            load,
+            "--json",
+            "-",
         )
         found = json.loads(out)
         assert (found["point"][2] > 0) == far

@@ -9,7 +9,7 @@ from assembly.exact.exact import solve_exact
 from assembly.files.solved_links import solve_links
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import Frame, MeshLink, Robot
-from assembly.platform_stiffness.deflection import load_deflection
+from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.robots import load_robot
 from forcefit.commands import progress
 from forcefit.commands.progress import report_loading
@@ -41,7 +41,7 @@ def test_every_step_of_an_exact_solution_is_reported():
 def test_every_load_of_a_curve_is_reported():
     said = []
     posture = home_posture(load_robot("hexapod"))
-    load_deflection(
+    deflection_curve(
         posture, 5, np.array([0.0, -10.0, -20.0]), exact=True,
         progress=lambda what, done, most: said.append(what),
     )  # fmt: skip

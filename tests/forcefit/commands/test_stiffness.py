@@ -49,19 +49,19 @@ def test_beam_text_shows_the_matrix():
     ("options", "section", "axis", "theory"),
     [
         (
-            ["--radius", "0.04", "--inner-radius", "0.03", "--axis", "z"],
+            ["--radius", "0.04", "--inner-radius", "0.03", "--along", "z"],
             round_section(0.04, 0.3, 0.03),
             [0, 0, 1],
             "timoshenko",
         ),
         (
-            ["--width", "0.02", "--height", "0.05", "--axis=-1,0,2", "--up", "y"],
+            ["--width", "0.02", "--height", "0.05", "--along=-1,0,2", "--up", "y"],
             rectangular_section(0.02, 0.05, 0.3),
             [-1, 0, 2],
             "timoshenko",
         ),
         (
-            ["--radius", "0.04", "--theory", "euler", "--axis=-y"],
+            ["--radius", "0.04", "--theory", "euler", "--along=-y"],
             round_section(0.04, 0.3),
             [0, -1, 0],
             "euler",
@@ -92,8 +92,8 @@ def test_beam_options_reach_the_formula(options, section, axis, theory):
         (["--radius", "1", "--young", "-1"], "--young: found -1"),
         (["--radius", "1", "--poisson", "0.5"], "--poisson: found 0.5"),
         (["--radius", "1", "--theory", "eular"], "--theory: found 'eular'; did you me"),
-        (["--radius", "1", "--axis", "q"], "--axis: found 'q', expected x, y, z or"),
-        (["--radius", "1", "--axis", "0,0,0"], "--axis: found '0,0,0'"),
+        (["--radius", "1", "--along", "q"], "--along: found 'q', expected x, y, z or"),
+        (["--radius", "1", "--along", "0,0,0"], "--along: found '0,0,0'"),
         (["--radius", "1", "--up", "x"], "lies along the axis"),
     ],
 )

@@ -9,6 +9,7 @@ import zlib
 import pytest
 import xarray
 
+from assembly.sweeps.selection import BY_CLEARANCE, FINITE
 from forcefit.commands import app as command
 
 ERRORS = """
@@ -24,7 +25,7 @@ def test_everything_at_once_ends_in_one_file_and_one_object(run, tmp_path):
     words = ["five_bar", "--poses", tmp_path / "poses.csv",
              "--errors", tmp_path / "errors.toml", "--draws", "2", "--seed", "5",
              "--vary", "elbow.link.young=7e10,2.1e11", "--wrench-of", "left.arm",
-             "--play-alone", "--linearisation"]  # fmt: skip
+             "--quantities", ",".join(["default", *BY_CLEARANCE, *FINITE])]  # fmt: skip
     status, out, _ = run("assembly", "sweep", *words, "-o", tmp_path / "x.nc",
                          "--json", "-")  # fmt: skip
     found = json.loads(out)
@@ -76,10 +77,10 @@ def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
     from assembly.sweeps import points
 
     monkeypatch.setattr(points, "_solve_reached", None)
-    status, out, err = run("assembly", "plot", file, "-o", picture)
+    status, out, err = run("assembly", "plot", file, "--figure", picture)
     assert (status, out, err) == (0, "", "")
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert run("assembly", "plot", file, "--at", "tx=0", "-o", picture)[0] == 0
+    assert run("assembly", "plot", file, "--at", "tx=0", "--figure", picture)[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,8 @@ def test_a_saved_sweep_is_drawn_without_solving(run, tmp_path, monkeypatch):
           "-o", "x.nc"], 'five_bar: no number "left.elbow.young"'),
         (["sweep", "five_bar", "--grid", "tx=0", "--errors", "no.toml", "--draws", "2",
           "-o", "x.nc"], "no.toml: cannot be read: No such file"),
-        (["plot", "no.nc", "-o", "x.png"], "no.nc: no such file; expected a data set"),
+        (["plot", "no.nc", "--figure", "x.png"],
+         "no.nc: no such file; expected a data set"),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_message_and_nothing_is_written(run, tmp_path, monkeypatch,
@@ -179,7 +181,7 @@ def test_a_sweep_without_a_finite_value_is_summed_up_and_drawn(
         assert found["quantities"]["energy"] is None
         assert found["quantities"]["margin"] is None
     elif figure:
-        assert run("assembly", "plot", file, "-o", picture) == (0, "", "")
+        assert run("assembly", "plot", file, "--figure", picture) == (0, "", "")
     if figure:
         assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -198,7 +200,7 @@ def test_a_sweep_that_reaches_nothing_is_summed_up_and_drawn(run, tmp_path):
     status, out, err = run("assembly", "sweep", "five_bar", *words)
     assert (status, out) == (1, "out of reach: 9\n")
     assert "Warning" not in err
-    assert run("assembly", "plot", file, "-o", picture, "--at", "tx=5")[0] == 0
+    assert run("assembly", "plot", file, "--figure", picture, "--at", "tx=5")[0] == 0
 
 
 def test_postures_of_a_list_and_designs_are_a_map(run, tmp_path):
@@ -320,7 +322,7 @@ def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypat
     for place in range(100, len(content), len(content) // 6):
         spoilt = content[:place] + bytes(40) + content[place + 40 :]
         file.write_bytes(spoilt)
-        status, _, err = run("assembly", "plot", file, "-o", tmp_path / "x.svg")
+        status, _, err = run("assembly", "plot", file, "--figure", tmp_path / "x.svg")
         assert status in {0, 2}
         assert messages(err) == (status == 2)
 
@@ -332,7 +334,7 @@ def test_a_damaged_file_is_one_message_and_nothing_more(run, tmp_path, monkeypat
 def test_sweep_says_that_frequencies_leave_load_and_gravity_out(
     run, tmp_path, words, said
 ):
-    grid = ["--grid", "tx=0,ty=0.13", "--reading", "none", "--frequencies", "1"]
+    grid = ["--grid", "tx=0,ty=0.13", "--assumption", "none", "--frequencies", "1"]
     target = ["-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", "five_bar", *grid, *words, *target)
     assert status == 0

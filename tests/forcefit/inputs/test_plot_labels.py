@@ -79,7 +79,7 @@ def test_a_constant_map_says_its_value_and_has_no_scale():
 
 
 def test_draws_importance_and_tolerances_of_odd_names_are_drawn():
-    attrs = {"robot": ODD[0], "seed": 1, "play": "worst"}
+    attrs = {"robot": ODD[0], "seed": 1, "clearance": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
     shown = drawn_texts(histogram_figure(xarray.Dataset(draws, attrs=attrs)))
     assert any(text.startswith(plot_label(ODD[0])) for text in shown)

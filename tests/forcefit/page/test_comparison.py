@@ -9,7 +9,8 @@ from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse
 
 BEFORE = {
-    "title": "robot", "worst_play": {"pose": {"translation": 8e-4, "rotation": 0.0}},
+    "title": "robot",
+    "worst_clearance": {"pose": {"translation": 8e-4, "rotation": 0.0}},
     "passed": True, "certificate": {"gap": 1e-12},
     "governing": [
         {"part": "a", "what": "clearance", "translation": 7e-4},
@@ -17,7 +18,8 @@ BEFORE = {
     ],
 }  # fmt: skip
 AFTER = {
-    "title": "robot", "worst_play": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
+    "title": "robot",
+    "worst_clearance": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
     "passed": False, "certificate": {"gap": 3e-12}, "new": 1,
     # another order, the same parts
     "governing": [
@@ -75,7 +77,7 @@ def test_the_command_compares_a_page_with_a_json_file(tmp_path, run):
     second.write_text(json.dumps(AFTER))
     pages = [tmp_path / "c.html", tmp_path / "d.html"]
     for page in pages:
-        status, printed, err = run("report", "compare", first, second, "-o", page)
+        status, printed, err = run("report", "compare", first, second, "--report", page)
         assert (status, err) == (0, "")
     assert "certified worst case, pose, shift: 0.0008 to 0.0004 m (-50 %)" in printed
     status, printed, _ = run("report", "compare", *pages, "--json", "-")

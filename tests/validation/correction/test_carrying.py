@@ -12,7 +12,7 @@ from assembly.robots import load_robot
 from stiffness.screws import rotation_matrix, rotation_vector
 from tests.campaigns_for_tests import write_campaign
 from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.saving import corrected
 
@@ -48,7 +48,7 @@ def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
     (folder / "plain.csv").write_text("\n".join([head, *lines]) + "\n")
     offset = {"encoder_offset": {names[0]: zero}}
     commands = read_commands(folder / "plain.csv", replace(saved, effects=offset))
-    found = foretell(commands).prediction.deviation
+    found = predict(commands).prediction.deviation
     nominal = commands.transforms[:, saved.index(saved.platform), :3, 3]
     R = rotation_matrix(DEVICE[:3])
     read = (nominal + found[:, 3:]) @ R.T + DEVICE[3:] - nominal
@@ -103,8 +103,8 @@ def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
     for k, axis in enumerate("xyz"):
         value, std = found[f"base.r{axis}"]
         assert abs(value - turn[k]) < 5 * std
-    # what was written foretells the day by itself
-    again = foretell(read_commands(folder, load_robot(out)))
+    # what was written predicts the day by itself
+    again = predict(read_commands(folder, load_robot(out)))
     assert again.error.position < 1.3 * SIGMA
 
 
@@ -149,7 +149,7 @@ def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):
     folder = measured(machine, 60, 0.8, ["a", "b"] * 30)
     write_robot(corrected(diagnose(read_campaign(folder))), machine / "found.toml")
     again = read_commands(folder, load_robot(machine / "found.toml"))
-    error = foretell(replace(again, registration="known")).error
+    error = predict(replace(again, registration="known")).error
     assert 0.8 < error.normalised < 1.1
 
 

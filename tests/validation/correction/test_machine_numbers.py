@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.files.robot_file import read_robot
-from assembly.measurement.predict import predict
+from assembly.measurement.predict import predict as predict_rows
 from assembly.model.function import Function
 from tests.campaigns_for_tests import campaign_of
 from tests.validation.diagnosis.test_sessions import FRAMES, measured
@@ -15,7 +15,7 @@ from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.carried_file import save
 from validation.correction.carrying import carry
 from validation.correction.machine_numbers import machine_numbers
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.correction.spread import number_slopes
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.saved_covariance import (
@@ -100,7 +100,7 @@ def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
     carried = carry(saved, declared, np.arange(12) < 8, ())
     save(carried, tmp_path / "carried.toml")
     robot = read_robot(tmp_path / "carried.toml")
-    again = foretell(replace(saved, robot=robot).take(np.arange(8, 12)))
+    again = predict(replace(saved, robot=robot).take(np.arange(8, 12)))
     assert again.error.position == pytest.approx(
         carried.sessions[0].error.position, rel=1e-9
     )
@@ -169,7 +169,7 @@ def test_slopes_of_functions_are_what_a_small_change_does(
     )
     step = 1e-6
     ends = [
-        predict(conditions_for(number.moved(robot, by))).deviation
+        predict_rows(conditions_for(number.moved(robot, by))).deviation
         for by in (step, -step)
     ]
     expected = (ends[0] - ends[1]) / (2 * step)

@@ -10,7 +10,7 @@ from assembly.files.robot_file import write_robot
 from assembly.robots import load_robot
 from tests.campaigns_for_tests import ARM, write_campaign
 from validation.campaign.campaign_file import read_commands
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 
 WAVE = """
 [[effect]]
@@ -115,6 +115,6 @@ def test_sessions_are_registered_one_by_one(tmp_path):
         robot=(tmp_path / "robot.toml").read_text(),
         toml={"registration": '"unknown"'},
     )  # fmt: skip
-    found = foretell(read_commands(folder, robot))
+    found = predict(read_commands(folder, robot))
     assert len(nominal) == 16
     assert found.error.position < 1e-9

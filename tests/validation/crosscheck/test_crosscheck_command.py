@@ -18,7 +18,7 @@ from tests.robots_for_tests import coaxial_beams
 pytestmark = pytest.mark.exudyn
 
 
-@pytest.mark.parametrize("more", [[], ["--clearances"]])
+@pytest.mark.parametrize("more", [[], ["--with-clearance"]])
 def test_the_command_does_not_pass_a_robot_without_errors(more):
     outcome = run("irsbot2", "--pose", "tx=0,tz=-0.5", "--scale", "1,0.5", *more)
     assert outcome.exit_code == 1
@@ -76,7 +76,7 @@ def test_the_command_keeps_clearances_if_asked(tmp_path):
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
     play = Clearance(radial=2e-5, axial=1e-5)
     write_robot(coaxial_beams(gap, clearance=play), file)
-    outcome = run(str(file), "--clearances", "--scale", "0.5,0.25", "--json",
+    outcome = run(str(file), "--with-clearance", "--scale", "0.5,0.25", "--json",
                   str(target))  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     table = json.loads(target.read_text())
@@ -84,7 +84,7 @@ def test_the_command_keeps_clearances_if_asked(tmp_path):
     assert table["slope"] is None
     assert [entry["scale"] for entry in table["scales"]] == [0.5, 0.25]
     assert len(table["optimality_gaps"]) == 2 + len(table["added_scales"])
-    refused = run(str(file), "--clearances", "--figure", "slope.png")
+    refused = run(str(file), "--with-clearance", "--figure", "slope.png")
     assert isinstance(refused.exception, BadInput)
 
 

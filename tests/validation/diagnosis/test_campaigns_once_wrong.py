@@ -8,7 +8,7 @@ import pytest
 from assembly.files.robot_file import read_robot
 from examples.campaign_folder import DATA
 from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import table
 from validation.diagnosis.saving import save
@@ -52,7 +52,7 @@ def test_the_saved_robot_is_the_one_that_is_printed_and_never_a_worse_one(
         return
     save(found, tmp_path / "robot.toml")
     data = read_commands(CASES / name, read_robot(tmp_path / "robot.toml"))
-    told = foretell(replace(data, registration="known").take(~found.outliers))
+    told = predict(replace(data, registration="known").take(~found.outliers))
     assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
     assert found.after.normalised < found.before.normalised
     assert found.sequence[-1].error.normalised == found.after.normalised
@@ -68,7 +68,7 @@ def test_robots_of_another_program_s_campaigns_are_saved_as_printed(
     found = diagnosed(PRACTICE / name)
     save(found, tmp_path / "robot.toml")
     data = read_commands(PRACTICE / name, read_robot(tmp_path / "robot.toml"))
-    told = foretell(replace(data, registration="known").take(~found.outliers))
+    told = predict(replace(data, registration="known").take(~found.outliers))
     assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.model.statuses import NOT_ENOUGH_ROWS
 from examples.campaign_folder import DATA
 from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA
@@ -13,7 +14,6 @@ from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.prediction import predicted
 from validation.diagnosis.results import table
 from validation.diagnosis.text import text
-from validation.diagnosis.verdict import NOT_ENOUGH
 
 
 def seen(rows, seed, unlike=0.0):
@@ -34,7 +34,7 @@ def seen(rows, seed, unlike=0.0):
 def test_eight_rows_of_a_target_explain_nothing(seed):
     """24 numbers, of which geometry alone has twenty unknowns."""
     found = diagnose(seen(8, seed))
-    assert found.verdict == NOT_ENOUGH
+    assert found.verdict == NOT_ENOUGH_ROWS
     assert found.claimed == ()
     told = table(found)
     assert told["effects"] == []
@@ -60,7 +60,7 @@ def test_readings_like_no_other_are_never_explained(seed):
     """A hundred sigma each, at random: there is nothing to be learned in 8 or 16."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))
-        assert found.verdict in {NOT_ENOUGH, "outside_library"}
+        assert found.verdict in {NOT_ENOUGH_ROWS, "outside_library"}
         assert found.claimed == ()
 
 
@@ -70,7 +70,7 @@ def test_eight_rows_of_six_joints_are_too_few():
     folder = DATA.parent / "cases" / "campaigns" / "few_8"
     if not folder.is_dir():
         pytest.skip(f"{folder} is not there")
-    assert diagnose(read_campaign(folder)).verdict == NOT_ENOUGH
+    assert diagnose(read_campaign(folder)).verdict == NOT_ENOUGH_ROWS
 
 
 @pytest.mark.parametrize("rows", [2, 3])

@@ -12,7 +12,7 @@ import pytest
 from assembly.files.robot_file import read_robot
 from assembly.model.robot import BeamLink, Frame, Robot
 from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import table
 from validation.diagnosis.saving import save
@@ -101,7 +101,7 @@ def hidden(tmp_path):
         found = diagnose(campaigns[0])
         save(found, tmp_path / "robot.toml")
         saved = read_robot(tmp_path / "robot.toml")
-        assert foretell(replace(campaigns[1], robot=saved)).error.normalised < 1.1
+        assert predict(replace(campaigns[1], robot=saved)).error.normalised < 1.1
         return table(found), made.effects[0].parameters
 
     return find

@@ -10,7 +10,7 @@ from assembly.files.robot_file import read_robot, write_robot
 from assembly.model.robot import Frame, Robot
 from tests.planar_arm_for_tests import SIGMA, measured
 from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import table
 from validation.diagnosis.saving import corrected, save
@@ -79,7 +79,7 @@ def assert_saved_predicts(found, tmp_path):
     """The file read again and predicted with leaves the errors that were printed."""
     save(found, tmp_path / "robot.toml")
     robot = read_robot(tmp_path / "robot.toml")
-    told = foretell(replace(found.campaign, robot=robot).take(~found.outliers))
+    told = predict(replace(found.campaign, robot=robot).take(~found.outliers))
     assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-6)
 
 

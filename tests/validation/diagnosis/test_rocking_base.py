@@ -15,7 +15,7 @@ from assembly.model.robot import Frame, Robot
 from stiffness.screws import rotation_matrix
 from tests.campaigns_for_tests import write_campaign
 from validation.campaign.campaign_file import read_campaign
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import learned
 
@@ -66,9 +66,9 @@ def with_gain(campaign, gain):
 
 def test_a_known_gain_leaves_noise(rocking):
     """1 mrad at 0.7 m is some twenty sigma; 0.2 mrad of it too much, some four."""
-    assert foretell(rocking).error.normalised > 8
-    assert 0.85 < foretell(with_gain(rocking, GAIN)).error.normalised < 1.15
-    assert foretell(with_gain(rocking, 1.0)).error.normalised > 2
+    assert predict(rocking).error.normalised > 8
+    assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15
+    assert predict(with_gain(rocking, 1.0)).error.normalised > 2
 
 
 def test_an_unknown_gain_is_learned(rocking):

@@ -10,7 +10,7 @@ from assembly.files.robot_file import read_robot
 from forcefit.inputs.writing import plain
 from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis import diagnose as module
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.fit import fit_machine
@@ -50,7 +50,7 @@ def saved(found, tmp_path_factory):
 
 def test_the_file_predicts_the_errors_that_are_printed(found, saved):
     """To the ten digits of the file: all rows without outliers."""
-    again = foretell(replace(found.campaign, robot=saved).take(~found.outliers))
+    again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
     assert asdict(again.error) == pytest.approx(printed, rel=1e-6)
     written = json.loads(json.dumps(plain(table(found))))
@@ -147,10 +147,10 @@ def test_the_file_knows_the_point_that_was_measured(found, saved):
     """Readings of a table are of it; those of another point say so."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
-    same = foretell(replace(found.campaign, robot=saved)).table()
+    same = predict(replace(found.campaign, robot=saved)).table()
     assert same["identified_at"] is None
     other = replace(found.campaign, robot=saved, reference_point=np.zeros(3))
-    told = foretell(other).table()
+    told = predict(other).table()
     assert told["identified_at"] == pytest.approx(list(point))
     assert told["reference_point"] == [0.0, 0.0, 0.0]
 
@@ -190,7 +190,7 @@ def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
     720 readings whose errors of the model are common: five standard errors of 0.011.
     """
     fresh = read(commanded(saved, 120, seed=11, reach=1.4), seed=12)
-    told = foretell(fresh)
+    told = predict(fresh)
     left = fresh.measured - told.prediction.deviation
     total = np.hypot(told.spread, told.noise)
     inside = np.mean(np.abs(left) < 1.645 * total)
@@ -218,7 +218,7 @@ def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
     assert robot.diagnosis["not_measured"] == ["rx", "ry", "rz", "tx", "ty"]
     assert table(found)["not_measured"] == ["rx", "ry", "rz", "tx", "ty"]
     fresh = read(commanded(robot, 30, seed=11, reach=1.4), seed=12)
-    told = foretell(fresh)
+    told = predict(fresh)
     left = fresh.measured - told.prediction.deviation
     # nothing is foretold surely in directions that were never seen
     assert np.median(told.spread[:, 3:5]) > 3 * SIGMA[3]

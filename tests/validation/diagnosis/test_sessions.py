@@ -10,7 +10,7 @@ from forcefit.inputs.errors import BadInput
 from tests.campaigns_for_tests import write_campaign
 from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign_file import read_campaign, read_commands
-from validation.correction.prediction import foretell
+from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.results import table
 from validation.diagnosis.saving import save
@@ -105,7 +105,7 @@ def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
     save(diagnosis, tmp_path / "found.toml")
     robot = read_robot(tmp_path / "found.toml")
     assert set(robot.session_effects) == set(ZEROS)
-    again = foretell(read_commands(folder, robot))
+    again = predict(read_commands(folder, robot))
     assert again.error.normalised == pytest.approx(
         found["error"]["saved"]["normalised"]
     )
@@ -145,7 +145,7 @@ def test_every_session_drifts_in_its_own_way(tmp_path):
             assert std < 0.3 * abs(true)
     assert diagnosis.after.normalised < 1.1
     save(diagnosis, tmp_path / "found.toml")
-    again = foretell(read_commands(folder, read_robot(tmp_path / "found.toml")))
+    again = predict(read_commands(folder, read_robot(tmp_path / "found.toml")))
     assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
@@ -206,7 +206,7 @@ def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
     robot = read_robot(tmp_path / "found.toml")
     assert [f.session for f in robot.functions] == ["wet"]
     assert diagnosis.after.normalised < 1.2
-    again = foretell(read_commands(folder, robot))
+    again = predict(read_commands(folder, robot))
     assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 

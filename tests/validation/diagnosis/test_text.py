@@ -160,7 +160,7 @@ def test_effects_and_functions_are_listed_with_their_numbers(shown):
     assert said[2:] == [
         "learned: tool tx, ty of q.one",
         f"  {'x' * 157}...",
-        "  foretold in parts of q.j1 left out: 1.25 sigma, without it 5",
+        "  predicted in parts of q.j1 left out: 1.25 sigma, without it 5",
         "  2 other places do as well",
     ]
 

@@ -107,7 +107,7 @@ def test_the_figures_on_the_page_are_the_results(results):
     outcome, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     table = json.loads((folder / "results.json").read_text())
-    worst = table["worst_play"]["pose"]
+    worst = table["worst_clearance"]["pose"]
     tile = [number.value for number in seen.numbers[:2]]
     assert tile == [worst["translation"], worst["rotation"]]
     assert seen.numbers[0].text == "0.794 mm"  # of the 0.7943345850 mm in the README
@@ -290,7 +290,7 @@ def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
     sentences = verdict(results)
     assert f"at most {1e3 * bound:.3g} mm" in sentences
     assert f"at most {1e3 * np.nanmax(upper):.3g} mm" in sentences
-    assert "certified bounds of (27), reading frozen" in sentences
+    assert "certified bounds of (27), assumption frozen" in sentences
     assert "with clearances resting at least energy it is 0 mm" in sentences
     lost = verdict(replace(results, error={}, maps=None))
     assert "could not be bounded; with clearances resting at least energy" in lost

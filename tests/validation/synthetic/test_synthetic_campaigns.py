@@ -338,7 +338,7 @@ def test_the_command_writes_a_campaign_or_says_why_not(tmp_path):
         (["arm6", "d", "--truth", "t.json", "--effect", "foo"], 'found "foo"'),
         (["arm6", "d", "--truth", "d/t.json"], "no folder d"),
         (["arm6", "d", "--truth", "t.json", "--program", "x"], "multibody | springs"),
-        (["arm6", "d", "--truth", "t.json", "--point", "1,2"], "three numbers"),
+        (["arm6", "d", "--truth", "t.json", "--at", "1,2"], "three numbers"),
     ):
         refused = run(*words)
         assert refused.returncode == 2, refused.stdout

@@ -1,0 +1,136 @@
+"""A whole sweep in one call: a robot and what varies in, a data set out.
+
+Begin at :func:`sweep`; the command ``forcefit assembly sweep`` takes the same options.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from assembly.model.robot import Robot
+from assembly.sweeps.dataset import open_dataset
+from assembly.sweeps.request import SweepOptions, ask_sweep
+from assembly.sweeps.selection import BY_CLEARANCE, DEFAULT, FINITE
+from assembly.sweeps.sweep import (
+    Progress,
+    Solver,
+    run_sweep,
+    solve_here,
+    sweep_in_memory,
+)
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def sweep(
+    robot: Robot | Path | str,
+    *,
+    grid: str | None = None,
+    poses: Path | str | None = None,
+    vary: Sequence[str] = (),
+    errors: Path | str | None = None,
+    draws: int | None = None,
+    seed: int = 1,
+    assumption: str = "frozen",
+    quantities: Sequence[str] = (),
+    wrench_of: Sequence[str] = (),
+    near: float = 0.02,
+    yield_strength: float | None = None,
+    load: Sequence[float] = (0.0,) * 6,
+    gravity: Sequence[float] = (0.0,) * 3,
+    under: Mapping[str, float | str] | None = None,
+    state: str | None = None,
+    frequencies: int | None = None,
+    rest: str | None = None,
+    mismatch: str | None = None,
+    output: Path | str | None = None,
+    progress: Progress = lambda done, total: None,
+    solve: Solver = solve_here,
+) -> "xarray.Dataset":
+    """Solve a robot at every posture, design and draw of errors.
+
+    Args:
+        robot: a robot, a robot file, or a built-in name.
+        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
+        poses: a table of postures.
+        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``; of a
+            robot file or a built-in name.
+        errors: file that says how errors are distributed, see docs/statistics.md.
+        draws: number of draws.
+        seed: of the draws.
+        assumption: of problem (27): ``"frozen"``, ``"free"``, ``"budget"``, or
+            ``"none"`` to leave its bounds out.
+        quantities: names of the data variables to compute and store, with
+            ``"default"`` for those that are stored without names: the bounds by
+            clearances alone (``"rotation_error_clearance"``,
+            ``"translation_error_clearance"``) and what finite motions change
+            (``"linearisation_rotation"``, ..) are only computed where they are named.
+        wrench_of: frames whose wrench is recorded.
+        near: distance below which a singularity is named.
+        yield_strength: [Pa] of the links, for their stress and safety.
+        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] base axes.
+        under: covariates that effects of the robot's file depend on.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``: also K_C in this state, and
+            the shares of links and joints in it.
+        frequencies: how many natural frequencies.
+        rest: a frame that takes what a closure leaves open at home.
+        mismatch: ``"spring"``: redundant drives that do not fit at home are preloaded.
+        output: NetCDF file to write.  Finished points are kept in
+            ``<output>.journal``; after a kill the same call resumes from it and writes
+            the same file, byte for byte.
+        progress: called with the number of points done, and of all.
+        solve: solves blocks of points; those of a file may be solved by others than
+            this process, see :mod:`assembly.sweeps.cluster`.
+
+    Returns:
+        The data set over the axes, with units; of a file all of it, in memory.
+
+    Raises:
+        BadInput: an option, a file it names or the robot breaks a rule; the journal is
+            another sweep's, another run holds it, or a file cannot be written.
+    """
+    asked = ask_sweep(
+        robot,
+        SweepOptions(
+            grid=grid, poses=poses, vary=vary, errors=errors, draws=draws, seed=seed,
+            assumption=assumption, quantities=quantities, wrench_of=wrench_of,
+            near=near, yield_strength=yield_strength, load=load, gravity=gravity,
+            under=under or {}, state=state, frequencies=frequencies, rest=rest,
+            mismatch=mismatch,
+        ),
+    )  # fmt: skip
+    if output is None:
+        return sweep_in_memory(asked, progress)
+    run_sweep(asked, output, progress, solve)
+    return open_dataset(output)
+
+
+def options_by_old_names(**options: Any) -> SweepOptions:
+    """Options of a sweep by the keywords of the last release.
+
+    Args:
+        options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,
+            ``stiffness`` and ``tangent``, and those of :class:`SweepOptions`.
+
+    Returns:
+        The options.
+    """
+    state = options.pop("tangent", None)
+    if options.pop("stiffness", False):
+        state = state or "nominal"
+    if state is not None:
+        options["state"] = state
+    for old, new in (("reading", "assumption"), ("wrench", "wrench_of")):
+        if old in options:
+            options[new] = options.pop(old)
+    added = [
+        name
+        for old, names in (("play_alone", BY_CLEARANCE), ("linearisation", FINITE))
+        if options.pop(old, False)
+        for name in names
+    ]
+    if added:
+        options["quantities"] = (DEFAULT, *added)
+    return SweepOptions(**options)

@@ -1,0 +1,91 @@
+"""Which quantities a sweep computes and stores, by the names of its data variables."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from assembly.sweeps.quantities import Question, Variable, computed
+from forcefit.inputs.errors import BadInput, nearest, quoted
+
+DEFAULT = "default"  # stands for what is stored where no quantity is named
+MODES = 6  # natural frequencies where their number is not given
+BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
+FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
+_STIFFNESS = (
+    "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
+)  # fmt: skip
+_STRESS = ("stress", "stress_error", "safety")
+_ERRORS = ("rotation_error", "translation_error")
+_NEEDED = (
+    dict.fromkeys(_STRESS, "--yield-strength")
+    | dict.fromkeys(_ERRORS, "an --assumption")
+    | {"wrench": "--wrench-of", "reading": "effects that change what a device reads"}
+)  # fmt: skip
+
+
+def select(question: Question, texts: Sequence[str]) -> Question:
+    """Restrict a question to quantities that are named.
+
+    Args:
+        question: of the other options.
+        texts: names of data variables, between commas; ``"default"`` stands for those
+            that are stored without names.
+
+    Returns:
+        The question; nothing is computed for variables that are not named.
+
+    Raises:
+        BadInput: there is no such variable, or it needs an option that is not given.
+    """
+    every = computed(_with_optional(question))
+    kept: list[str] = []
+    for name in (part.strip() for text in texts for part in text.split(",")):
+        if name == DEFAULT:
+            kept += computed(question)
+        elif name in every:
+            kept.append(name)
+        elif name in _NEEDED:
+            raise BadInput(f"--quantities: {name} needs {_NEEDED[name]}")
+        else:
+            hint = nearest(name, [*every, *_NEEDED, DEFAULT])
+            raise BadInput(f"--quantities: no {quoted(name)}{hint}")
+    return _for(question, {name: every[name] for name in every if name in kept})
+
+
+def _with_optional(question: Question) -> Question:
+    """The question for every quantity whose options are given or have a default."""
+    return replace(
+        question, clearance_only=True, linearisation=True,
+        stiffness=question.stiffness or "nominal",
+        frequencies=question.frequencies or MODES,
+    )  # fmt: skip
+
+
+def _for(question: Question, kept: dict[str, Variable]) -> Question:
+    """The question for the variables kept and no others."""
+    every = _with_optional(question)
+    return replace(
+        question,
+        kept=tuple(kept),
+        assumption=question.assumption if set(_ERRORS) & set(kept) else None,
+        clearance_only=bool(set(BY_CLEARANCE) & set(kept)),
+        linearisation=bool(set(FINITE) & set(kept)),
+        stiffness=every.stiffness if set(_STIFFNESS) & set(kept) else "",
+        frequencies=every.frequencies if "frequency" in kept else 0,
+        wrenches=question.wrenches if "wrench" in kept else (),
+        strength=question.strength if set(_STRESS) & set(kept) else None,
+    )
+
+
+def quantities_text() -> str:
+    """Every data variable of sweeps: name, unit, meaning, and the option it needs."""
+    from assembly.robots import BUILT_IN
+
+    robot = BUILT_IN["four_bar"]()
+    frame = robot.frames[0].name
+    question = Question(robot, assumption="frozen", wrenches=(frame,), strength=1.0)
+    lines = [
+        f"{name:28s}{one.unit:20s}{one.meaning}"
+        + (f"; needs {_NEEDED[name]}" if name in _NEEDED else "")
+        for name, one in computed(_with_optional(question)).items()
+    ]
+    return "\n".join(lines)

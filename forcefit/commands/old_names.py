@@ -1,0 +1,90 @@
+"""Old names of options: each works for one release, with a line on stderr.
+
+The commands themselves know the new names only; ``--help`` shows no others.
+"""
+
+import sys
+from collections.abc import Sequence
+
+_PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
+# new words by command and old option; a value follows where the option takes one
+OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    "assembly error": {
+        "--reading": ("--assumption",),
+        "--point": ("--at",),
+        "--direction": ("--along",),
+    },
+    "assembly show": _PICTURE | {"--reading": ("--assumption",)},
+    "assembly stiffness": _PICTURE
+    | {
+        "--exact": ("--state", "exact"),
+        "--direction": ("--along",),
+    },
+    "assembly frequencies": {"--exact": ("--state", "exact")},
+    "assembly sweep": {
+        "--stiffness": ("--state", "nominal"),
+        "--tangent": ("--state",),
+        "--play-alone": (
+            "--quantities",
+            "default,rotation_error_clearance,translation_error_clearance",
+        ),
+        "--linearisation": (
+            "--quantities",
+            "default,linearisation_rotation,linearisation_translation,"
+            "linearisation_energy",
+        ),
+        "--reading": ("--assumption",),
+    },
+    "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
+    "assembly tolerances": {"--play": ("--clearance",)},
+    "assembly deflection": _PICTURE,
+    "assembly plot": _PICTURE | {"--quantity": ("--quantities",)},
+    "report compare": {"-o": ("--report",), "--output": ("--report",)},
+    "validation crosscheck": {"--clearances": ("--with-clearance",)},
+    "validation generate": {"--point": ("--at",)},
+    "validation plan": {"--point": ("--at",)},
+    "stiffness beam": {"--axis": ("--along",)},
+}
+
+
+def with_new_names(words: Sequence[str]) -> list[str]:
+    """Replace options given by their old names, each reported on stderr once.
+
+    Args:
+        words: of the command line, without the program's name.
+
+    Returns:
+        The words that the commands understand.
+    """
+    renamed = _renamed_options(words)
+    end = words.index("--") if "--" in words else len(words)
+    reported: list[str] = []
+    new_words: list[str] = []
+    for word in words[:end]:
+        option, equals, value = _parts(word)
+        if option not in renamed:
+            new_words.append(word)
+            continue
+        new = renamed[option]
+        if option not in reported:
+            print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
+        reported.append(option)
+        new_words += [*new[:-1], new[-1] + equals + value]
+    return new_words + list(words[end:])
+
+
+def _parts(word: str) -> tuple[str, str, str]:
+    """Option, "=" and value of a word; of ``-ofile`` too."""
+    if word.startswith("--") or not word.startswith("-"):
+        return word.partition("=")
+    return word[:2], "=" * bool(word[2:]), word[2:]
+
+
+def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Old options of the command that the first words name."""
+    renamed: dict[str, tuple[str, ...]] = {}
+    for command, options in OPTIONS.items():
+        path = command.split()
+        if list(words[: len(path)]) == path:
+            renamed |= options
+    return renamed

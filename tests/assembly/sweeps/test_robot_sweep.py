@@ -1,0 +1,39 @@
+"""A sweep in one call: in memory or to a file, of a robot named or in memory."""
+
+import pytest
+import xarray
+
+import forcefit as ff
+
+GRID = "tx=-0.02:0.02:0.02,ty=0.13:0.14:0.01"
+
+
+def test_a_sweep_to_a_file_gives_what_it_gives_in_memory(tmp_path):
+    done = []
+    written = ff.sweep(
+        "five_bar", grid=GRID, output=tmp_path / "map.nc",
+        progress=lambda *numbers: done.append(numbers),
+    )  # fmt: skip
+    xarray.testing.assert_identical(written, ff.sweep("five_bar", grid=GRID))
+    assert done == [(0, 6), (6, 6)]
+    assert [path.name for path in tmp_path.iterdir()] == ["map.nc"]
+
+
+def test_a_sweep_of_a_robot_in_memory_is_that_of_its_name():
+    named = ff.sweep("five_bar", grid=GRID)
+    command = named.attrs.pop("command")
+    assert command == f"forcefit assembly sweep five_bar --grid {GRID}"
+    xarray.testing.assert_identical(
+        ff.sweep(ff.load_robot("five_bar"), grid=GRID), named
+    )
+
+
+def test_a_robot_in_memory_has_no_numbers_to_vary():
+    with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
+        ff.sweep(ff.load_robot("five_bar"), grid=GRID, vary=["a.b=1,2"])
+
+
+def test_the_command_of_a_sweep_has_the_options_that_it_was_given():
+    data = ff.sweep("five_bar", grid="ty=0.13", wrench_of=["left.elbow"], seed=3)
+    expected = "five_bar --grid ty=0.13 --seed 3 --wrench-of left.elbow"
+    assert data.attrs["command"] == f"forcefit assembly sweep {expected}"

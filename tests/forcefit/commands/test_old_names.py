@@ -1,0 +1,62 @@
+"""Options by their old names: they work and are reported."""
+
+import pytest
+import typer
+
+from forcefit.commands.app import app
+from forcefit.commands.old_names import OPTIONS, with_new_names
+
+RENAMED = [
+    (command, old, new)
+    for command, options in OPTIONS.items()
+    for old, new in options.items()
+]
+
+
+def options_of(command):
+    """Option names that the command declares, by those whose value follows."""
+    found = typer.main.get_command(app)
+    for word in command.split():
+        found = found.commands[word]
+    options = [one for one in found.params if one.param_type_name == "option"]
+    return {name: not one.is_flag for one in options for name in one.opts}
+
+
+@pytest.mark.parametrize(("command", "old", "new"), RENAMED)
+def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsys):
+    words = command.split()
+    joined = f"{old}=value" if old.startswith("--") else f"{old}value"
+    found = with_new_names([*words, old, "value", joined, "--json", "-"])
+    assert found == [
+        *words,
+        *new,
+        "value",
+        *new[:-1],
+        f"{new[-1]}=value",
+        "--json",
+        "-",
+    ]
+    assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
+    options = options_of(command)
+    assert old not in options
+    assert new[0] in options
+    # with a value of its own in the table, or with that of the old option, or none
+    assert len(new) == 1 or options[new[0]]
+
+
+def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
+    for words in (
+        ["assembly", "sweep", "--", "--tangent"],
+        ["validation", "crosscheck", "r", "--stiffness"],
+    ):
+        assert with_new_names(words) == words
+    assert capsys.readouterr().err == ""
+
+
+def test_an_old_flag_gives_the_answer_of_its_new_option(run):
+    words = ["assembly", "stiffness", "four_bar", "--load", "fx=10", "--json", "-"]
+    status, new, silent = run(*words, "--state", "exact")
+    old_status, old, err = run(*words, "--exact")
+    assert (status, silent) == (0, "")
+    assert (old_status, old) == (status, new)
+    assert err == "forcefit: --exact is now --state exact\n"

@@ -1,0 +1,93 @@
+"""Public names, arguments and values of the last release: they work, with a warning."""
+
+import numpy as np
+import pytest
+import xarray
+
+import forcefit as ff
+from assembly.sweeps.selection import BY_CLEARANCE, FINITE
+
+LOAD = [0, 0, 0, 0, 0, -100.0]
+
+
+@pytest.fixture(scope="module")
+def posture():
+    return ff.home_posture(ff.load_robot("irsbot2"))
+
+
+@pytest.mark.parametrize("old", sorted(ff._RENAMED))
+def test_an_old_public_name_works_and_names_the_new_one(old):
+    new, *elsewhere = ff._RENAMED[old]
+    with pytest.warns(FutureWarning, match=rf"forcefit\.{old} is now forcefit\.{new}"):
+        found = getattr(ff, old)
+    assert callable(found)
+    assert elsewhere or found is getattr(ff, new)
+    assert old not in ff.__all__
+    assert new in ff.__all__
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("without clearance", "nominal"), ("in contact", "contact")]
+)
+def test_an_old_state_is_the_new_one(posture, old, new):
+    with pytest.warns(FutureWarning, match=f"state='{old}' is now state='{new}'"):
+        found = ff.platform_stiffness(posture, old, LOAD)
+    expected = ff.platform_stiffness(posture, new, LOAD)
+    assert found.state == new
+    np.testing.assert_array_equal(found.compliance, expected.compliance)
+
+
+def test_modes_of_the_exact_state_by_the_old_flag():
+    posture = ff.home_posture(ff.load_robot("delta"))
+    with pytest.warns(FutureWarning, match="state='exact'") as caught:
+        found = ff.natural_modes(posture, 2, LOAD, exact=True)
+    assert caught[0].filename == __file__
+    expected = ff.natural_modes(posture, 2, LOAD, state="exact")
+    np.testing.assert_array_equal(found.frequencies, expected.frequencies)
+
+
+def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
+    variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
+    old = xarray.Dataset(variables, attrs={"play": "worst", "reading": "free"})
+    old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    data = ff.open_dataset(tmp_path / "old.nc")
+    assert sorted(data) == ["energy", "translation_error_clearance"]
+    assert data.translation_error_clearance.values.tolist() == [1.0, 2.0]
+    assert data.attrs == {"clearance": "worst", "assumption": "free"}
+
+
+def test_a_pose_error_by_the_old_word_for_its_assumption(posture):
+    forced = ff.solve_assembly(posture)
+    with pytest.warns(FutureWarning, match="bound_pose_error.assumption='free'"):
+        found = ff.bound_pose_error(forced, reading="free")
+    expected = ff.bound_pose_error(forced, assumption="free")
+    assert found.assumption == "free"
+    with pytest.warns(FutureWarning, match=r"is now PoseError\.assumption"):
+        assert found.reading == "free"
+    np.testing.assert_array_equal(found.rotation_error, expected.rotation_error)
+
+
+def test_a_sweep_in_the_words_of_the_last_release(tmp_path):
+    """Options, question and answer apart; the file has what memory has."""
+    new = ff.sweep(
+        "five_bar", grid="tx=0:0.02:0.02,ty=0.13", assumption="free",
+        wrench_of=["left.elbow"], state="contact",
+        quantities=["default", *BY_CLEARANCE],
+    )  # fmt: skip
+    with pytest.warns(FutureWarning):
+        SweepOptions, ask_sweep, run_sweep, sweep_in_memory = (
+            getattr(ff, name)
+            for name in ("SweepOptions", "ask_sweep", "run_sweep", "sweep_in_memory")
+        )
+    options = SweepOptions(
+        grid="tx=0:0.02:0.02,ty=0.13", reading="free", play_alone=True,
+        wrench=["left.elbow"], tangent="contact",
+    )  # fmt: skip
+    xarray.testing.assert_identical(
+        sweep_in_memory(ask_sweep("five_bar", options)), new
+    )
+    run_sweep(ask_sweep("five_bar", options), tmp_path / "old.nc")
+    xarray.testing.assert_identical(ff.open_dataset(tmp_path / "old.nc"), new)
+    assert SweepOptions(linearisation=True).quantities == ("default", *FINITE)
+    assert SweepOptions(stiffness=True).state == "nominal"
+    assert SweepOptions(stiffness=False).state is None
