@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from forcefit.commands.inspect import CampaignArgument
-from forcefit.commands.options import JsonOption, RobotArgument
+from forcefit.commands.options import FigureOption, JsonOption, RobotArgument
 from forcefit.inputs.errors import BadInput, nearest, quoted
 from forcefit.inputs.writing import (
     PICTURE,
@@ -243,9 +243,7 @@ def explain(
         list[str] | None,
         typer.Option(help="Range of a variable: q.drive=-1:1,cov.tilt=0:0.1."),
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also plot the curves, as PNG, SVG or PDF.")
-    ] = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """Show the functions of a robot's file as curves.

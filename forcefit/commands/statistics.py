@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from forcefit.commands.options import (
+    FigureOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -102,9 +103,7 @@ def statistics(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also plot histograms, as PNG, SVG or PDF.")
-    ] = None,
+    figure: FigureOption = None,
     report: ReportOption = None,
     csv: CsvOption = None,
     json: JsonOption = None,
@@ -246,9 +245,7 @@ def tolerances(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also plot the tolerances, as PNG, SVG or PDF.")
-    ] = None,
+    figure: FigureOption = None,
     report: ReportOption = None,
     csv: CsvOption = None,
     json: JsonOption = None,

@@ -9,13 +9,12 @@ import typer
 
 from forcefit.commands.library import library
 from forcefit.commands.link_exchange import export, import_
-from forcefit.commands.options import JsonOption
+from forcefit.commands.options import FigureOption, JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.stiffness_options import (
     Accuracy,
     Base,
     Density,
-    Figure,
     Height,
     InnerRadius,
     Kind,
@@ -255,7 +254,7 @@ def compare(
     unit: Unit = "m",
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
-    figure: Figure = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """K_E by finite elements beside a beam, entry by entry.
@@ -313,7 +312,7 @@ def slenderness(
     ratios: Annotated[str, typer.Option(help="L / r, two or more.")] = "5,10,20,40",
     accuracy: Accuracy = 0.002,
     interface: Kind = "rigid",
-    figure: Figure = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """Beam beside finite elements over L / r: the end effect.
@@ -375,7 +374,7 @@ def stress(
     unit: Unit = "m",
     accuracy: Accuracy = 0.005,
     interface: Kind = "rigid",
-    figure: Figure = None,
+    figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
     """Peak von Mises stress, away from the clamped edges.

@@ -56,4 +56,3 @@ Masses = Annotated[
     typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
 ]
 TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]
-Figure = Annotated[Path | None, typer.Option(help="Plot it (png, svg, pdf).")]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from forcefit.commands.options import (
+    FigureOption,
     GravityOption,
     JsonOption,
     LoadOption,
@@ -135,9 +136,7 @@ def sweep(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also plot it, as PNG, SVG or PDF.")
-    ] = None,
+    figure: FigureOption = None,
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:

@@ -13,6 +13,7 @@ from forcefit.commands.exchange import import_, iso
 from forcefit.commands.generate import generate
 from forcefit.commands.inspect import inspect
 from forcefit.commands.options import (
+    FigureOption,
     GravityOption,
     JointOption,
     JsonOption,
@@ -143,9 +144,7 @@ def crosscheck(
         typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
     ] = None,
     json: JsonOption = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also plot the slopes, as PNG, SVG or PDF.")
-    ] = None,
+    figure: FigureOption = None,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="[s] for each simulation.")
     ] = 600.0,
@@ -259,10 +258,7 @@ def validity(
         Path | None, typer.Option(help="At every pose of a CSV: pose.tx .. or q.*.")
     ] = None,
     json: JsonOption = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(help="Also plot the stiffness's errors, as PNG, SVG or PDF."),
-    ] = None,
+    figure: FigureOption = None,
 ) -> None:
     """What the model's assumptions cost a robot.
 
