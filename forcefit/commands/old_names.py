@@ -1,6 +1,7 @@
 """Old names of options: each works for one release, with a line on stderr.
 
-The commands themselves know the new names only; ``--help`` shows no others.
+The commands themselves know the new names only; ``--help`` shows no others.  Those that
+the public formats name stay for good, and nothing is said of them.
 """
 
 import sys
@@ -46,6 +47,8 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness beam": {"--axis": ("--along",)},
 }
 
+STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
+
 
 def with_new_names(words: Sequence[str]) -> list[str]:
     """Replace options given by their old names, each reported on stderr once.
@@ -66,7 +69,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
             new_words.append(word)
             continue
         new = renamed[option]
-        if option not in reported:
+        if option not in reported and option not in _staying(words):
             print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
         reported.append(option)
         new_words += [*new[:-1], new[-1] + equals + value]
@@ -78,6 +81,11 @@ def _parts(word: str) -> tuple[str, str, str]:
     if word.startswith("--") or not word.startswith("-"):
         return word.partition("=")
     return word[:2], "=" * bool(word[2:]), word[2:]
+
+
+def _staying(words: Sequence[str]) -> list[str]:
+    """Old options of the command that the public formats name."""
+    return [old for command, old in STAY if list(words[:2]) == command.split()]
 
 
 def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
