@@ -5,10 +5,12 @@ with the program that holds it.  A killed one leaves ``FILE.lock``, which the ne
 away.
 """
 
+import atexit
 import errno
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP}  # some network disks
 _POLL = 0.01  # [s] between looks at a file that another program has locked
@@ -46,19 +48,39 @@ def _lock(own: Path, wait: bool) -> Generator[None, None, None]:
         yield
         return
     lock = FileLock(own, thread_local=False, poll_interval=_POLL)
+    _locks[id(lock)] = lock, own
+    new = not own.exists()
     try:
         try:
             lock.acquire(timeout=-1 if wait else 0)
         except Timeout:
             raise BlockingIOError(errno.EWOULDBLOCK, "locked", str(own)) from None
-        except OSError as error:
-            if error.errno not in _NO_LOCKS:
+        except BaseException as error:  # a full disk, or a signal
+            if new and not lock.is_locked:
+                own.unlink(missing_ok=True)
+            if getattr(error, "errno", None) not in _NO_LOCKS:
                 raise
         yield
     finally:
-        # while it is held: who waits for it sees that it is gone, and makes another;
-        # where no open file can be removed (Windows), releasing it does that
-        if lock.is_locked:
-            with suppress(OSError):
-                own.unlink()
-            lock.release()
+        _release(lock, own)
+        del _locks[id(lock)]
+
+
+# a signal may come before a lock is released: what is left is released at the end
+_locks: dict[int, tuple[Any, Path]] = {}
+
+
+@atexit.register
+def _release_all() -> None:
+    for lock, own in list(_locks.values()):
+        _release(lock, own)
+
+
+def _release(lock: Any, own: Path) -> None:
+    """Remove a lock's file, and release it; that of another program stays."""
+    # while it is held: who waits for it sees that it is gone, and makes another;
+    # where no open file can be removed (Windows), releasing it does that
+    if lock.is_locked:
+        with suppress(OSError):
+            own.unlink()
+        lock.release()
