@@ -164,6 +164,6 @@ def moreau_batched(postures: list[Posture]) -> float:
 
 
 def cvxpy_rebuilt(posture: Posture) -> object:
-    """As printed, in SI units, built anew."""
+    """As printed, in SI units, built again."""
     as_printed._UNIT = 1.0
     return as_printed.energy_as_printed(posture)

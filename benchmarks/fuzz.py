@@ -1,4 +1,4 @@
-"""Gives every reader and every command's options what nobody should, and counts.
+"""Gives every reader and every command's options invalid input, and count the failures.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
 [--every-option]``. Each input is a sound command of ``fuzz_seeds.py``,

@@ -1,4 +1,4 @@
-"""What is wrong with the result of a command that was given what nobody should."""
+"""What is wrong with the result of a command that was given invalid input."""
 
 import json
 import re

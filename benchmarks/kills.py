@@ -6,7 +6,7 @@ diagnose``, run in children forked from a process in which everything is importe
 compiled. They are stopped by SIGKILL, SIGTERM or Ctrl-C, or their disk is full: files
 may not grow beyond a random size, or the folder is a small tmpfs where mounting one is
 allowed. Between, journals are cut or one of their bits is turned. Then the same command
-runs to its end, and its files are compared with those of a run that nobody disturbed.
+runs to its end, and its files are compared with those of an undisturbed run.
 
 Lost is a point that a child had put into the journal, that no cut or turned bit hit,
 and that is not there or is solved again. Half-written is a file that stands under its
@@ -207,7 +207,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
     counts["journals with a bit turned"] += 1
     content[at] ^= 1 << random.randrange(8)
     if not sound and (at <= content.find(b"\n") or b"\n" not in content):
-        path.unlink()  # nothing in it says whose it is: refused, and begun anew
+        path.unlink()  # nothing in it says whose it is: refused, and begun again
         return 0
     path.write_bytes(content)
     return sum(points for start, end, points in sound if not start <= at < end)

@@ -5,7 +5,7 @@
 
 The default tests of all folders and ``tests/test_answers.py`` run once, traced: which
 test passes which line, and how long it takes (kept in the folder after --traced, and
-traced anew where a test has changed; what was traced of a file that has changed since
+traced again where a test has changed; what was traced of a file that has changed since
 is of no use).  Then the tests that pass a fault's line run, the nearest and shortest
 first, as many as take S seconds; the first failure is enough.  A fault that longer or
 other tests would see counts as survived.

@@ -183,7 +183,7 @@ def importers(path: Path) -> list[Path]:
 def traced(tree: Path, kept: Path) -> Trace:
     """The default tests of each folder, traced, or what an earlier call left of them.
 
-    A folder of which a test has changed since is traced anew.
+    A folder of which a test has changed since is traced again.
     """
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}

@@ -1,6 +1,6 @@
 """Questions of every kind, and their answers as numbers that can be stored.
 
-    python -m tests.answers_for_tests [NAME ...]    # stores answers anew: all, or these
+    python -m tests.answers_for_tests [NAME ...]    # stores all answers, or these
 
 Stored numbers prove nothing about mechanics; the laws beside them do.  They tell that a
 change which was to change nothing changed nothing.  Left out is what rounding decides:

@@ -86,7 +86,7 @@ def measure(folder, seed=0, configurations=16, passes=4, temperature=None, devic
             **effects):  # fmt: skip
     """A campaign in a folder, and what was read: interleaved, loads in the plane.
 
-    ``device`` is the (Rotation, shift) of a measuring frame that nobody knows;
+    ``device`` is the (Rotation, shift) of an unknown measuring frame;
     ``stand`` [sigma] yields with the square of the load; ``outliers`` are rows.
     """
     rng = np.random.default_rng(seed)

@@ -262,7 +262,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, lengthened until nobody has it."""
+    """The name, lengthened until it is unique."""
     while name in taken:
         name += "_"
     return name

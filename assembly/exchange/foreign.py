@@ -108,7 +108,7 @@ def _closed(
     Args:
         mechanism: as it was read.
         source: its file.
-        beside: the loops file if nobody may have decided the types in it: its loops
+        beside: the loops file if the types in it may be generated defaults: its loops
             are taken for points where they cannot close otherwise.  None otherwise.
 
     Returns:

@@ -57,7 +57,7 @@ class LoopsFile:
 
     @property
     def as_generated(self) -> bool:
-        """Whether no loop is said to be a point, which may be nobody's decision."""
+        """Whether no loop is declared a point, as in a generated file."""
         return bool(self.pairs) and not any(self.points)
 
 

@@ -1,6 +1,6 @@
 """A small TOML laid over a converted robot: elasticity, clearances, tolerances.
 
-The robot's own file may then be made anew, by a CAD program say, and what was measured
+The robot's own file may then be made again, by a CAD program say, and what was measured
 or looked up stays where it is.
 """
 

@@ -1,4 +1,4 @@
-"""Elements that nobody here knows, and whether they may tie bodies to one another."""
+"""Elements of unknown type, and whether they may tie bodies to one another."""
 
 from collections.abc import Container, Mapping
 

@@ -3,8 +3,8 @@
 
 #include "records.h"
 
-// (22) and (21) of every point.  Lanes that nobody needs cost time, and what two lanes
-// touch fits into the fastest cache: the same bits sooner where there are one or two.
+// (22) and (21) of every point.  Unused lanes cost time, and what two lanes
+// touch fits into the fastest cache: bit-identical results sooner for one or two points.
 namespace few_lanes {
 void assemble_all(const Robot &robot, const Points &points, Solutions &out);
 void all_margins(const Robot &robot, const Points &points, Margins &out);

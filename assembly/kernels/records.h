@@ -29,8 +29,8 @@ struct Points {
     int64_t own_posture, own_errors, own_loads;
 };
 
-// Problem (22), one row a point: `out` of assembly/linear/lanes.py; no `elastic` where
-// nobody asks.
+// Problem (22), one row a point: `out` of assembly/linear/lanes.py; `elastic` only
+// where it is requested.
 struct Solutions {
     int64_t *outcome;
     double *energy, *bound, *without_clearance, *work, *platform_screw, *clearances,

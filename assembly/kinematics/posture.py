@@ -128,7 +128,7 @@ def together(postures: Sequence[Posture]) -> Posture:
 
 @dataclass(frozen=True)
 class Unchanged:
-    """An array that nobody changes, so that what is made of it is made once."""
+    """Return a read-only array, so that results derived from it can be cached."""
 
     numbers: NDArray
 

@@ -3,7 +3,8 @@
 With its drives locked a robot keeps as many freedoms as its closures leave.  Where it
 keeps more than at the postures near by, these closures are dependent at first order
 only: small errors move the robot far, or not at all, and equations (17) to (27), which
-are linear in them, answer neither whether it goes together nor how far off it is.
+are linear in them, answer neither whether the robot can be assembled nor how large its
+errors are.
 Operation modes meet there (Zlatanov, Bonev, Gosselin 2002).
 
 Begin with :func:`is_singular`.

@@ -75,7 +75,7 @@ class FrameLoads:
 
 @lru_cache(maxsize=32)
 def no_loads(size: int) -> FrameLoads:
-    """No loads at all; one object for all who ask, which nobody may write.
+    """Return a shared, read-only zero load.
 
     Args:
         size: 6n, of a robot of n frames.

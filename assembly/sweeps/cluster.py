@@ -173,7 +173,7 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Of all workers, asked each time anew: clusters grow and shrink."""
+    """Of all workers, asked at each call: clusters grow and shrink."""
     from distributed.comm import CommClosedError
 
     try:

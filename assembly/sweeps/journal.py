@@ -216,7 +216,7 @@ def _difference(first_line: bytes, header: bytes) -> str:
     if check != b"%08x" % zlib.crc32(line):
         return (
             "the first line does not fit its check sum: a damaged journal, or one of "
-            "another version; expected this sweep's (delete it to begin anew)"
+            "another version; expected this sweep's (delete it to begin again)"
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]

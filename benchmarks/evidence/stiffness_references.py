@@ -3,7 +3,7 @@
 ``python benchmarks/evidence/stiffness_references.py [link ...]`` (``pip install
 ngsolve``)
 
-The solids are built once more from the dimensions in ``meshes/make.py``, meshed by
+The solids are built again from the dimensions in ``meshes/make.py``, meshed by
 Netgen with thin layers of elements along the singular edges of the interfaces, curved,
 and solved with polynomials of rising order; nothing is shared with our elements, meshes
 or estimates.  Printed beside each K is its distance from the sharper references of

@@ -74,7 +74,7 @@ def given(name):
 
 
 def ours(name, accuracy):
-    """From the surface to K, and the last mesh once more by itself."""
+    """From the surface to K, and the last mesh again by itself."""
     from stiffness.fem.condensation import condense
     from stiffness.fem.fea import Budget, FemOptions, solve_link
     from stiffness.fem.material import Material

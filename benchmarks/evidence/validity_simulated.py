@@ -1,4 +1,4 @@
-"""The costs of ``crosscheck_validity.py`` once more, by the multibody simulation.
+"""The costs of ``crosscheck_validity.py`` again, by the multibody simulation.
 
 Run ``python benchmarks/evidence/validity_simulated.py``: some two minutes; it prints
 the last table of ``docs/validity.md``.  Beams bend geometrically exactly, weight acts

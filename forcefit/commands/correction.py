@@ -170,7 +170,7 @@ def _warned(commands: "Campaign") -> dict[str, Any]:
 
 
 def _left(path: Path) -> dict[str, float]:
-    """What a diagnosis left on rows kept aside, from its answer."""
+    """What a diagnosis left on the held-out rows, from its answer."""
     from json import loads
 
     from forcefit.inputs.table import read_text

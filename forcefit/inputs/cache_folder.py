@@ -52,7 +52,7 @@ def _of_user() -> Path:
 
 
 def _temporary() -> Path:
-    """The user's own folder among the temporary files, which nobody else may write."""
+    """The user's own folder among the temporary files, writable by this user only."""
     # numbers of other programs are read from it
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"forcefit-{user}"

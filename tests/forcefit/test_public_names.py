@@ -29,7 +29,7 @@ def stub_of(owners):
 
 
 def test_the_stub_says_what_the_table_says():
-    """Write it anew: python -m tests.forcefit.test_public_names."""
+    """Write it again: python -m tests.forcefit.test_public_names."""
     assert STUB.read_text(encoding="utf-8") == stub_of(ff._OWNERS)
 
 

@@ -55,7 +55,7 @@ class Carried:
         held: [m] the same with the robot's own numbers as they were saved.
         open_: names of the values that are known least, if they do not suffice.
         left_behind: what changed with time where the robot was learned, and is not
-            fitted here: without a clock nobody can say how it goes on.
+            fitted here: without a clock its course is unknown.
     """
 
     session: str | None

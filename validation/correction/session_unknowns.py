@@ -1,4 +1,4 @@
-"""What of a robot belongs to one session, and is fitted anew to the next.
+"""What of a robot belongs to one session, and is fitted again to the next.
 
 Where the device stands; if asked for, the measured point and the zeros of the joints;
 and whatever changed with time, the effect ``drift`` and functions of time.  A slow wave
@@ -31,7 +31,7 @@ from assembly.model.robot import Robot
 
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
-_ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set anew
+_ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set again
 _SETTLING = ("lag", "creep")  # of time: they begin with the session
 _STEP = 1e-6  # [rad, m] of what is no drift
 _CONSTANT = "time_constant"

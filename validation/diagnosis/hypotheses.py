@@ -124,7 +124,7 @@ def _choices(
 ) -> Iterator[list[Unknown]]:
     """Subsets of the unknowns of an effect of the whole, the whole set first."""
     if effect.follows_load:
-        # an offset in a direction never loaded belongs to another story
+        # an offset in a direction never loaded belongs to another candidate model
         kept = {f"offset.{name}" for name in loads}
         unknowns = tuple(
             u for u in unknowns if u.name in kept or "offset." not in u.name
@@ -233,7 +233,8 @@ def with_sessions(
     """Return hypotheses, and those that may differ from session to session.
 
     Where there are several sessions, each effect of :data:`PER_SESSION` and ``further``
-    that shares no number among frames stands once more, with numbers for every session.
+    that shares no number among frames is listed a second time, with
+    numbers for every session.
     """
     if len(sessions) < 2:
         return list(listed)

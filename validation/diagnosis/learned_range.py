@@ -1,7 +1,7 @@
 """Where a machine was measured when its robot file was made, and rows beyond that.
 
 A function of a covariate, and any other effect, is known where that covariate has been.
-A joint that has turned once more stands where it stood: its angle is compared modulo a
+A joint that has made a full turn is where it was: its angle is compared modulo a
 turn, unless the file has a function of it that does not repeat after a turn.
 """
 

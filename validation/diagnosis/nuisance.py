@@ -1,6 +1,6 @@
-"""Nuisance parameters: small unknowns that every machine has, geometry and springs.
+"""Nuisance parameters: geometric errors and compliances that every machine has.
 
-Nobody makes a frame exactly where it was drawn, and nothing is rigid.  Each of these
+No frame is made exactly where it was drawn, and nothing is rigid.  Each of these
 unknowns has a Gaussian prior about what is declared: from the frame's ``tolerance``, or
 of one size for all of a group that the readings are asked for.
 """

@@ -26,7 +26,7 @@ from validation.diagnosis.nuisance import (
 )
 
 _GIVES = 0.2  # [rad, sizes] that nothing gives under the largest load
-_MADE = (0.1, 0.02)  # [rad, sizes] geometric errors: nobody makes frames worse
+_MADE = (0.1, 0.02)  # [rad, sizes] largest geometric errors of a manufactured frame
 _HOT = 150.0  # [K] away from calibration: no machine is measured there
 _G = 9.81  # [m/s^2]
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}

@@ -93,7 +93,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # a function that may as well not be there is not kept
+        # a function whose absence predicts as well is not kept
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]

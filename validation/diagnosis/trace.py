@@ -247,7 +247,7 @@ def _errors(fit: MachineFit) -> NDArray:
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """(R,) bool, fitted rows so far off that the others must be looked at alone."""
+    """(R,) bool, fitted rows that are outliers: the others are then examined alone."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)

@@ -118,7 +118,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Readings of targets; where nobody names the only one, all are of it."""
+    """Readings of targets; without a name, all are of the only target."""
     ours = []
     for reading in readings:
         named = [part for part in reading.names if part in targets]

@@ -15,7 +15,7 @@ from validation.inspection.repeat_remarks import on_repeats
 from validation.inspection.repeats import RepeatNoise
 
 _EXPANSION = 2.4e-5  # [1/K] aluminium, about the most a machine's body expands
-_TOGETHER = 0.9  # correlation above which two covariates tell one story
+_TOGETHER = 0.9  # correlation above which two covariates count as one
 _UNIT = 0.02  # of the robot: larger deviations are hardly manufacturing errors
 
 

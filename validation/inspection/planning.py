@@ -40,7 +40,7 @@ _BETTER = 1e-3  # in the criterion
 _AVERAGE = 20  # draws of random rows that the plan is compared with
 _PACE = 60.0  # [s] a row takes
 _SWING = 2400.0  # [s] in which a machine warms and cools
-_FEWEST = 8  # rows and configurations: fewer cannot be judged by rows kept aside
+_FEWEST = 8  # rows and configurations: fewer cannot be judged by held-out rows
 
 
 @dataclass(frozen=True, eq=False)

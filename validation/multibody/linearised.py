@@ -163,7 +163,7 @@ def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
     whole = V @ _solve(_held(model, K, V), V.T)
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
-    # what moves the idle springs alone, such as a rod that rolls, is nobody else's
+    # what moves the idle springs alone, such as a rod that rolls, moves no other body
     ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
     ways = coupled @ ways / np.sqrt(held)
     return whole[:6, :6] + k * ways @ ways.T

@@ -3,7 +3,7 @@
 Every body is placed open and stress-free, with its full geometric error; the closures
 are then closed by force, and Exudyn finds the static equilibrium with finite
 rotations.  Nothing but the robot's data and its joint coordinates is shared with the
-virtual-joint model: placement, beams and equilibrium are found anew.
+virtual-joint model: placement, beams and equilibrium are found again.
 
 At a frame the body's error comes first, then the link's deformation, then the joint's,
 as in the paper; rotation vector and translation of an error are both in the frame's

@@ -243,7 +243,7 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """The effect scaled; drawn anew where the readings hardly show what was drawn."""
+    """The effect scaled; drawn again where the readings hardly show what was drawn."""
     # a force whose line meets a drive's axis does not load its spring, say
     for _ in range(_DRAWS - 1):
         try:

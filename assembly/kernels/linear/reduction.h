@@ -268,7 +268,7 @@ inline Row Reduction::least_motions(int rank, const Row &moved) {
             least[i] /= free.diagonal[i];
         }
     } else {
-        // the triangle's columns, as rows, triangulated once more
+        // the triangle's columns, as rows, triangulated again
         Triangle R(rank, nq);
         for (int i = 0; i < rank; ++i) {
             R.F[i][i] = free.diagonal[i];

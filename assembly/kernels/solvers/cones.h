@@ -318,7 +318,7 @@ inline Whole Solver::interior_point(
         // lanes that have ended stay where they are
         for (int j = 0; j < k.nu; ++j) u[j] = going ? u[j] + length * du[j] : u[j];
         for (int c = 0; c < k.count; ++c) z0[c] = going ? z0[c] + length * dz0[c] : z0[c];
-        // the balance holds by construction; computed anew it cannot drift
+        // the balance holds by construction; computed again it cannot drift
         multiply(q.M.rows(), r, u.data(), k.nu, y.data());
         for (int i = 0; i < r; ++i) y[i] += q.h[i];
         for (int i = r; i < m; ++i) y[i] = going ? y[i] + length * right[i] : y[i];

@@ -21,5 +21,5 @@ paper      what                                        where
 
 ``closure.py`` and ``assembled.py`` stand in the folder above: the compiled methods
 have them in common.  Cone programmes are :mod:`assembly.solvers.conic`'s.
-``as_printed.py`` has (21) and (22) once more, as the paper prints them, in cvxpy.
+``as_printed.py`` has (21) and (22) again, as the paper prints them, in cvxpy.
 """

@@ -1,4 +1,4 @@
-"""Problems (21) and (22) once more, written in cvxpy as the paper prints them.
+"""Problems (21) and (22) again, written in cvxpy as the paper prints them.
 
 Slow and simple on purpose: every screw of every frame is a variable, every constraint
 an equation of the paper.  :mod:`assembly.linear.energy` and

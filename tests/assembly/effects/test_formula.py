@@ -38,7 +38,7 @@ def test_a_formula_has_the_value_that_python_gives_it(text):
     "q; q", "1j", "a and b", "q % 2", "q // 2",
 ])  # fmt: skip
 def test_what_is_no_formula_is_refused(text):
-    if text == "sin":  # a name like any other, which nobody declares
+    if text == "sin":  # a name like any other, which is not declared
         assert names_in(parse_formula(text)) == ["sin"]
     elif text.startswith("(("):  # brackets alone are no depth
         assert names_in(parse_formula(text)) == ["q"]

@@ -97,7 +97,7 @@ def test_springs_carry_what_the_closures_transmit():
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_energy_falls_with_errors_as_the_wrenches_say(seed):
-    """dE / d(delta l) = -force: the first body longer, against solving anew."""
+    """dE / d(delta l) = -force: the first body longer, against solving again."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
     answer = solve_exact(home_posture(robot))
@@ -226,10 +226,10 @@ def test_from_a_solution_nearby_there_are_fewer_steps_to_the_same_one():
     posture = loaded_arm().posture
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
     before = solve_exact(posture, load)
-    anew = solve_exact(posture, 1.01 * load)
+    again = solve_exact(posture, 1.01 * load)
     near = solve_exact(posture, 1.01 * load, near=before)
-    assert near.platform_screw == pytest.approx(anew.platform_screw, rel=1e-9)
-    assert near.iterations <= anew.iterations
+    assert near.platform_screw == pytest.approx(again.platform_screw, rel=1e-9)
+    assert near.iterations <= again.iterations
     again = solve_exact(posture, load, near=before)
     assert again.iterations <= 2
     other = solve_exact(home_posture(load_robot("five_bar")), [0, 0, 0, 1, 0, 0])

@@ -406,7 +406,7 @@ def test_a_platform_may_have_the_name_of_its_joint(tmp_path):
 
 
 def test_file_of_thousands_of_joints_is_refused_at_once(tmp_path):
-    """As a robot file is; such a chain used to take minutes."""
+    """As a robot file is, in seconds also for a long chain."""
     steps = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous">'
         f'<parent link="l{i}"/><child link="l{i + 1}"/></joint>'

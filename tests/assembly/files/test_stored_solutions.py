@@ -1,4 +1,4 @@
-"""Solutions of mesh links on disk: the same bits, and only for the same question."""
+"""Solutions of mesh links on disk: bit-identical, and only for the same question."""
 
 import os
 import subprocess

@@ -243,7 +243,7 @@ frames = ["end", "meets"]
 
 
 @pytest.fixture(scope="module")
-def rattling(tmp_path_factory):
+def with_clearance(tmp_path_factory):
     """A slide whose play lets its platform hang loose, 24 readings of noise."""
     rng = np.random.default_rng(1)
     rows = [
@@ -257,10 +257,10 @@ def rattling(tmp_path_factory):
 
 @pytest.mark.parametrize("command", ["inspect", "diagnose"])
 def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
-    command, rattling, tmp_path, run
+    command, with_clearance, tmp_path, run
 ):
     target = tmp_path / "found.json"
-    status, said, err = run("validation", command, rattling, "--json", target)
+    status, said, err = run("validation", command, with_clearance, "--json", target)
     assert status == 0, err
     assert "clearances leave the pose free in 24 of 24 rows" in said
     assert "in a closed chain the nearest to nominal" in said

@@ -88,7 +88,7 @@ def test_a_direction_is_that_of_the_last_step_within_its_session(rng):
 
 
 def test_sessions_stay_in_their_order_and_rows_in_that_of_time(rng):
-    """Each session begins anew, wherever its rows stand in the table."""
+    """Each session begins again, wherever its rows stand in the table."""
     session = np.array([1, 0, 1, 0, 1])
     time = np.array([5.0, 2.0, 1.0, 1.0, 3.0])
     history, row = in_order({"time": time, "u": time}, session)

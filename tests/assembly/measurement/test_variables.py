@@ -37,7 +37,7 @@ def rows(rng):
 
 def test_each_name_is_a_number_of_the_row(rows):
     """Positions are those of the platform; covariates with their prefix or, three of
-    them, without; of what nobody gave nothing is known."""
+    them, without; a quantity that is not given is unknown."""
     here, commands, known = rows
     expected = {"q.turn": commands[:, 0], "q.slide": commands[:, 1], "q.tip": [0.0] * 4}
     for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):

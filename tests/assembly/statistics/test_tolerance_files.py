@@ -170,7 +170,7 @@ def test_errors_that_need_no_clearance_have_no_share_of_it():
 
 
 def test_present_errors_times_their_factor_just_fit():
-    """The margin is proportional: solved anew with the scaled errors it is 1."""
+    """The margin is proportional: solved again with the scaled errors it is 1."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
     found = present_errors(postures)

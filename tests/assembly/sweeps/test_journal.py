@@ -319,7 +319,7 @@ COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "-
 def start_command(folder, *words):
     """The command in a process group of its own, stopped once its journal has grown."""
     path = folder / "map.nc"
-    errors = folder.parent / f"{folder.name}.txt"  # a pipe that nobody reads fills
+    errors = folder.parent / f"{folder.name}.txt"  # a pipe that is not read fills
     with (
         errors.open("w+") as stderr,
         subprocess.Popen(

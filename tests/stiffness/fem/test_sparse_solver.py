@@ -1,4 +1,4 @@
-"""Sparse systems solved, the solver chosen, the cost foretold."""
+"""Sparse systems solved, the solver chosen, the cost predicted."""
 
 import sys
 
@@ -12,7 +12,7 @@ from stiffness.fem.sparse_solver import _mkl, solve, solver_name
 
 @pytest.fixture
 def chosen():
-    """The solver's name, looked for anew in the test and after it."""
+    """The solver's name, looked for again in the test and after it."""
     solver_name.cache_clear()
     yield solver_name
     solver_name.cache_clear()

@@ -191,7 +191,7 @@ def test_a_drift_is_fitted_anew_to_set_up_rows_over_the_day(machine, run):
 
 
 def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
-    """As large as it was, 2e-4 m: half an hour later nobody knows."""
+    """As large as it was, 2e-4 m: half an hour later it is unknown."""
     folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
     with_a_wave(machine, 2e-4, 2e-4)
     code, said, (day,), _ = carried(run, machine, folder, "--setup", "10")

@@ -66,7 +66,7 @@ def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
 
 
 def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
-    """Only a + b was known; dry rows tell a anew, and b makes up for it where wet."""
+    """Only a + b was known; dry rows tell a again, and b makes up for it where wet."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8

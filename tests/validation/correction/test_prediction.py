@@ -1,4 +1,4 @@
-"""Readings foretold: those of the model, under the campaign's names."""
+"""Readings predicted: those of the model, under the campaign's names."""
 
 import csv
 from math import cos, sin

@@ -23,7 +23,7 @@ def posture(irsbot2):
 def broken(monkeypatch):
     """Breaks a term; columns made before it broke, or while it was, are forgotten.
 
-    In the model in numpy: the compiled one has each term once more.
+    In the model in numpy: the compiled one has each term a second time.
     """
     from assembly.linear.closure import _virtual_joints
     from assembly.linear.energy import solve_assembly

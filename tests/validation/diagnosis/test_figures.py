@@ -41,7 +41,7 @@ def test_the_page_names_the_row_and_what_is_drawn(diagnosed):
 
 
 def test_without_rows_held_out_nothing_is_drawn(diagnosed):
-    nobody = np.zeros(len(diagnosed.campaign), bool)
-    none = replace(diagnosed, held=replace(diagnosed.held, folds=(nobody,)))
+    no_rows = np.zeros(len(diagnosed.campaign), bool)
+    none = replace(diagnosed, held=replace(diagnosed.held, folds=(no_rows,)))
     assert worst_row(none) == (-1, "")
     assert worst_robot(none) == ""

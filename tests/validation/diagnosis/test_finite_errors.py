@@ -1,4 +1,4 @@
-"""An arm whose frames are so far off that the squares of their errors show.
+"""An arm whose errors of frames are so large that the squares of their errors show.
 
 Its readings are products of homogeneous transforms, SciPy's; 1e-2 rad and 2 mm squared
 are ten times the noise.
@@ -61,7 +61,7 @@ def found():
 
 
 def test_large_errors_of_frames_are_explained_as_finite_motions(found):
-    """Down to the noise, also in rows kept aside; to first order they are 1.5 sigma."""
+    """Down to the noise, also in held-out rows; to first order they are 1.5 sigma."""
     assert (found.verdict, found.claimed) == ("explained", ())
     assert found.before.normalised > 500
     assert found.after.normalised == pytest.approx(1.0, abs=0.3)

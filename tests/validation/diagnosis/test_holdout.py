@@ -1,4 +1,4 @@
-"""Rows that judge: which they are, and which of two models foretells them better."""
+"""Rows that judge: which they are, and which of two models predicts them better."""
 
 import numpy as np
 import pytest

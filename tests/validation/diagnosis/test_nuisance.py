@@ -1,4 +1,4 @@
-"""Small unknowns of a loaded bar, worked out by hand, and what they add."""
+"""Nuisance parameters of a loaded bar, worked out by hand, and what they add."""
 
 from dataclasses import replace
 

@@ -34,7 +34,7 @@ def model(columns, std, z, wet):
 
 
 def refitted(columns, std, z, wet):
-    """Rms of parts foretold by the others: normal equations, a free constant."""
+    """Rms of parts predicted by the others: normal equations, a free constant."""
     X = np.column_stack([columns, np.ones(ROWS)])
     precision = np.diag([*(std**-2.0), 0.0])
     order = np.argsort(np.argsort(wet))

@@ -77,7 +77,7 @@ def test_a_device_reads_small_screws_where_and_as_it_stands():
 
 
 def test_a_row_without_a_solution_answers_nothing():
-    """A closed chain with an error that nobody knows; other rows are as before."""
+    """A closed chain with an unknown error; other rows are as before."""
     at = home_posture(five_bar())
     three = replace(
         at, coordinates=np.stack([at.coordinates] * 3),

@@ -15,7 +15,7 @@ from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
 def fitted(robot, parts, x, std):
-    """A machine with effects and small unknowns of known values."""
+    """A machine with effects and nuisance parameters of known values."""
     effects = tuple(Acting(p, np.zeros(1)) for p in parts if not isinstance(p, Small))
     small = tuple(p for p in parts if isinstance(p, Small))
     unknowns = Unknowns(robot, effects, small)

@@ -185,7 +185,7 @@ def test_a_bare_table_is_read_at_the_point_of_the_file(found, tmp_path, run):
 
 
 def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
-    """Of 120 rows that nobody measured before: by covariance and noise.
+    """Of 120 rows that were not measured before: by covariance and noise.
 
     720 readings whose errors of the model are common: five standard errors of 0.011.
     """
@@ -220,7 +220,7 @@ def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
     fresh = read(commanded(robot, 30, seed=11, reach=1.4), seed=12)
     told = predict(fresh)
     left = fresh.measured - told.prediction.deviation
-    # nothing is foretold surely in directions that were never seen
+    # nothing is predicted surely in directions that were never seen
     assert np.median(told.spread[:, 3:5]) > 3 * SIGMA[3]
     inside = np.abs(left) < 2.6 * np.hypot(told.spread, told.noise)
     assert np.mean(inside[:, 3:]) > 0.9

@@ -83,7 +83,7 @@ def test_what_is_not_there_is_not_said(shown):
 def test_one_step_alone_reduces_nothing(shown):
     """Where only rotations were read its rms is one of angles."""
     declared = step("declared", 0, 2e-6, 7.0, "rad")
-    assert [line.split() for line in shown(ladder=[declared])[-2:]] == [
+    assert [line.split() for line in shown(**{"ladder": [declared]})[-2:]] == [
         ["model", "unknowns", "rad", "sigma", "reduction"],
         ["declared", "0", "2e-06", "7"],
     ]

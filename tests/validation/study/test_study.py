@@ -230,7 +230,7 @@ def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_
     results = run_study(read_study(study_file(tmp_path, text)))
     assert results.verdicts == {"reference": "no signal", "crosscheck": "passed"}
     assert set(results.unchecked) == {"reference"}
-    assert results.passed  # nobody asked for the reference by name
+    assert results.passed  # the reference was not requested by name
     sentences = verdict(results)
     assert (
         "Checked independently: pose without clearances by a multibody "

@@ -1,0 +1,63 @@
+"""Find the words of plain_words.txt in sources and pages; exit status 1 if any.
+
+Run ``python .ci/plain_words.py`` at the root of the repository.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+LIST = Path(__file__).with_suffix(".txt")
+FOLDERS = (
+    ".ci", "assembly", "benchmarks", "docs", "examples", "forcefit", "meshes",
+    "stiffness", "tests", "validation",
+)  # fmt: skip
+SOURCES = {".py", ".h", ".cpp", ".md"}
+SKIPPED = {"CHANGELOG.md"}  # history keeps the words of its time
+
+
+def read_list(text):
+    """Return the sections of a word list: {section: {word: replacement}}."""
+    sections, words = {}, {}
+    for line in text.splitlines():
+        if line.startswith("["):
+            words = sections[line[1 : line.index("]")]] = {}
+        elif line and not line.startswith("#"):
+            word, _, plain = line.partition(" -> ")
+            words[word] = plain
+    return sections
+
+
+def find_words(text, words, names=()):
+    """Yield line number, word found and replacement; ``names`` are left out."""
+    for name in names:
+        text = text.replace(name, "")
+    # words of a phrase may be on two lines, with a comment's mark between them
+    gap = r"(?:\s|#|//)+"
+    phrases = [gap.join(map(re.escape, word.split())) for word in words]
+    for match in re.finditer(rf"\b(?:{'|'.join(phrases)})\b", text, re.IGNORECASE):
+        found = " ".join(re.sub(gap, " ", match[0]).lower().split())
+        yield text.count("\n", 0, match.start()) + 1, found, words[found]
+
+
+def main():
+    """Print every word that is found, with its file, line and replacement."""
+    sections = read_list(LIST.read_text("utf-8"))
+    paths = [*Path().glob("*.md")]
+    paths += [path for folder in FOLDERS for path in Path(folder).rglob("*")]
+    status = 0
+    for path in sorted(paths):
+        if path.suffix not in SOURCES or path.name in SKIPPED:
+            continue
+        words = dict(sections["everywhere"])
+        if path.suffix == ".md":
+            words |= sections["pages"]
+        text = path.read_text("utf-8")
+        for line, found, plain in find_words(text, words, sections["names"]):
+            print(f"{path}:{line}: {found!r}; write: {plain}")
+            status = 1
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,32 @@
+"""The check of private words in sources and pages finds them and nothing else."""
+
+import runpy
+from pathlib import Path
+
+CHECK = runpy.run_path(str(Path(__file__).parents[1] / ".ci" / "plain_words.py"))
+WORDS = {"side row": "held-out", "gizmo": "candidate model"}
+
+
+def found(text, *names):
+    """Return what the check finds in a text."""
+    return list(CHECK["find_words"](text, WORDS, names))
+
+
+def test_words_are_found_with_line_and_replacement():
+    text = "one\n# Gizmo of a side\n    # row\n"
+    assert found(text) == [
+        (2, "gizmo", "candidate model"), (2, "side row", "held-out"),
+    ]  # fmt: skip
+
+
+def test_parts_of_longer_names_are_not_found():
+    assert found("higizmo = gizmo_of(rows)") == []
+
+
+def test_names_of_public_formats_are_not_found():
+    assert found('row["gizmo"], a gizmo', '"gizmo"') == [(1, "gizmo", WORDS["gizmo"])]
+
+
+def test_sections_of_a_word_list_are_read_without_comments():
+    text = "# a\n[one]  # b\nx -> y\n\n[two]\nu v -> w\n"
+    assert CHECK["read_list"](text) == {"one": {"x": "y"}, "two": {"u v": "w"}}
