@@ -133,15 +133,13 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
     """The least energy when compliant joints turn freely about their own axis.
 
     Args:
-        assembly: of one point or of many.
+        assembly: of many points.
 
     Returns:
         The same points under the same loads, see ``"hinged"`` of
         :func:`assembly.linear.closure.virtual_joints`.
     """
     posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
-    if not assembly.of_many:
-        return least_energy(posture, load, loads, "hinged")
     return _solve_many(posture, assembly.errors, load, loads, "hinged", "compiled")
 
 
@@ -234,12 +232,11 @@ def _solve_many(
     count = len(sets) if len(T) == 1 else len(T)
     rows = _compiled(joints, structure, T, sets, off, acting, method)
     rows["excess"] = _excess_of(rows["clearances"], structure.starts)
-    held, within = np.zeros(0, dtype=int), rows
-    bounded, own_structure = structure_of(robot, compliant, bounded_motion=True)
-    if _bounds_matter(structure, rows["outcome"]).any():
-        held, within = _within_bounds(
-            bounded, own_structure, structure, (T, sets, off, acting), rows
-        )
+    held = _bounds_matter(structure, rows["outcome"])
+    within = None
+    if held.any():
+        given, own_joints = (T, sets, off, acting), (robot, compliant, True)
+        within = _within_bounds(*structure_of(*own_joints), held, given, rows)
     rows |= _unsaid(count)
     if len(T) == 1 and posture.transforms.ndim > 3:
         posture = posture[0]
@@ -251,7 +248,7 @@ def _solve_many(
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
     _certify(rows, points)
-    return points.with_held(held, bounded, within) if len(held) else points
+    return points if within is None else points.with_held(*within)
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
@@ -260,16 +257,16 @@ def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
 
 
 def _within_bounds(
-    joints: VirtualJoints, structure: Structure, without: Structure,
+    joints: VirtualJoints, structure: Structure, matter: NDArray,
     given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
-) -> tuple[NDArray, _Rows]:  # fmt: skip
+) -> tuple[NDArray, VirtualJoints, _Rows]:  # fmt: skip
     """Solve again points to which bounds of passive joints' own motion matter.
 
     Returns:
-        Which are solved now, and their rows with all bounds as cones; what both have is
-        written into ``rows`` too.
+        Which are solved now, with all bounds as cones, in which joints, and their rows
+        in these; what both have is written into ``rows`` too.
     """
-    held = np.flatnonzero(_bounds_matter(without, rows["outcome"]))
+    held = np.flatnonzero(matter)
     T, sets, off, acting = (
         part if part is None or len(part) == 1 else part[held] for part in given
     )
@@ -283,7 +280,7 @@ def _within_bounds(
     for name, part in again.items():
         own = rows[name].shape[1:] == part.shape[1:]
         rows[name][held] = part if own else np.nan
-    return held, again
+    return held, joints, again
 
 
 def _checked(

@@ -16,7 +16,7 @@ from assembly.linear.load import FrameLoads
 from assembly.model.point_results import N, PointResults, plain
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# what may be known beside a solution: properties, and parts of its certificate
+# what may be known besides the fields: properties, and parts of its certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",

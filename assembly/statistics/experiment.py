@@ -189,15 +189,14 @@ class Experiment:
             if self.clearance_model == "uniform":
                 rows["clearance_mixed"] = mixed
         rows["platform_screw"] = screws
+        at_tips = solved.frame_loads.at_tips
         wrenches = without_rounding(solved.wrenches)
         for name, part in (("moment", slice(0, 3)), ("force", slice(3, 6))):
-            through = wrenches[..., part] - self.energies.at_tips[..., part]
+            through = wrenches[..., part] - at_tips[..., part]
             sizes = np.sqrt((through**2).sum(axis=-1))
             rows[name] = sizes.max(axis=1)
         if self.links:
-            rows["stress"] = peak_stresses(
-                self.posture.robot, wrenches, self.energies.at_tips
-            )
+            rows["stress"] = peak_stresses(self.posture.robot, wrenches, at_tips)
         for name, zone in self.zones.items():
             rows[name] = zone.solve(errors).margin
         if self.stiffness:

@@ -106,13 +106,6 @@ class LinearResponse:
             return found.in_columns(self.joints)  # bounds of motions are cones here
         return found
 
-    @property
-    def at_tips(self) -> NDArray:
-        """(n, 6) [N m, N] the part of :meth:`wrenches` that is links' own weight."""
-        if self.loads is None:
-            return np.zeros((len(self.posture.robot.frames), 6))
-        return self.loads.at_tips
-
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
     """Errors of k draws.

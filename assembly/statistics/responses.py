@@ -50,9 +50,8 @@ def respond(
         slopes = prepared.slopes(margins)
         return margins.margin, slopes[:, sources.frame, sources.component]
     draws = prepared.solve(errors)
-    wrenches = draws.wrenches
     if key == "energy":
-        return draws.energy, -wrenches[:, sources.frame, sources.component]
+        return draws.energy, -draws.wrenches[:, sources.frame, sources.component]
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
     # without clearances in unit cones their active bounds are not known
@@ -64,9 +63,9 @@ def respond(
             size[solved], by_screw, by_clearance = _pose_error(
                 prepared, some, key, (clearance_model, contact_length), solved
             )
-            by_wrench = np.zeros_like(wrenches[solved])
+            by_wrench = np.zeros_like(errors[solved])
         else:
-            size[solved], by_wrench = _wrench_quantity(prepared, key, wrenches[solved])
+            size[solved], by_wrench = _wrench_quantity(some, key)
             by_screw, by_clearance = np.zeros_like(some.platform_screw), None
         slopes[solved] = solution_slopes(
             prepared, some, by_wrench, by_screw, by_clearance
@@ -97,25 +96,23 @@ def _pose_error(
     return size, slopes, None
 
 
-def _wrench_quantity(
-    prepared: LinearResponse, key: str, wrenches: NDArray
-) -> tuple[NDArray, NDArray]:
+def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
     """The largest moment, force or stress, and its slopes with the wrenches."""
+    wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
-    at_tips = prepared.at_tips
     if key != "stress":
         sizes, own = _size((wrenches - at_tips)[:, :, _PARTS[key]])
         worst = sizes.argmax(axis=1)
         slopes[draws, worst, _PARTS[key]] = own[draws, worst]
         return sizes[draws, worst], slopes
-    links = stressed_links(prepared.posture.robot)
+    links = stressed_links(some.posture.robot)
     each = [link.peak(wrenches[:, link.row], at_tips[link.row]) for link in links]
     peaks = np.stack(each, axis=1)
     worst = peaks.argmax(axis=1)
     for i, link in enumerate(links):
-        some = np.flatnonzero(worst == i)
-        slopes[some, link.row] = _stress_slopes(
-            link, wrenches[some, link.row], at_tips[link.row]
+        own = np.flatnonzero(worst == i)
+        slopes[own, link.row] = _stress_slopes(
+            link, wrenches[own, link.row], at_tips[link.row]
         )
     return peaks[draws, worst], slopes
 
