@@ -33,19 +33,13 @@ from assembly.statistics.ranking import (
     possible_ranks,
     rank_text,
 )
+from forcefit.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
 
-QUANTITIES = ("energy", "margin_free", "rotation", "translation", "force", "stress")
+EXPLAINED = ("energy", "margin_free", "rotation", "translation", "force", "stress")
 _ROWS = 15  # of the table
-_MEANINGS = {
-    "first_index": "share of the variance that a group explains alone",
-    "total_index": "share of the variance that involves a group",
-    "failed_share": "base draws left out, for a draw compared has no answer",
-    "part": "deviation of the platform's screw that involves a group, by component",
-    "gain": "exact slope of the platform's screw with the errors; NaN if rad and m",
-}
 
 
 @dataclass(frozen=True)
@@ -130,7 +124,7 @@ def importance_dataset(
     """
     import xarray
 
-    names = [q for q in QUANTITIES if q in (rows.dtype.names or ())]
+    names = [q for q in EXPLAINED if q in (rows.dtype.names or ())]
     if not experiment.links:
         names.remove("stress")
     columns = [rows[n].max(axis=1) if rows[n].ndim == 2 else rows[n] for n in names]
@@ -141,15 +135,15 @@ def importance_dataset(
     indices, moves = ("quantity", "group", "estimate"), ("component", "group")
     kept = slice(0, len(names))
     values = {
-        "first_index": (indices, importance.first[kept], "1"),
-        "total_index": (indices, importance.total[kept], "1"),
-        "failed_share": (("quantity", "group"), importance.failed[kept], "1"),
-        "part": (moves, part, "rad, m"),
-        "gain": (moves, gain, "rad or m for each rad or m"),
+        "first_index": (indices, importance.first[kept]),
+        "total_index": (indices, importance.total[kept]),
+        "failed_share": (("quantity", "group"), importance.failed[kept]),
+        "part": (moves, part),
+        "gain": (moves, gain),
     }
     data = {
-        key: (dims, value, {"units": unit, "long_name": _MEANINGS[key]})
-        for key, (dims, value, unit) in values.items()
+        key: (dims, value, QUANTITIES[key].attributes)
+        for key, (dims, value) in values.items()
     }
     labels = {
         "quantity": names, "group": list(importance.groups),

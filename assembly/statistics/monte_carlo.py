@@ -28,12 +28,13 @@ from assembly.statistics.importance_table import (
     importance_rows,
 )
 from assembly.statistics.perfect_parts import stored_perfect_parts
-from assembly.statistics.quantities import MEANINGS, POSE_ERRORS, UNITS
+from assembly.statistics.quantities import POSE_ERRORS
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.identity import program_hash, robot_hash
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.packages import need
+from forcefit.results.quantities import QUANTITIES, count
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
 
 BLOCK = 1024  # draws solved and journalled together
 # by axis: no limit is one number
-_UNITS = UNITS | {"stiffness": "N m/rad, N/m", "free_motion": "rad, m"}
 _QUEUED = 4  # blocks submitted ahead for each thread
 
 
@@ -204,21 +204,23 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     dims = {"platform_screw": ("draw", "screw"), "stress": ("draw", "link"),
             "stiffness": ("draw", "wrench_component"),
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
-    meanings = MEANINGS | {
-        k: f"{MEANINGS[k]}; "
-        f"{clearance_means(experiment.clearance_model, experiment.used_contact_length)}"
-        for k in POSE_ERRORS
+    known = {
+        **QUANTITIES,
+        "stiffness": QUANTITIES["axis_stiffness"],
+        "status": count("status", meaning="0 solved, 1 no answer"),
     }
-    if experiment.clearance_model == "worst":
-        meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
-        meanings["platform_screw"] += f"; {clearance_means('least')}"
+    attributes = {name: known[name].attributes for name in rows.dtype.names or ()}
+    means = clearance_means(experiment.clearance_model, experiment.used_contact_length)
+    worst = experiment.clearance_model == "worst"
+    for name in POSE_ERRORS:
+        bound = "upper bound of the " if worst else ""
+        attributes[name]["long_name"] = f"{bound}{known[name].meaning}; {means}"
+    if worst:
+        attributes["platform_screw"]["long_name"] += f"; {clearance_means('least')}"
     variables = {
-        name: (
-            dims.get(name, ("draw",)), rows[name],
-            {"units": _UNITS.get(name, "1"), "long_name": meanings[name]},
-        )
+        name: (dims.get(name, ("draw",)), rows[name], attributes[name])
         for name in rows.dtype.names or ()
-    }  # fmt: skip
+    }
     labels = {
         "draw": np.arange(len(rows)), "screw": list(SCREW),
         "link": list(experiment.links), "source": list(experiment.sources.labels),

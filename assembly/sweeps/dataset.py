@@ -17,6 +17,7 @@ from assembly.sweeps.netcdf import check_heaps, forgive_damaged_files, netcdf_fi
 from assembly.sweeps.quantities import TEXTS, variables
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import NETCDF, check_writable
+from forcefit.results.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     import xarray
@@ -28,11 +29,8 @@ Texts = dict[str, dict[int, str]]
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law"
 }  # fmt: skip
-_TEXT = {
-    "status": "ok, or why there is no answer: " + ", ".join(OF_POINTS[1:]),
-    "reason": "what was said where the status is not ok",
-    "near_singularity": "singularities near by, with the joints that show them",
-}
+_TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
+_TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
 # names in files of older releases, and the present ones
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
@@ -60,7 +58,7 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     data: dict[str, Any] = {}
     for name, one in variables(sweep.question).items():
         values = records[name].reshape(*sweep.shape, *records[name].shape[1:])
-        data[name] = ((*sweep.dims, *one.dims), values.copy(), _attributes(one))
+        data[name] = ((*sweep.dims, *one.dims), values.copy(), one.attributes)
     for name in _TEXT:
         column = _text_column(name, records, texts).reshape(sweep.shape)
         data[name] = (sweep.dims, column, {"long_name": _TEXT[name]})
@@ -106,7 +104,7 @@ def _write(
         variable.attrs.update(attributes)
     for name, one in asked.items():
         dims = (*sweep.dims, *one.dims)
-        file.create_variable(name, dims, "<f8").attrs.update(_attributes(one))
+        file.create_variable(name, dims, "<f8").attrs.update(one.attributes)
     for name, meaning in _TEXT.items():
         variable = file.create_variable(name, sweep.dims, text)
         variable.attrs["long_name"] = meaning
@@ -187,11 +185,6 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
     for row, text in texts[name].items():
         column[row] = text
     return column
-
-
-def _attributes(variable: Any) -> dict[str, str]:
-    """Unit and meaning of a variable."""
-    return {"units": variable.unit, "long_name": variable.meaning}
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:

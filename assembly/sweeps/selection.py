@@ -3,21 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from assembly.sweeps.quantities import Question, Variable, computed
+from assembly.sweeps.quantities import (
+    BY_CLEARANCE,
+    ERRORS,
+    FINITE,
+    STRESS,
+    Question,
+    Variable,
+    computed,
+)
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 DEFAULT = "default"  # stands for what is stored where no quantity is named
 MODES = 6  # natural frequencies where their number is not given
-BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
-FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
 )  # fmt: skip
-_STRESS = ("stress", "stress_error", "safety")
-_ERRORS = ("rotation_error", "translation_error")
 _NEEDED = (
-    dict.fromkeys(_STRESS, "--yield-strength")
-    | dict.fromkeys(_ERRORS, "an --assumption")
+    dict.fromkeys(STRESS, "--yield-strength")
+    | dict.fromkeys(ERRORS, "an --assumption")
     | {"wrench": "--wrench-of", "reading": "effects that change what a device reads"}
 )  # fmt: skip
 
@@ -66,13 +70,13 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
     return replace(
         question,
         kept=tuple(kept),
-        assumption=question.assumption if set(_ERRORS) & set(kept) else None,
+        assumption=question.assumption if set(ERRORS) & set(kept) else None,
         clearance_only=bool(set(BY_CLEARANCE) & set(kept)),
         linearisation=bool(set(FINITE) & set(kept)),
         stiffness=every.stiffness if set(_STIFFNESS) & set(kept) else "",
         frequencies=every.frequencies if "frequency" in kept else 0,
         wrenches=question.wrenches if "wrench" in kept else (),
-        strength=question.strength if set(_STRESS) & set(kept) else None,
+        strength=question.strength if set(STRESS) & set(kept) else None,
     )
 
 
@@ -84,7 +88,7 @@ def quantities_text() -> str:
     frame = robot.frames[0].name
     question = Question(robot, assumption="frozen", wrenches=(frame,), strength=1.0)
     lines = [
-        f"{name:28s}{one.unit:20s}{one.meaning}"
+        f"{name:28s}{one.quantity.unit:20s}{one.attributes['long_name']}"
         + (f"; needs {_NEEDED[name]}" if name in _NEEDED else "")
         for name, one in computed(_with_optional(question)).items()
     ]

@@ -19,6 +19,7 @@ from forcefit.commands.example import example
 from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
+from forcefit.commands.schema import schema
 from forcefit.inputs.errors import BadInput, one_line, quoted
 from forcefit.inputs.packages import naming_packages, need
 from forcefit.inputs.writing import write_json
@@ -35,6 +36,7 @@ app.add_typer(validation.app, name="validation", help="Is it true?")
 app.add_typer(report.app, name="report", help="What changed between two runs?")
 app.command()(convert)
 app.command()(example)
+app.command()(schema)
 
 
 def _print_version(asked: bool) -> None:

@@ -10,7 +10,7 @@ from assembly.model.tables import component_unit
 from forcefit.page.charts import Axis, Layer, value_map
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Value, table
-from forcefit.page.words import unit_of
+from forcefit.results.quantities import unit_of
 from stiffness.screws import WRENCH
 
 # of the maps: key, words

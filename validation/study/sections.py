@@ -13,7 +13,7 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.page.charts import GREY, Axis, chart, matrix
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
-from forcefit.page.words import in_words, unit_of
+from forcefit.results.quantities import in_words, unit_of
 from stiffness.link import scaled
 from stiffness.screws import SCREW
 from validation.crosscheck.verdict import verdict_text

@@ -142,7 +142,7 @@ def test_the_page_names_things_in_words(results):
     _, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     shown = " ".join(c.text for table in seen.tables for row in table for c in row)
-    assert "degrees of freedom left when the drives are locked" in shown
+    assert "degrees of freedom with locked drives" in shown
     assert not re.search(
         r"locked_|_residual|_excess|_gap|_open|margin_|_error\b", shown
     )
