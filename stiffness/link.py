@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import Figures, html_table, numbers, short_repr
 
 # eigenvalues of a scaled 6 by 6 matrix are known to its size times this
 _ROUNDING = 6 * np.finfo(float).eps

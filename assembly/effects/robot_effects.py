@@ -12,8 +12,8 @@ from assembly.kinematics.posture import Posture
 from assembly.measurement.conditions import COVARIATES, Conditions, as_declared
 from assembly.measurement.predict import assemble_row, read
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)

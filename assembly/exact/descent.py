@@ -46,7 +46,7 @@ from assembly.kinematics.ranks import ROWS_RANK, rank_tolerance
 from assembly.solvers.cones import into_cones
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
-from forcefit.inputs.display import numbers
+from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths]

@@ -67,7 +67,13 @@ from assembly.model.clearance import (
 )
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import Figures, html_table, numbers, screw_text, short_repr
+from forcefit.results.display import (
+    Figures,
+    html_table,
+    numbers,
+    screw_text,
+    short_repr,
+)
 from stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:

@@ -29,8 +29,8 @@ from assembly.kinematics.singular_posture import is_singular
 from assembly.kinematics.track import Track
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, brief, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput, nearest
+from forcefit.results.display import Figures, brief, html_table, numbers, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")

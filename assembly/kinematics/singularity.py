@@ -34,7 +34,7 @@ from assembly.kinematics.nominal import Target, follow, mobile, size_of
 from assembly.kinematics.posture import home_posture
 from assembly.kinematics.ranks import rank_of
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, largest_row, short_repr
+from forcefit.results.display import html_table, largest_row, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")

@@ -39,14 +39,13 @@ from assembly.model.clearance import Compliant, clearance_bounds, clearance_exce
 from assembly.model.point_results import N, plain
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
-from forcefit.inputs.display import (
+from forcefit.results.display import (
     Figures,
     largest,
     largest_row,
-    numbers,
-    screw_text,
     short_repr,
 )
+from forcefit.results.text import forced_lines
 
 if TYPE_CHECKING:
     import pandas
@@ -79,10 +78,7 @@ class Assembly(Solution[N]):
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
         most = largest_row(forces)  # bodies in a row carry the same force
         return {
-            "pose": f"{numbers(self.posture.pose().values())} m, rad",
-            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
-            "energy": f"{self.energy:.6g} J",
-            "platform error": screw_text(self.platform_screw),
+            **forced_lines(self),
             "largest force": f"{forces[most]:.4g} N, in "
             f"{self.posture.robot.frames[most].name}",
             "certificate": f"closure residual {self.closure_residual():.1e}, clearance "

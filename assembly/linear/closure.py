@@ -36,8 +36,8 @@ from assembly.model.clearance import (
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.links import compliance_factor, joint_compliances, link_compliances
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)

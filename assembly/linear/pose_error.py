@@ -44,8 +44,8 @@ from assembly.model.point_results import Numbers, PointResults
 from assembly.model.statuses import SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
-from forcefit.inputs.display import Figures, bracket, short_repr
 from forcefit.inputs.renamed import renamed_keywords, warn_renamed
+from forcefit.results.display import Figures, bracket, short_repr
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -24,7 +24,7 @@ from assembly.model.clearance import Compliant
 from assembly.model.point_results import N, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import Figures
+from forcefit.results.display import Figures
 
 MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
 _GAP_ABSOLUTE = 1e-12  # .. plus this

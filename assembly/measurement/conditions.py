@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.measurement.history import History
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 
 COVARIATES = ("temperature", "time", "approach")
 

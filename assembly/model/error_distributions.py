@@ -26,8 +26,8 @@ from scipy.special import ndtr, ndtri
 
 from assembly.model.random_errors import SIGNS, frames_named
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import SCREW
 
 KINDS = ("uniform", "normal", "truncated")

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.link_kinds import BeamLink, Link
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import rotation_matrix
 
 JOINTS = ("fixed", "revolute", "prismatic")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 
 if TYPE_CHECKING:
     import pandas

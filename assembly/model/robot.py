@@ -29,8 +29,8 @@ from assembly.model.link_kinds import (
     MatrixLink,
     MeshLink,
 )
-from forcefit.inputs.display import Figures, html_table, largest, short_repr
 from forcefit.inputs.table import BadInput, nearest, quoted
+from forcefit.results.display import Figures, html_table, largest, short_repr
 from stiffness.screws import rotation_matrix, transform
 
 __all__ = [

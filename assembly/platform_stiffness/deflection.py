@@ -33,8 +33,8 @@ from assembly.platform_stiffness.matrices import (
 )
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
-from forcefit.inputs.display import html_table, largest_row, numbers, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.results.display import html_table, largest_row, numbers, short_repr
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
 _CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed

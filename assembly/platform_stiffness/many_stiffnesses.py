@@ -14,7 +14,7 @@ from assembly.linear.robot_structure import structure_of
 from assembly.platform_stiffness.linear_tangent import owners, without_clearance
 from assembly.platform_stiffness.matrices import Part, PlatformStiffness
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size of a compliance's root that counts as rigid

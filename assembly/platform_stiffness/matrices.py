@@ -35,9 +35,9 @@ from scipy.linalg import null_space
 
 from assembly.kinematics.posture import Posture
 from assembly.solvers.method import Method
-from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.number_arrays import find_fault
+from forcefit.results.display import Figures, html_table, numbers, short_repr
 from stiffness.screws import screw_map
 
 _RANK = 1e-10  # relative size of a motion that counts as none

@@ -31,9 +31,9 @@ from assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam_axis
 from assembly.platform_stiffness.exact_tangent import part_owners, platform_moves
 from assembly.platform_stiffness.matrices import Part
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.renamed import renamed_keywords
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.beam.beam import section_axes
 from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map

@@ -12,13 +12,14 @@ from assembly.statistics.clearance_positions import clearance_means, contact_len
 from assembly.statistics.quantities import UNITS
 from assembly.statistics.requirement import Plan
 from assembly.sweeps.identity import robot_hash
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
+from forcefit.results.text import in_unit
 
 if TYPE_CHECKING:
     import xarray
 
 
-_SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm")}  # factor and unit of tolerances
+_SHOWN = {"rad": "mrad", "m": "mm"}  # display units of tolerances
 _SHARE_OF = {
     "reciprocal": "of the price",
     "logarithm": "of the saving by looser tolerances",
@@ -170,8 +171,7 @@ def allocation_text(results: dict[str, Any]) -> str:
     """An allocation for people."""
     lines = []
     for one in results["tolerances"]:
-        scale, unit = _SHOWN[one["unit"]]
-        line = f"  {one['name']}: +-{scale * one['tolerance']:.4g} {unit}"
+        line = f"  {one['name']}: +-{in_unit(one['tolerance'], _SHOWN[one['unit']])}"
         note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
         lines.append(f"{line} ({note})")
     if lines:
@@ -206,10 +206,11 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
     """What clearances alone take of a limit."""
-    scale, unit = _SHOWN[one["unit"]]
-    reached, limit = scale * one["reached"], scale * one["limit"]
+    reached, limit = (
+        in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
+    )
     return (
-        f"clearances alone take {reached:.4g} of the {limit:.4g} {unit} of {key} (at "
+        f"clearances alone take {reached} of the {limit} of {key} (at "
         f"{one['at']}): without them tolerances could be about "
         f"{one['looser_without']:.3g} times looser, at a price of about "
         f"{one['price_without']:.3g}"

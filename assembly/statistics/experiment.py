@@ -24,8 +24,8 @@ from assembly.statistics.posture_margins import PostureMargins, prepare_margins
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 
 _PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
 

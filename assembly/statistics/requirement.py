@@ -16,8 +16,8 @@ from assembly.statistics.quantities import POSE_ERRORS, UNITS
 from assembly.statistics.replay import Replay
 from assembly.statistics.responses import respond
 from assembly.statistics.worst_case import Corner, worst_corner
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")

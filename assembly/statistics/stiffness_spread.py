@@ -21,7 +21,7 @@ from assembly.platform_stiffness.linear_tangent import in_contact
 from assembly.solvers.conic import SolverFailed
 from assembly.statistics.estimates import mean, proportion, quantile
 from assembly.sweeps.point_stiffness import STATES
-from forcefit.inputs.display import numbers
+from forcefit.results.display import numbers
 from stiffness.screws import WRENCH
 
 _NAMED = 5  # free motions, those of most draws

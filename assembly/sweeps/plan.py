@@ -14,8 +14,8 @@ from assembly.sweeps.parameters import unit_of
 from assembly.sweeps.points import Points
 from assembly.sweeps.quantities import Question, record_type
 from assembly.sweeps.targets import LARGEST_GRID, Targets, unit_of_target
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.results.display import html_table, short_repr
 
 
 @dataclass(frozen=True, eq=False)

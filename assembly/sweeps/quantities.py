@@ -11,7 +11,7 @@ from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
 from assembly.sweeps.parameters import Design
 from assembly.sweeps.point_stiffness import STATES, stiffness_parts
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from forcefit.results.quantities import LABELS, QUANTITIES, Quantity
 
 if TYPE_CHECKING:

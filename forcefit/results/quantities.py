@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from forcefit.results.units import shown_in
-
 Kind = Literal["number", "integer", "string", "boolean"]
 # labels of the dimensions that many quantities share
 LABELS: dict[str, tuple[str, ...]] = {
@@ -35,6 +33,8 @@ class Quantity:
         meaning: what exactly it is, where the words do not say it.
         symbol: in the paper, where it has one.
         kind: of its values.
+        shown: display unit of text, where it is not SI.
+        digits: significant digits of text.
     """
 
     words: str
@@ -43,11 +43,13 @@ class Quantity:
     meaning: str = ""
     symbol: str = ""
     kind: Kind = "number"
+    shown: str = ""
+    digits: int = 4
 
     @property
     def display_unit(self) -> str:
-        """Unit in which people read it; that of small errors for lengths and angles."""
-        return shown_in(self.unit, 1e-3).shown
+        """Unit in which text states it."""
+        return self.shown or self.unit
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -81,6 +83,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "status": text("status", meaning="ok, or why there is no valid answer"),
     "reason": text("reason", meaning="explanation where the status is not ok"),
     "remarks": text("note", "remark"),
+    "pose": Quantity("pose", "m, rad", meaning="nominal, of the platform, base axes"),
     "rx": Quantity("rotation vector x", "rad"),
     "ry": Quantity("rotation vector y", "rad"),
     "rz": Quantity("rotation vector z", "rad"),
@@ -137,7 +140,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "energy": Quantity(
         "assembly energy", "J", meaning="least elastic energy that closes it, eq. (22)",
-        symbol="E",
+        symbol="E", digits=6,
     ),
     "potential": Quantity(
         "potential", "J", meaning="elastic energy minus the work of the loads",
@@ -148,23 +151,27 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "platform_screw": Quantity(
         "platform error", "rad, m", _SCREW,
-        "pose error at the platform's origin, base axes", "x",
+        "pose error at the platform's origin, base axes", "x", shown="mrad, mm"
     ),
     "reading": Quantity(
-        "reading", "rad, m", _SCREW, "what a measuring device reads at this pose"
+        "reading", "rad, m", _SCREW, "what a measuring device reads at this pose",
+        shown="mrad, mm"
     ),
     "clearance": Quantity(
         "clearance", "rad, m", _SCREW, "displacement within the clearance, and small "
-        "motions of passive joints", "delta c",
+        "motions of passive joints", "delta c", shown="mrad, mm"
     ),
     "link": Quantity(
-        "deformation of the link", "rad, m", _SCREW, "at the frame in its axes", "e"
+        "deformation of the link", "rad, m", _SCREW, "at the frame in its axes", "e",
+        shown="mrad, mm"
     ),
     "joint": Quantity(
-        "deformation of the joint", "rad, m", _SCREW, "at the frame in its axes"
+        "deformation of the joint", "rad, m", _SCREW, "at the frame in its axes",
+        shown="mrad, mm"
     ),
     "geometric_error": Quantity(
-        "geometric error", "rad, m", _SCREW, "at the frame in its axes", "delta l"
+        "geometric error", "rad, m", _SCREW, "at the frame in its axes", "delta l",
+        shown="mrad, mm"
     ),
     "wrench": Quantity(
         "wrench", "N m, N", _WRENCH,
@@ -194,23 +201,23 @@ QUANTITIES: Mapping[str, Quantity] = {
         "duality gap", "J", meaning="certified: energy is at most this too high"
     ),
     "relative_gap": Quantity("relative duality gap"),
-    "screw_rotation": Quantity("platform rotation known to", "rad"),
-    "screw_translation": Quantity("platform translation known to", "m"),
+    "screw_rotation": Quantity("platform rotation known to", "rad", shown="mrad"),
+    "screw_translation": Quantity("platform translation known to", "m", shown="um"),
     "screw_rotation_open": Quantity(
         "undetermined rotation", "rad",
-        meaning="rotation that clearances leave open at the same energy",
+        meaning="rotation that clearances leave open at the same energy", shown="mrad"
     ),
     "screw_translation_open": Quantity(
         "undetermined translation", "m",
-        meaning="translation that clearances leave open at the same energy",
+        meaning="translation that clearances leave open at the same energy", shown="um"
     ),
     "screw_rotation_error": Quantity(
         "determined rotation known to", "rad",
-        meaning="certified, without the undetermined rotation",
+        meaning="certified, without the undetermined rotation", shown="mrad"
     ),
     "screw_translation_error": Quantity(
         "determined translation known to", "m",
-        meaning="certified, without the undetermined translation",
+        meaning="certified, without the undetermined translation", shown="um"
     ),
     "stationarity": Quantity("residual of equilibrium", meaning="relative"),
     "iterations": count("iterations"),
@@ -222,46 +229,47 @@ QUANTITIES: Mapping[str, Quantity] = {
     "assumption": text("assumption of problem (27)"),
     "rotation_error": Quantity(
         "largest rotation of the platform", "rad", ("bound",),
-        "certified bounds of the largest rotation error, eq. (27)",
+        "certified bounds of the largest rotation error, eq. (27)", shown="mrad"
     ),
     "translation_error": Quantity(
         "largest translation of the platform", "m", ("bound",),
-        "certified bounds of the largest translation error, eq. (27)",
+        "certified bounds of the largest translation error, eq. (27)", shown="mm"
     ),
     "rotation_error_clearance": Quantity(
         "largest rotation by clearances alone", "rad", ("bound",),
         "certified bounds of the largest rotation error, eq. (27), frozen, without "
-        "geometric errors",
+        "geometric errors", shown="mrad"
     ),
     "translation_error_clearance": Quantity(
         "largest translation by clearances alone", "m", ("bound",),
         "certified bounds of the largest translation error, eq. (27), frozen, without "
-        "geometric errors",
+        "geometric errors", shown="mm"
     ),
     "rotation_screw": Quantity(
         "platform error of largest rotation", "rad, m", _SCREW,
-        "attains the lower bound of the rotation",
+        "attains the lower bound of the rotation", shown="mrad, mm"
     ),
     "translation_screw": Quantity(
         "platform error of largest translation", "rad, m", _SCREW,
-        "attains the lower bound of the translation",
+        "attains the lower bound of the translation", shown="mrad, mm"
     ),
     "cuts": count("cutting planes"),
     "linearisation_rotation": Quantity(
         "linearisation error, rotation", "rad",
-        meaning="size of the platform's rotation, linear minus exact",
+        meaning="size of the platform's rotation, linear minus exact", shown="mrad"
     ),
     "linearisation_translation": Quantity(
         "linearisation error, translation", "m",
-        meaning="size of the platform's translation, linear minus exact",
+        meaning="size of the platform's translation, linear minus exact", shown="um"
     ),
     "linearisation_energy": Quantity(
         "linearisation error, relative energy",
-        meaning="energy, linear minus exact, relative to the exact one",
+        meaning="energy, linear minus exact, relative to the exact one", shown="%"
     ),
-    "relative_energy": Quantity("relative energy"),
+    "relative_energy": Quantity("relative energy", shown="%"),
     "stress": Quantity(
-        "von Mises stress", "Pa", meaning="largest von Mises stress in the link"
+        "von Mises stress", "Pa", meaning="largest von Mises stress in the link",
+        shown="MPa"
     ),
     "stress_error": Quantity(
         "estimated relative error of the stress", meaning="by the mesh; a beam's "
@@ -269,20 +277,21 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "safety": Quantity("safety", meaning="yield strength over the largest stress"),
     "rotation": Quantity(
-        "rotation", "rad", meaning="size of the platform's rotation error"
+        "rotation", "rad", meaning="size of the platform's rotation error", shown="mrad"
     ),
     "translation": Quantity(
-        "translation", "m", meaning="size of the platform's translation error"
+        "translation", "m", meaning="size of the platform's translation error",
+        shown="um"
     ),
     "rotation_lower": Quantity(
         "bound of the rotation", "rad",
-        meaning="certified: the largest rotation error is at least this",
+        meaning="certified: the largest rotation error is at least this", shown="mrad"
     ),
     "translation_lower": Quantity(
         "bound of the translation", "m",
-        meaning="certified: the largest translation error is at least this",
+        meaning="certified: the largest translation error is at least this", shown="um"
     ),
-    "position": Quantity("position error", "m"),
+    "position": Quantity("position error", "m", shown="um"),
     "normalised": Quantity("normalised error", meaning="error over the stated noise"),
     "force": Quantity("largest force", "N", meaning="largest force through any body"),
     "moment": Quantity(
@@ -328,7 +337,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "lowest first, drives held, without load and gravity",
     ),
     "idle_motions": count("free motions that leave the platform at rest"),
-    "von_mises": Quantity("largest von Mises stress", "Pa"),
+    "von_mises": Quantity("largest von Mises stress", "Pa", shown="MPa"),
     "tip": Quantity("tip", "m", ("axis",), "where the stiffness is read"),
     "base": Quantity("base", "m", ("axis",)),
     "length": Quantity("length", "m"),
@@ -423,12 +432,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     "not_measured": text("components not measured", "component"),
     "beyond_learned_range": text("rows outside the learned range", "row"),
     "rms": Quantity("root mean square"),
-    "scatter": Quantity("scatter about the declared robot", "m"),
+    "scatter": Quantity("scatter about the declared robot", "m", shown="um"),
     "left_out": text("left out", "row"),
     "slope": Quantity("slope of the difference with the scale"),
     "scale": Quantity("scale of errors and loads"),
-    "accuracy": Quantity("accuracy", "m"),
-    "repeatability": Quantity("repeatability", "m"),
+    "accuracy": Quantity("accuracy", "m", shown="um"),
+    "repeatability": Quantity("repeatability", "m", shown="um"),
 }  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from forcefit.results.display import html_table, short_repr
 from stiffness.fem.adaptive_step import (
     Level,
     estimated_error,

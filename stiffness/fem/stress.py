@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from stiffness.beam.beam import section_axes
 from stiffness.beam.beam_stress import peak_beam_stress
 from stiffness.fem.adaptive_step import Level

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.mesh.lagrange import EDGES
 from stiffness.surface.primitives import Shape, project
 from stiffness.surface.true_surface import TrueSurface

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, describe, nearest
+from forcefit.results.display import html_table, short_repr
 from stiffness.surface.filled_solids import FilledSolids
 from stiffness.surface.surface_files import STEP, named_solid, read_triangles
 

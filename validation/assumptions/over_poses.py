@@ -10,7 +10,7 @@ from assembly.kinematics.posture import Posture, place_many, place_many_joints
 from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
 from assembly.sweeps.targets import Targets, goals_of, of_joints
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.assumptions.assumptions import assumption_costs, stiffness_costs
 from validation.assumptions.platform_cost import PlatformCosts
 from validation.assumptions.validity import Cost

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, html_table, short_repr
+from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.text import in_unit
 
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, as in a screw
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -83,7 +84,7 @@ class Campaign:
         for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
             sigma = self.sigma[:, part][cells[:, part]]
             if sigma.size:
-                sizes.append(f"{1e6 * np.sqrt(np.mean(sigma**2)):.3g} {unit}")
+                sizes.append(in_unit(np.sqrt(np.mean(sigma**2)), unit, 3))
         return {
             "robot": self.robot.name,
             "rows": f"{len(self)}, of {len(set(self.configuration.tolist()))} "

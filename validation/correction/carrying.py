@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.correction.machine_numbers import machine_numbers, unchanging
 from validation.correction.session_fit import SessionsFit, SetUp, fit_sessions

@@ -33,7 +33,7 @@ from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import flexibility
 from assembly.model.links import own_screw
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.campaign.campaign import Campaign
 from validation.correction.spread import deviation_spread

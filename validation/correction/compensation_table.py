@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.posture import POSE, pose_components
+from forcefit.results.text import readings_text
 from validation.campaign.campaign import LOAD
 from validation.correction.compensation import Compensation
 from validation.correction.prediction import csv_text
@@ -155,10 +156,7 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
         if key == "spread" and not compensation.spread.any():
             continue
         if size["position"] is not None:
-            lines.append(
-                f"{words}: {1e6 * size['position']:.4g} um, "
-                f"{1e6 * size['rotation']:.4g} urad"
-            )
+            lines.append(f"{words}: {readings_text(size)}")
     if table["error"]["expected"]["position"] is None:
         lines.append(
             "to be expected: what the robot's diagnosis left (--diagnosed says it); "

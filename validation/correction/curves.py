@@ -18,8 +18,8 @@ from assembly.effects.functions import CLOCKS, parameters_of, value_of
 from assembly.effects.units import result_unit, units_of, variable_unit, whole_unit
 from assembly.model.function import Function
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import plot_label
+from forcefit.results.display import html_table, short_repr
 from validation.diagnosis.saved_covariance import FUNCTION, known_covariance
 
 if TYPE_CHECKING:

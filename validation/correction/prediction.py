@@ -12,8 +12,8 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.predict import Prediction
 from assembly.measurement.predict import predict as predict_rows
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.correction.spread import deviation_spread
 from validation.diagnosis.learned_range import beyond_by_row

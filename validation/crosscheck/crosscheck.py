@@ -19,7 +19,7 @@ from assembly.linear.energy import CannotAssemble, failure_status, solve_assembl
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.statuses import FAILS, OK, SIMULATION_FAILED, UNDECIDED
 from assembly.solvers.conic import SolverFailed
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
 from validation.crosscheck.link_models import link_models
 from validation.crosscheck.pair import (

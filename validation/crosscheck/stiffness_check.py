@@ -24,7 +24,7 @@ from assembly.linear.reference.reduction import FreeMotion
 from assembly.platform_stiffness.exact_tangent import exact_tangent
 from assembly.platform_stiffness.linear_tangent import without_clearance as classical
 from assembly.platform_stiffness.matrices import PlatformStiffness
-from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW, rotation_vector
 from validation.crosscheck.link_models import link_models
 from validation.multibody.simulation import TIME_LIMIT, without_clearance

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.measurement.conditions import Conditions
 from assembly.model.robot import Robot
-from forcefit.inputs.display import Figures, html_table, short_repr
+from forcefit.results.display import Figures, html_table, short_repr
 from validation.campaign.campaign import Campaign
 from validation.diagnosis.fit import MachineFit
 from validation.diagnosis.holdout import HeldOut

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from forcefit.results.text import readings_text
+
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # standard deviation of blunders over tau
 _LEFT_OUT = 1e-12  # relative precision of a blunder
@@ -91,8 +93,8 @@ def findings(
     """
     told = []
     if any(common):
-        named = (common[1], "um"), (common[0], "urad")
-        sizes = ", ".join(f"{1e6 * size:.3g} {unit}" for size, unit in named if size)
+        named = {"position": common[1] or None, "rotation": common[0] or None}
+        sizes = readings_text(named, digits=3)
         told.append(f"noise common to the points of a row: {sizes}")
         if not repeats[1]:
             unsure = "a cause that was not recorded would look the same"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.text import in_unit
 from stiffness.screws import rotation_matrix, rotation_vector
 from validation.exchange.commands_table import Commands
 from validation.exchange.device_axes import check_axes, check_targets
@@ -175,7 +176,7 @@ def _suspects(
             other = quoted(names[ks[order[place]]])
             suspects.append((k, f"it is {other}, exchanged"))
         elif is_gross(gap, scatter):
-            reason = f"{1e3 * gap:.4g} mm off, the others {1e3 * scatter:.2g}"
+            reason = f"{in_unit(gap, 'mm')} off, the others {in_unit(scatter, 'mm', 2)}"
             suspects.append((k, reason))
     return suspects
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import check_new_folder, whole_folder, write_text
+from forcefit.results.text import in_unit
 from validation.exchange.bag import is_bag, read_bag
 from validation.exchange.campaign_text import (
     cell,
@@ -82,7 +83,7 @@ class Import:
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
-            f"scatter about the declared robot {1e6 * self.scatter:.4g} um",
+            f"scatter about the declared robot {in_unit(self.scatter, 'um')}",
         ]
         lines += [
             f"axes of {name} on the platform: {np.round(turn, 7).tolist()} rad"

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from numpy.typing import NDArray
 
 from assembly.measurement.predict import predict
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.campaign.campaign import READING, Campaign
 from validation.diagnosis.separability import Separability, compare_signatures
 from validation.diagnosis.signatures import conditions_of

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from validation.multibody.exudyn_model import Model, Regularisation
 from validation.multibody.exudyn_parts import OutOfTime, SimulationFailed
 from validation.multibody.exudyn_reading import pose

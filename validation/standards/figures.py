@@ -1,5 +1,6 @@
 """Figures of ISO 9283 and ISO 230-2 from a campaign's repeats."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import combinations, islice
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.inputs.errors import BadInput, quoted
+from forcefit.results.text import in_unit, table_lines
 from validation.campaign.campaign import READING, Campaign, number_rows
 from validation.standards.iso230 import AxisFigures, axis_figures
 from validation.standards.iso9283 import (
@@ -98,12 +100,17 @@ class StandardFigures:
 
     def text(self) -> str:
         """A table for people, the worst of each in the last line."""
-        lines = [f"{self.campaign}: ISO 9283, {len(self.poses)} poses with repeats",
-                 "pose              cycles  AP [um]  RP [um]  drift [um]"]  # fmt: skip
-        for pose in self.poses:
-            values = (pose.accuracy, pose.repeatability, pose.drift)
-            shown = "  ".join(_micro(value) for value in values)
-            lines.append(f"{pose.label[:16]:16}  {pose.cycles:6}  {shown}")
+        rows = {
+            pose.label: [
+                pose.cycles,
+                *(math.nan if value is None else 1e6 * value
+                  for value in (pose.accuracy, pose.repeatability, pose.drift)),
+            ]
+            for pose in self.poses
+        }  # fmt: skip
+        head = ("pose", "cycles", "AP [um]", "RP [um]", "drift [um]")
+        lines = [f"{self.campaign}: ISO 9283, {len(rows)} poses with repeats",
+                 *table_lines(head, rows, digits=4)]  # fmt: skip
         if self.registration == "unknown":
             lines.append("registration unknown: AP includes where the device stood")
         if self.distances:
@@ -111,22 +118,18 @@ class StandardFigures:
             a, b = worst.labels
             lines.append(
                 f"distance accuracy, worst of {len(self.distances)}: "
-                f"{1e6 * worst.accuracy:.4g} um of {worst.commanded:.4g} m, {a} to "
-                f"{b}; repeatability {1e6 * worst.repeatability:.4g} um"
+                f"{in_unit(worst.accuracy, 'um')} of {worst.commanded:.4g} m, {a} to "
+                f"{b}; repeatability {in_unit(worst.repeatability, 'um')}"
             )
         for name, axis in self.axes.items():
             unit = "urad" if name.startswith("r") else "um"
             lines.append(
-                f"ISO 230-2 {name} [{unit}]: B {1e6 * axis.reversal:.4g}, "
-                f"R {1e6 * axis.repeatability:.4g}, E "
-                f"{1e6 * axis.systematic_deviation:.4g}, A {1e6 * axis.accuracy:.4g}"
+                f"ISO 230-2 {name}: B {in_unit(axis.reversal, unit)}, "
+                f"R {in_unit(axis.repeatability, unit)}, E "
+                f"{in_unit(axis.systematic_deviation, unit)}, "
+                f"A {in_unit(axis.accuracy, unit)}"
             )
         return "\n".join(lines)
-
-
-def _micro(value: float | None) -> str:
-    """A length in um, in eight characters."""
-    return f"{'-':>7}" if value is None else f"{1e6 * value:7.4g}"
 
 
 def standard_figures(campaign: Campaign) -> StandardFigures:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
+from forcefit.results.text import in_unit
 from validation.study.study import StudyResults
 
 WORST = "frozen"  # assumption of (27): all clearance motions without spring deformation
@@ -151,7 +152,7 @@ def _bound_text(bounds: dict[str, float]) -> str:
 
 def _pose_text(rotation: float, translation: float) -> str:
     """Sizes of a pose error [rad, m] in mm and mrad."""
-    return f"{1e3 * translation:.3g} mm and {1e3 * rotation:.3g} mrad"
+    return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
 
 
 def covered(results: StudyResults) -> list[str]:

@@ -23,9 +23,9 @@ from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of
 from assembly.sweeps.sweep import sweep_poses
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.packages import need
 from forcefit.inputs.table import BadInput
+from forcefit.results.display import html_table, short_repr
 from validation.crosscheck.crosscheck import Crosscheck, attempt, crosscheck
 from validation.crosscheck.verdict import verdict
 from validation.multibody.simulation import (

@@ -19,8 +19,8 @@ from assembly.model.random_errors import SIGNS, ErrorDraw, draw_errors, frames_n
 from assembly.model.robot import BeamLink, MeshLink, Robot
 from assembly.robots import BUILT_IN
 from assembly.sweeps.targets import parse_grid
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
+from forcefit.results.display import html_table, short_repr
 from stiffness.surface.surface import UNITS
 from stiffness.surface.surface_files import named_solid
 from validation.crosscheck.verdict import SCALES, check_scales

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from assembly.files.robot_file import write_robot
 from assembly.model.robot import Robot
-from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import whole_folder, write_text
+from forcefit.results.display import html_table, short_repr
 from validation.synthetic.design import CampaignDesign, CampaignPlan, plan_campaign
 from validation.synthetic.draws import NotApplicable, draw_effect, strengthened
 from validation.synthetic.effects import SCREW, WRENCH, Row

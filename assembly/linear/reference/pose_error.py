@@ -43,7 +43,7 @@ from assembly.solvers import one_problem, outer_cuts
 from assembly.solvers.cones import cone_sizes, cone_starts, into_cones
 from assembly.solvers.conic import minimise_energy
 from assembly.solvers.method import Method
-from forcefit.inputs.display import html_table, short_repr
+from forcefit.results.display import html_table, short_repr
 from stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")

@@ -39,7 +39,7 @@ from assembly.linear.closure import (
     in_reference_lengths,
 )
 from assembly.linear.load import FrameLoads, loads_on_frames
-from forcefit.inputs.display import html_table, numbers, short_repr
+from forcefit.results.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW
 
 _STILL = 1e-6  # of the largest motion: what less counts as rounding

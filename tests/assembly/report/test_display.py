@@ -16,7 +16,7 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.report.results import solution_of, solution_text
-from forcefit.inputs.display import brief, html_table, short_repr
+from forcefit.results.display import brief, html_table, short_repr
 from stiffness.beam.beam import beam_compliance
 from stiffness.beam.sections import round_section
 from stiffness.link import LinkStiffness

@@ -12,7 +12,7 @@ from assembly.model.robot import Clearance, Frame, MeshLink, Robot
 from assembly.report.pose_errors import pose_error_of
 from assembly.report.results import solution_of, solution_text
 from assembly.robots import load_robot
-from forcefit.inputs.display import largest_row
+from forcefit.results.display import largest_row
 
 
 def test_largest_error_that_solve_names_is_the_one_that_error_certifies():
