@@ -144,6 +144,5 @@ def pose_error_text(results: dict[str, Any]) -> str:
 
 def _bounds_text(part: str, bounds: dict[str, Any]) -> str:
     """Two bounds of a rotation or translation."""
-    if not np.isfinite(bounds["upper"]):
-        return "without bound"
-    return value_text(f"{part}_error", (bounds["lower"], bounds["upper"]))
+    low, high = bounds["lower"], bounds["upper"]
+    return value_text(f"{part}_error", (low, high) if np.isfinite(high) else high)

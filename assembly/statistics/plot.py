@@ -10,6 +10,8 @@ from assembly.statistics.estimates import most_probable, quantile
 from assembly.statistics.quantities import POSE_ERRORS
 from assembly.sweeps.panels import named_panels, quantity
 from forcefit.inputs.errors import BadInput, plot_label
+from forcefit.results.quantities import QUANTITIES
+from forcefit.results.units import FACTORS
 
 if TYPE_CHECKING:
     import xarray
@@ -17,18 +19,14 @@ if TYPE_CHECKING:
 
 KINDS = ("histogram", "tornado", "allocation")
 _MARGINS = ("margin", "margin_free")
-_SCALES = {
-    "rotation": (1e3, "mrad"), "translation": (1e3, "mm"), "energy": (1.0, "J"),
-    "margin": (1.0, "-"), "margin_free": (1.0, "-"), "force": (1.0, "N"),
-    "moment": (1.0, "N m"), "stress": (1e-6, "MPa"),
+_SHOWN = {
+    name: QUANTITIES[name]
+    for name in (
+        "rotation", "translation", "energy", "margin", "margin_free", "force", "moment",
+        "stress",
+    )
 }  # fmt: skip
-NAMES = {
-    "rotation": "platform rotation error", "translation": "platform position error",
-    "energy": "assembly energy", "margin": "zone margin, compliant joints rigid",
-    "margin_free": "zone margin, compliant joints free",
-    "force": "largest force in a body", "moment": "largest moment in a body",
-    "stress": "largest stress in a link",
-}  # fmt: skip
+NAMES = {name: one.words for name, one in _SHOWN.items()}
 
 
 def figure_of_draws(
@@ -84,8 +82,8 @@ def histogram_figure(
         raise ValueError("histograms need a data set of draws")
     solved = data.isel(draw=np.flatnonzero(data["status"].values == 0))
     shown = [panel[:3] for panel in named_panels(data, quantities)] or [
-        (name, scale, f"{NAMES[name]} [{unit}]")
-        for name, (scale, unit) in _SCALES.items()
+        (name, FACTORS.get(unit, 1.0), f"{NAMES[name]} [{unit}]")
+        for name, unit in ((n, one.display_unit) for n, one in _SHOWN.items())
         if name in solved and solved[name].size
     ]
     figure = Figure(figsize=(12, 3.2 * -(-len(shown) // 2)), layout="constrained")

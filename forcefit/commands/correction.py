@@ -21,7 +21,6 @@ from forcefit.inputs.writing import (
     write_json,
     write_text,
 )
-from forcefit.results.text import readings_text
 
 if TYPE_CHECKING:
     from assembly.model.function import Function
@@ -49,6 +48,7 @@ def predict(
     are empty.
     """
     from assembly.exchange.robot_files import load_robot
+    from forcefit.results.text import readings_text
     from validation.campaign.campaign_file import read_commands
     from validation.correction.prediction import predict as predict_readings
     from validation.correction.prediction import reading_table
@@ -72,6 +72,8 @@ def predict(
 
 def _about(table: dict[str, Any]) -> list[str]:
     """What a prediction rests on, a line each."""
+    from forcefit.results.text import readings_text
+
     lines = []
     if any(size > 0.0 for size in table["std"].values()):
         lines.append(

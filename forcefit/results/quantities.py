@@ -98,7 +98,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "nominal closure error", meaning="largest closure error of the nominal robot, "
         "rad or m, that rounded files leave",
     ),
-    "state": text("state in which the stiffness is taken"),
+    "state": text("state", meaning="in which the stiffness is taken"),
     "load": Quantity(
         "load", "N m, N", _WRENCH, "on the platform at its origin, base axes", "w"
     ),
@@ -277,10 +277,11 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "safety": Quantity("safety", meaning="yield strength over the largest stress"),
     "rotation": Quantity(
-        "rotation", "rad", meaning="size of the platform's rotation error", shown="mrad"
+        "platform rotation", "rad", meaning="size of the platform's rotation error",
+        shown="mrad",
     ),
     "translation": Quantity(
-        "translation", "m", meaning="size of the platform's translation error",
+        "platform translation", "m", meaning="size of the platform's translation error",
         shown="um"
     ),
     "rotation_lower": Quantity(

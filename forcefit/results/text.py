@@ -38,7 +38,7 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
     units = known.display_unit.split(", ")
     if np.ndim(value) == 0:
         if math.isinf(value):
-            return "unbounded"
+            return "without bound"
         return _with_unit(f"{rounded_in(value, units[0]):.{known.digits}g}", units[0])
     parts = np.split(np.asarray(value, dtype=float), len(units))
     if known.dims == ("bound",):
