@@ -1,6 +1,6 @@
 """Certificates of an assembly that is not the best, against their definitions."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +9,8 @@ from assembly.kinematics.posture import home_posture, together
 from assembly.linear.energy import solve_assembly, together_at
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.links import joint_compliances, link_compliances
-from assembly.model.robot import Frame, Robot
-from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
-
-EPS = 2.0**-52
+from assembly.model.robot import Frame
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def disturbed(rng, seed):
@@ -85,17 +83,6 @@ def test_the_uncertainty_is_the_gap_without_cancellation(rng):
         assert other.uncertainty == pytest.approx(worst, rel=1e-8)
 
 
-def test_a_large_work_is_uncertain_by_its_rounding():
-    """Nothing else is: an arm that hangs from a spring, without closures."""
-    K = 1e4 * np.eye(6)
-    robot = Robot("arm", "tip", (
-        Frame("hinge", joint="revolute", joint_stiffness=K), Frame("tip", "hinge"),
-    ))  # fmt: skip
-    assembly = solve_assembly(home_posture(robot), [0, 0, 0, 100.0, 0, 0])
-    assert assembly.work == pytest.approx(1.0)
-    assert assembly.uncertainty == pytest.approx(8 * EPS, rel=0.5, abs=0.0)
-
-
 def test_a_gap_is_relative_to_an_energy_of_any_size():
     """1e-4 of the energy without clearance is the least it is compared with."""
     assembly = solve_assembly(home_posture(coaxial_beams([0, 0, 0, 1e-6, 0, 0])))
@@ -118,18 +105,6 @@ def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
     )
     figures = solve_assembly(home_posture(idle))._figures()
     assert figures["largest force"].endswith(" N, in one")
-
-
-def test_one_assembly_is_one_row():
-    """In every array that has a row for each point."""
-    one = solve_assembly(home_posture(planar_four_bar())).as_many
-    for each in fields(one):
-        if each.name == "load":  # one load serves all
-            continue
-        values = getattr(one, each.name)
-        if isinstance(values, np.ndarray):
-            assert len(values) == 1, each.name
-    assert len(one) == 1
 
 
 def test_points_solved_one_by_one_keep_their_own_certificate():

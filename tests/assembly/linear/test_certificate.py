@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture, place_many, place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear import energy
 from assembly.linear.certificate import (
     bound_screw,
@@ -21,41 +21,23 @@ from tests.robots_for_tests import (
     NUMBERS,
     assemble_at,
     coaxial_beams,
+    irsbot2_over,
     irsbot2_with,
     random_robot,
 )
 
 
-@pytest.mark.parametrize("kappa", [0.05, 0.1])
-def test_the_energy_is_proved_near_the_edge_of_the_zone(kappa):
-    """Where hardly any energy is left; a part of the 25 mm grid."""
-    for posture in half_workspace(every=37):
-        assert_proved(solve_assembly(with_errors_times(kappa, posture)))
-
-
-@pytest.mark.slow
-def test_the_energy_is_proved_at_every_point_of_the_half_workspace():
-    postures = half_workspace(every=1)
-    assert len(postures) == 1113
-    for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):
-        for posture in postures:
-            assert_proved(solve_assembly(with_errors_times(kappa, posture)))
-
-
-def half_workspace(every):
-    """Every so many postures of the 25 mm grid below the base."""
-    x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
-    poses = np.full((x.size, 6), np.nan)
-    poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    placed = place_many(robot, poses[::every])[0]
-    return [posture for posture in placed if posture is not None]
-
-
-def with_errors_times(factor, posture):
-    """The posture of the robot with other errors."""
-    robot = posture.robot
-    return replace(posture, robot=robot.with_errors(factor * robot.errors))
+@pytest.mark.parametrize("kappa", [0.0, 0.05, 0.1, 1.0])
+def test_energy_is_proved_over_half_of_the_workspace(kappa):
+    """Errors of 0.05 and 0.1 are near the edge of the zone: little energy is left."""
+    robot, postures = irsbot2_over(
+        np.arange(-0.65, 0.651, 0.15), np.arange(-0.75, 0.001, 0.15)
+    )
+    reached = [posture for posture in postures if posture is not None]
+    assert len(reached) > 20
+    for posture in reached:
+        erring = replace(posture, robot=robot.with_errors(kappa * robot.errors))
+        assert_proved(solve_assembly(erring))
 
 
 def assert_proved(answer):
@@ -283,16 +265,6 @@ def test_what_springs_do_not_balance_is_the_gap(size, rng):
     share = size**2 / (1 + size**2)
     assert spoilt.relative_gap() == pytest.approx(share, rel=1e-3)
     assert (unproved(spoilt) == "") == (share < 1e-8)
-
-
-def test_within_the_zone_a_gap_counts_beside_the_energy_without_clearance():
-    posture = place_robot(load_robot("3rrr"))
-    errors = np.zeros((len(posture.robot.frames), 6))
-    errors[0, 3] = 1e-6
-    answer = solve_assembly(replace(posture, robot=posture.robot.with_errors(errors)))
-    assert answer.stored < 1e-6 * answer.energy_without_clearance
-    scale = 1e-4 * answer.energy_without_clearance
-    assert answer.relative_gap() * scale == pytest.approx(answer.duality_gap())
 
 
 def test_each_half_of_the_screw_is_proved_to_its_own_size():

@@ -7,9 +7,8 @@ import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.linear.zone import zone_margin
-from assembly.model.robot import Clearance
 from assembly.robots import BUILT_IN
-from tests.robots_for_tests import coaxial_beams, random_robot
+from tests.robots_for_tests import random_robot
 
 
 def assert_same_margin(batch, i, zone):
@@ -47,21 +46,6 @@ def test_margins_of_random_and_built_in_robots_equal_one_at_a_time(compliant, rn
         one = zone_margin(erring, compliant, method="reference")
         assert_same_margin(batch, 0, one)
     assert compiled
-
-
-def test_margin_of_one_joint_is_gap_over_play_in_a_batch():
-    """5e-5 m across, 2e-5 m of play: 2.5, by hand."""
-    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
-    robot = coaxial_beams(np.array([0, 0, 0, 3e-5, 4e-5, 0]), clearance=play)
-    batch = zone_margin([home_posture(robot)])
-    assert batch.margin[0] == pytest.approx(2.5, rel=1e-9)
-    assert batch.method[0] == "compiled"
-
-
-def test_a_margin_has_two_readings():
-    robot = coaxial_beams(np.zeros(6))
-    with pytest.raises(ValueError, match="compliant is 'soft'"):
-        zone_margin([home_posture(robot)], "soft")
 
 
 def test_margins_of_a_perfect_robot_are_zero_and_are_compiled(grid):

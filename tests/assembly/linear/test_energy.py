@@ -8,16 +8,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from assembly.exact.exact import solve_exact
-from assembly.kinematics.posture import Posture, home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.linear.load import loads_with_weight
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.zone import zone_margin
 from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import flexibility
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.solvers.conic import minimise_energy
@@ -53,9 +51,12 @@ def test_two_springs_in_series_take_the_gap(axis):
     assert answer.platform_screw[axis] == pytest.approx(1.5e-4, rel=1e-12)
 
 
-@pytest.mark.parametrize(("gap", "left"), [(5e-5, 0.0), (1.5e-4, 5e-5)])
-def test_play_is_used_up_before_anything_bends(gap, left):
-    """Radial play of 1e-4 m: the springs only see what it leaves of the gap."""
+@pytest.mark.parametrize(
+    ("gap", "left"),
+    [(5e-5, 0.0), (1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0), (1.5e-4, 5e-5)],
+)
+def test_clearance_is_used_up_before_anything_bends(gap, left):
+    """Radial clearance of 1e-4 m: the springs close only the rest of the gap."""
     play = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
     robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=play)
@@ -209,7 +210,8 @@ def test_a_load_along_a_free_motion_has_no_equilibrium():
     assert across.energy == 0.0
 
 
-def test_play_bound_of_a_passive_joint_holds_where_it_matters():
+@pytest.mark.parametrize("method", METHODS)
+def test_bound_of_a_passive_joints_motion_holds(method):
     """A passive slider bounded to +-1e-4 m: the spring takes the rest of the gap."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
@@ -219,12 +221,18 @@ def test_play_bound_of_a_passive_joint_holds_where_it_matters():
               geometric_error=[0, 0, 0, 0, 0, 3e-4]),
     )  # fmt: skip
     robot = Robot("slider", "end", frames, (("end", "wall"),))
-    answer = solve_assembly(home_posture(robot))
+    answer = solve_assembly(home_posture(robot), method=method)
+    assert answer.method == method
     assert answer.energy == pytest.approx(1e6 * (2e-4) ** 2 / 2, rel=1e-9)
     assert answer.clearance_screws[1, 5] == pytest.approx(1e-4, rel=1e-9)
+    within = home_posture(robot.with_errors(robot.errors / 4))
+    answer = solve_assembly(within, method=method)
+    assert answer.energy == pytest.approx(0, abs=1e-20)
+    assert np.abs(answer.clearance_screws[1, 5]) == pytest.approx(3e-4 / 4, rel=1e-9)
     unbounded = replace(robot, frames=(frames[0], replace(frames[1], clearance=None),
                                        *frames[2:]))  # fmt: skip
-    assert solve_assembly(home_posture(unbounded)).energy == pytest.approx(0, abs=1e-20)
+    answer = solve_assembly(home_posture(unbounded), method=method)
+    assert answer.energy == pytest.approx(0, abs=1e-20)
 
 
 def as_bearings(robot):
@@ -287,35 +295,8 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
             )
             exact = [solve_exact(p).energy for p in (first, second)]
             assert exact[0] == pytest.approx(exact[1], rel=1e-6, abs=scale)
-        tight = without_joint_clearances(one), without_joint_clearances(two)
-        rows = [Posture(r, p.coordinates[None], p.transforms[None], p.mismatch)
-                for r, p in zip(tight, (first, second), strict=True)]  # fmt: skip
-        found = [
-            flexibility(p).solve(
-                np.zeros(1, int), p.robot.errors.reshape(1, -1), loads_with_weight(
-                    p, np.zeros((1, 6)), np.zeros((1, 3))
-                ),
-            )
-            for p in rows
-        ]  # fmt: skip
-        if all(f.solved[0] for f in found):
-            np.testing.assert_allclose(
-                found[0].platform_screw, found[1].platform_screw, rtol=1e-7, atol=1e-12
-            )
         compared += 1
     assert compared > 10
-
-
-def test_play_that_just_suffices_stores_nothing():
-    """A gap of the size of the play, to the last digit: inside, at, and beyond it."""
-    direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
-    for gap, energy in ((1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0),
-                        (1.0001e-4, 0.5e6 * 1e-8**2 / 2)):  # fmt: skip
-        robot = coaxial_beams(gap * direction, clearance=Clearance(radial=1e-4))
-        posture = home_posture(robot)
-        batch = assemble_at(robot, posture.transforms[None])
-        for found in (solve_assembly(posture).energy, batch.energy[0]):
-            assert found == (pytest.approx(energy, rel=1e-3) if energy else 0.0)
 
 
 def test_frames_in_another_order_give_the_same_answer():

@@ -151,24 +151,6 @@ def test_a_load_that_a_hinge_does_not_resist_names_it_and_its_unit_turn():
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
 
 
-@pytest.mark.parametrize("cuts", [1, 3])
-def test_a_cantilever_carries_its_weight_at_its_start_and_nothing_at_its_tip(cuts):
-    """q L and q L^2 / 2 at the wall; between pieces of L / 3 what lies beyond."""
-    answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
-    step = L / cuts
-    for k in range(cuts):
-        row = answer.posture.robot.index(f"p{k}")
-        for wrench, beyond in (
-            (answer.tip_wrenches[row], L - step * (k + 1)),
-            (answer.start_wrenches[row], L - step * k),
-        ):
-            expected = [0, Q * beyond**2 / 2, 0, 0, 0, -Q * beyond]
-            scale = [Q * L**2] * 3 + [Q * L] * 3
-            np.testing.assert_allclose(wrench / scale, expected / np.array(scale),
-                                       atol=1e-9)  # fmt: skip
-    assert np.isnan(answer.start_wrenches[0]).all()
-
-
 def test_a_bent_chains_links_hand_on_what_lies_beyond(rng):
     """Three beams in any directions: at each start the weights and moments of all that
     lies beyond, the tip's load among them; at each tip the next one's start."""

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.assembled import Assembly
 from assembly.linear.energy import (
     CannotAssemble,
     solve_assembly,
-    with_free_own_axes,
 )
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.linear.reference.reduction import FreeMotion
@@ -218,33 +216,6 @@ def test_no_load_is_the_unloaded_answer_bit_for_bit(grid):
         assert np.array_equal(rows[~every[:, 0]], expected[~every[:, 0]]), name
 
 
-def test_an_answer_does_not_depend_on_its_neighbours(grid, rng):
-    """Other order, or alone by two lanes or many: not a bit changes."""
-    _, postures = grid
-    whole = solve_assembly(postures, LOAD, gravity=GRAVITY)
-    order = rng.permutation(len(postures))
-    other = solve_assembly([postures[i] for i in order], LOAD, gravity=GRAVITY)
-    for name in ROWS:
-        assert np.array_equal(row(other, name), row(whole, name)[order]), name
-    for i in range(0, len(postures), 7):
-        alone = solve_assembly(postures[i], LOAD, gravity=GRAVITY)
-        assert alone.energy == whole.energy[i]
-        assert np.array_equal(alone.platform_screw, whole.platform_screw[i])
-        assert np.array_equal(alone.multipliers, whole.multipliers[i])
-
-
-def test_many_draws_under_a_load_are_those_of_robots_with_these_errors(grid):
-    robot, postures = grid
-    errors = np.array([0.0, 0.5, 1.0])[:, None, None] * robot.errors
-    many = solve_assembly(postures[3], LOAD, errors=errors)
-    for i, own in enumerate(errors):
-        posture = replace(postures[3], robot=robot.with_errors(own))
-        one = solve_assembly(posture, LOAD)
-        assert many.energy[i] == one.energy
-        assert isinstance(many[i], Assembly)
-        assert np.array_equal(many[i].wrenches, one.wrenches)
-
-
 def test_a_driven_motion_stops_no_other_point():
     """A hinge that a moment turns has no equilibrium; a force through it does."""
     link = MatrixLink(1e6 * np.eye(6))
@@ -255,9 +226,3 @@ def test_a_driven_motion_stops_no_other_point():
     assert list(turned.method).count("reference") == 1
     assert turned.status[0] == "no equilibrium"
     assert pulled.platform_screw[0, 3] == pytest.approx(1e-5, rel=1e-12)
-
-
-def test_loads_of_one_posture_or_many_are_those_of_unloaded_kinds(grid):
-    """Hinged readings and pose errors see no load."""
-    many = solve_assembly(grid[1][:2])
-    assert not with_free_own_axes(many).loaded.any()

@@ -109,9 +109,12 @@ def test_what_is_not_proved_compiled_is_the_references_answer_to_the_bit(load):
     assert list(many.method).count("reference") == 1
 
 
-def test_points_beside_one_that_is_not_proved_stay_compiled(monkeypatch):
+def test_only_the_point_that_is_not_proved_is_the_references(monkeypatch):
+    """One of three, with its own errors."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures = [home_posture(robot)] * 3
+    errors = robot.errors * np.array([1.0, 0.5, 2.0])[:, None, None]
+    whole = solve_assembly(postures, errors=errors)
     solve = energy.assemble_side_by_side
 
     def uncertified(structure, T, errors, mismatch, loads, out):
@@ -119,10 +122,12 @@ def test_points_beside_one_that_is_not_proved_stay_compiled(monkeypatch):
         out["outcome"][len(T) // 2] = 4
 
     monkeypatch.setattr(energy, "assemble_side_by_side", uncertified)
-    found = solve_assembly(postures)
+    found = solve_assembly(postures, errors=errors)
     assert found.method.tolist() == ["compiled", "reference", "compiled"]
-    asked = solve_assembly(postures[1], method="reference")
+    halved = replace(postures[1], robot=robot.with_errors(errors[1]))
+    asked = solve_assembly(halved, method="reference")
     assert found.energy[1] == asked.energy
+    assert np.array_equal(found.energy[[0, 2]], whole.energy[[0, 2]])
     assert found.to_xarray().method.values.tolist() == found.method.tolist()
 
 

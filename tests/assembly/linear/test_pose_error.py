@@ -171,18 +171,6 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
         assert height == pytest.approx(most.value / 1e4, rel=1e-6, abs=1e-11)
 
 
-def test_the_largest_error_grows_with_the_bound_and_begins_where_it_is_zero():
-    spins = [0.0, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1.0]
-    found = [bounds(hinged_frame(spin)) for spin in spins]
-    for part in ("rotation_error", "translation_error"):
-        low, high = np.array([getattr(one, part) for one in found]).T
-        assert np.all(low[:-1] <= high[1:])
-        assert high[1] - low[0] <= 3e-9
-        assert low[-1] > 1.1 * high[0]
-        # a bound that no clearance comes near changes nothing
-        assert low[-1] == pytest.approx(low[-2], rel=1e-5)
-
-
 def test_planar_loop_by_vertex_enumeration():
     """Two play joints along x and y meet a third: a polygon's farthest vertex.
 
@@ -233,13 +221,14 @@ def test_frozen_deformations_leave_a_loaded_joint_no_play():
 
 
 def test_reading_must_be_known_and_budget_needs_no_load():
-    answer = solve_assembly(
-        home_posture(coaxial_beams(np.zeros(6))), [1, 0, 0, 0, 0, 0]
+    many = solve_assembly(
+        [home_posture(coaxial_beams(np.zeros(6)))], [1, 0, 0, 0, 0, 0]
     )
-    with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
-        bound_pose_error(answer, "loose")
+    for answer in (many, many[0]):
+        with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
+            bound_pose_error(answer, "loose")
     with pytest.raises(ValueError, match="budget assumption needs no load"):
-        bound_pose_error(answer, "budget")
+        bound_pose_error(many[0], "budget")
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
@@ -271,19 +260,3 @@ def test_clearances_alone_give_a_map_symmetric_in_x():
         left, right = (getattr(b, name) for b in both)
         assert left[0] <= right[1]
         assert right[0] <= left[1]
-
-
-def test_attaining_screws_are_in_the_set_and_no_random_screw_beats_the_bound():
-    """A second method, from inside: random support directions stay below the upper."""
-    answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
-    found = bound_pose_error(answer, "frozen")
-    reach = reachable_screws(answer, "frozen")
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        direction = np.concatenate([rng.normal(size=3), np.zeros(3)])
-        found_there = reach.support(direction)
-        assert direction @ found_there.screw <= found_there.height + 1e-15
-        assert np.linalg.norm(found_there.screw[:3]) <= found.rotation_error[1]
-    assert np.linalg.norm(found.rotation_screw[:3]) == pytest.approx(
-        found.rotation_error[0], rel=1e-12
-    )

@@ -6,7 +6,6 @@ import itertools
 import cvxpy as cp
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
@@ -126,18 +125,6 @@ def test_supports_of_the_paper_robot_equal_cvxpys(reading, rng):
         expected = by_cvxpy(reach, direction)[0]
         assert found.height == pytest.approx(expected, rel=1e-6)
         assert direction @ found.screw == pytest.approx(expected, rel=1e-6)
-
-
-def test_supports_of_intervals_equal_a_linear_programme(rng):
-    reach = small_reach(rng, 8, 3, flat=True)
-    for _ in range(5):
-        direction = rng.normal(size=6)
-        found = linprog(
-            -direction @ reach.map, A_eq=reach.rows, b_eq=reach.rows @ reach.start,
-            bounds=(-1, 1),
-        )  # fmt: skip
-        expected = direction @ (reach.centre + reach.map @ (found.x - reach.start))
-        assert reach.support(direction).height == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -10,7 +10,7 @@ from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.load import loads_on_frames
 from assembly.linear.reference.reduction import FreeMotion, reduce_problem
 from assembly.model.robot import Frame, Robot
-from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
+from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def reduced(robot, load=None):
@@ -51,11 +51,6 @@ def test_a_rigid_part_is_open_by_its_error_however_small(gap):
     assert reduced(rigid_beams([gap, 0, 0, 0, 0, 0])).inconsistent == pytest.approx(gap)
 
 
-def test_what_is_closed_to_rounding_is_closed():
-    assert reduced(rigid_beams([0, 0, 0, 0, 5e-13, 0])).inconsistent == 0.0
-    assert reduced(rigid_beams(np.zeros(6))).inconsistent == 0.0
-
-
 def turn_and_slide():
     """A pin about z and a slider along it, 10 m long."""
     return Robot("chain", "tip", (
@@ -78,10 +73,3 @@ def test_a_free_motion_is_named_alike_under_any_load(load):
         reduced(turn_and_slide(), load * np.array([0, 0, 0, 0, 0, 2.0]))
     text = str(told.value)
     assert "it moves slide tz; the platform along [0 0 0 0 0 1] [rad, m]" in text
-
-
-@pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
-def test_a_load_that_springs_resist_drives_nothing(load):
-    robot = planar_four_bar()
-    found = reduced(robot, load * np.array([0, 0, 1.0, 2.0, 3.0, 0]))
-    assert np.isfinite(found.load_multipliers).all()
