@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.exact.dead_load import (
-    curvature_of,
     dead_loads,
     work_gradient,
     work_of,
@@ -20,7 +19,6 @@ from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
-from assembly.robots.irsbot2 import irsbot2
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
 from tests.assembly.exact.test_placement import moved_unknowns
@@ -78,41 +76,6 @@ def test_at_rest_the_loads_pull_as_in_the_linear_model(seed):
     assert (
         np.abs(work_gradient(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
     )
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_both_derivatives_of_the_work(seed):
-    """Far from rest, central differences of 1e-5."""
-    rng = np.random.default_rng(seed)
-    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
-    model, x, h = moved_unknowns(posture, rng, 0.1)
-    load, bodies, gravity = some_loads(posture, rng)
-    loads, step = dead_loads(posture, 0 * load, bodies, gravity), 1e-5
-    here, ahead, behind = (place(model, x + k * step * h) for k in (0, 1, -1))
-    slope = (work_of(ahead, loads) - work_of(behind, loads)) / (2 * step)
-    assert work_gradient(here, loads) @ h == pytest.approx(slope, rel=1e-7)
-    bend = (work_gradient(ahead, loads) - work_gradient(behind, loads)) / (2 * step)
-    found = curvature_of(here, np.zeros(len(here.residual)), loads)
-    assert np.abs(found @ h - bend).max() < 1e-7 * np.abs(bend).max()
-    assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()
-
-
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
-def test_loads_together_work_as_each_alone(point):
-    """Of the platform at a point, of bodies, of weights: energies add up."""
-    rng = np.random.default_rng(7)
-    posture = home_posture(heavy(random_robot(rng, legs=3), rng))
-    model, x, _ = moved_unknowns(posture, rng, 0.1)
-    there = place(model, x)
-    load, bodies, gravity = some_loads(posture, rng)
-    each = [
-        dead_loads(posture, load, point=point), dead_loads(posture, bodies=bodies),
-        dead_loads(posture, gravity=gravity),
-    ]  # fmt: skip
-    together = dead_loads(posture, load, bodies, gravity, point)
-    alone = [work_of(there, loads) for loads in each]
-    assert min(np.abs(alone)) > 1e-6
-    assert work_of(there, together) == pytest.approx(sum(alone), rel=1e-12)
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
@@ -217,8 +180,9 @@ def test_the_linear_model_is_the_limit_of_small_weights():
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_turning_robot_and_gravity_together_turns_the_answer():
-    rng = np.random.default_rng(5)
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
+def test_turning_robot_and_gravity_together_turns_the_answer(seed):
+    rng = np.random.default_rng(seed)
     robot = heavy(random_robot(rng, legs=2), rng)
     R = rotation_matrix(rng.normal(size=3))
     turned = []
@@ -236,19 +200,6 @@ def test_turning_robot_and_gravity_together_turns_the_answer():
     both = np.kron(np.eye(2), R)
     assert there.potential == pytest.approx(here.potential, rel=1e-9)
     assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)
-
-
-def test_the_paper_robot_under_its_weight_at_full_errors():
-    robot = irsbot2_with(NUMBERS["cases"][1])
-    robot = heavy(robot, np.random.default_rng(2))
-    answer = solve_exact(
-        place_robot(robot, pose={"tx": 0.1, "tz": -0.5}), gravity=[0, 0, -G]
-    )
-    assert answer.closure_residual() < 1e-12
-    assert answer.stationarity < 1e-7
-    assert answer.least_curvature > 0
-    plain = solve_exact(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
-    assert plain.loads.beyond_platform is False
 
 
 def test_a_start_under_other_loads_is_refused():

@@ -7,7 +7,6 @@ from assembly.exact.dead_load import dead_loads
 from assembly.exact.descent import expand
 from assembly.exact.equilibrium import (
     active_clearances,
-    curvature_modes,
     imbalance,
     least_curvature,
     tangent_space,
@@ -57,14 +56,6 @@ def test_a_spring_lacks_the_part_of_its_moment_that_a_load_does_not_balance(shar
     assert imbalance(local) == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_spring_that_nothing_loads_lacks_all_its_moment():
-    assert imbalance(at(pendulum(10.0, 0.5), [0.3], None)) == pytest.approx(1.0)
-    assert imbalance(at(pendulum(10.0, 0.5), [0.0], None)) == 0.0
-    # less than that of a billionth of a radian counts by it
-    tiny = 0.25e-9 * np.sqrt(10.0)
-    assert imbalance(at(pendulum(10.0, 0.5), [tiny], None)) == pytest.approx(0.25)
-
-
 @pytest.mark.parametrize(("size", "small"), [(1.0, 0.0), (1e-10, 1e-9)])
 def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
     size, small
@@ -97,8 +88,6 @@ def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
         (-1.0, -5.0, 0.0),
         (1.0, -5.0, 0.5),  # a bound does not pull
         (-1.0, 5.0, 0.5),
-        (1.0 - 5e-6, 5.0, (1 - (1 - 5e-6) ** 2) / 2),  # short of where it is held
-        (1.0 - 2e-5, 5.0, 0.5),  # too far from its bound to be held
         (0.3, 0.0, 0.0),
     ],
 )
@@ -130,24 +119,6 @@ def test_where_all_plays_are_pressed_nothing_moves():
     assert active_clearances(local)[1] == pytest.approx([3 * C, 4 * C], rel=1e-12)
     assert tangent_space(local)[0].shape == (2, 0)
     assert least_curvature(local) == np.inf
-
-
-@pytest.mark.parametrize("units", [1.0, 1e-3])
-def test_modes_are_orthonormal_in_their_units_and_do_not_mix(rng, units):
-    """Whatever the basis of the motions."""
-    D, A = rng.normal(size=(7, 3)), rng.normal(size=(3, 3))
-    H, scales = A + A.T, units * rng.uniform(0.5, 2.0, 7)
-    values, motions = curvature_modes(D, H, scales)
-    assert (np.diff(values) > 0).all()
-    scaled = motions / scales[:, None]
-    assert scaled.T @ scaled == pytest.approx(np.eye(3), abs=1e-12)
-    parts = np.linalg.lstsq(D, motions)[0]
-    assert D @ parts == pytest.approx(motions, abs=1e-12 * units)
-    size = np.abs(values).max()
-    assert parts.T @ H @ parts == pytest.approx(np.diag(values), abs=1e-11 * size)
-    other = rng.normal(size=(3, 3))
-    again, _ = curvature_modes(D @ other, other.T @ H @ other, scales)
-    assert again == pytest.approx(values, abs=1e-9 * size)
 
 
 def test_a_bound_presses_with_the_energy_that_a_larger_play_would_save():

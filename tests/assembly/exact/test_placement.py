@@ -9,7 +9,6 @@ from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture
 from assembly.kinematics.se3 import (
     bracket,
-    bracket_form,
     exponential,
     inverse,
     left_jacobian,
@@ -80,11 +79,6 @@ def test_second_derivative_of_the_exponential(rng, size):
     assert np.abs(form - form.T).max() == 0.0
     scale = np.linalg.norm(w) * np.linalg.norm(h) ** 2
     assert abs(h @ form @ h - expected) < (10 * rounding + 1e-7) * scale
-
-
-def test_the_bracket_form_is_the_work_on_a_bracket(rng):
-    a, b, w = rng.normal(size=(3, 6))
-    assert a @ bracket_form(w) @ b == pytest.approx(w @ (bracket(a) @ b), rel=1e-13)
 
 
 # Closures of a robot
