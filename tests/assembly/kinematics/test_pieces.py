@@ -10,7 +10,6 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from stiffness.screws import rotation_matrix, screw_map, transform
-from tests.robots_for_tests import random_robot
 
 BEAM = BeamLink({"radius": 0.01}, 7e10, 0.3)
 LENGTH = np.sqrt(0.3**2 + 0.2**2 + 0.6**2)  # 0.7 m
@@ -27,14 +26,6 @@ def arm(pieces):
         Frame("wrist", "elbow", [0.0, 0.4, 0.0], link=BEAM),
         Frame("tip", "wrist", [0.1, 0, 0], link=MatrixLink(np.eye(6))),
     ))  # fmt: skip
-
-
-def test_a_robot_without_pieces_is_itself():
-    robot = arm(1)
-    whole = cut_beams(robot)
-    assert whole.robot is robot
-    assert whole.owner.tolist() == whole.last.tolist() == [0, 1, 2, 3]
-    assert not whole.back.any()
 
 
 @pytest.mark.parametrize("pieces", [2, 3, 5])
@@ -102,17 +93,3 @@ def test_a_posture_is_cut_as_the_cut_robot_is_placed():
     assert both.transforms.shape == (2, 6, 4, 4)
     for row in both.transforms:
         assert row == pytest.approx(cut.cut(home).transforms, abs=1e-15)
-
-
-def test_what_acts_at_frames_acts_where_their_beams_end(rng):
-    cut = cut_beams(arm(3))
-    rows = rng.normal(size=(2, 4, 6))
-    spread = cut.spread(rows)
-    assert spread.shape == (2, 6, 6)
-    assert np.array_equal(spread[:, [0, 3, 4, 5]], rows)
-    assert not spread[:, 1:3].any()
-
-
-def test_matrices_are_not_cut(rng):
-    robot = random_robot(rng)
-    assert cut_beams(robot).robot is robot
