@@ -1,13 +1,10 @@
 """Load against deflection: clearances, contacts, buckling, jumps; closed forms."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
-from assembly.platform_stiffness import deflection
 from assembly.platform_stiffness.deflection import deflection_curve
 from assembly.robots import load_robot
 
@@ -196,20 +193,3 @@ def test_column_whose_platform_cannot_move_sideways_buckles_inside_its_links():
     assert (
         event.what == "buckles: inside the links, the platform stays; most in top link"
     )
-
-
-def test_contacts_that_change_with_rounding_end_within_a_step():
-    """A clearance that changes 1000 times in a step is followed eight times."""
-    asked = []
-
-    def at(load, near=None):
-        asked.append(load)
-        equilibrium = SimpleNamespace(platform_screw=np.zeros(6))
-        tangent = SimpleNamespace(stable=True, length=1.0, compliance=np.eye(6))
-        pressed = frozenset({"pin radial"} if int(1000 * load) % 2 else ())
-        return deflection._Point(load, equilibrium, tangent, pressed)
-
-    events = deflection._events(at(0.0), at(0.9995), at, 5)
-    assert {event.kind for event in events} <= {"contact", "release"}
-    assert 1 <= len(events) <= 8
-    assert len(asked) <= 2 + 8 * 14

@@ -350,11 +350,3 @@ def test_both_sides_of_a_change_of_contact(state):
     away = platform_stiffness(posture, state, side="letting go")
     assert stop.along(UNIT[5])[0] == np.inf
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
-
-
-def test_an_unknown_state_and_a_direction_that_is_none_are_refused():
-    posture = home_posture(load_robot("four_bar"))
-    with pytest.raises(ValueError, match="no state"):
-        platform_stiffness(posture, "loose")
-    with pytest.raises(ValueError, match="not all 0"):
-        platform_stiffness(posture).shares(np.zeros(6))
