@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 from assembly.effects.places import drives
 from assembly.kinematics.posture import Posture, home_posture, place_many_joints
 from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.contacts import contact_deflections
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import assemble_row, predict, read
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -130,21 +129,6 @@ def test_rows_that_do_not_converge_claim_nothing():
     assert not found.any()
     angle = predict(here).deviation[0, 2]
     assert angle == pytest.approx(brentq(lambda x: x - 3 * np.cos(x), 0, 2), rel=1e-9)
-
-
-def test_contacts_that_load_each_other_balance_their_laws(rng):
-    """c |d|^n sign d = w + A d with A < 0, of all signs and sizes."""
-    laws = tuple(
-        ContactLaw(f"j{k}", c, n) for k, (c, n) in enumerate([(2e6, 1.5), (3e7, 2.0)])
-    )
-    d = rng.uniform(-1, 1, (40, 2)) * 10.0 ** rng.uniform(-6, -3, (40, 1))
-    B = rng.normal(size=(40, 2, 2))
-    A = -3e4 * np.einsum("rij,rkj->rik", B, B) - 1e3 * np.eye(2)
-    c, n = np.array([2e6, 3e7]), np.array([1.5, 2.0])
-    w = c * np.abs(d) ** n * np.sign(d) - np.einsum("rij,rj->ri", A, d)
-    found, converged = contact_deflections(laws, w, A)
-    assert converged.all()
-    np.testing.assert_allclose(found, d, rtol=1e-6, atol=1e-10)
 
 
 @pytest.mark.parametrize("seed", [0, 3, 5, 7])

@@ -87,18 +87,6 @@ def test_a_direction_is_that_of_the_last_step_within_its_session(rng):
         assert history.direction("approach").tolist() == approach.tolist()
 
 
-def test_sessions_stay_in_their_order_and_rows_in_that_of_time(rng):
-    """Each session begins again, wherever its rows stand in the table."""
-    session = np.array([1, 0, 1, 0, 1])
-    time = np.array([5.0, 2.0, 1.0, 1.0, 3.0])
-    history, row = in_order({"time": time, "u": time}, session)
-    assert row.tolist() == [2, 4, 0, 3, 1]
-    assert history.first.tolist() == [True, False, False, True, False]
-    one, _ = in_order({"time": time, "u": time}, None)
-    assert one.first.tolist() == [True, False, False, False, False]
-    assert history.fading(2.0) == pytest.approx(np.exp([-0.5, -1.5, -2.5, -0.5, -1]))
-
-
 def test_nothing_settles_in_no_time():
     """A row at time 0 has not begun to lag; one at the moment of another as that."""
     given = {"time": np.array([0.0, 2.0, 2.0]), "u": np.array([3.0, 3.0, 7.0])}

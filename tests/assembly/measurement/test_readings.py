@@ -59,17 +59,6 @@ def test_a_reading_is_that_of_rigid_bodies(rows, own_targets, by_row, rng):
         assert seen[k] - here.reading[k] == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_reading_of_any_of_three_kinds_is_not_the_pose_error(rows):
-    """Whatever of a device's frame, its tool and its own reading there is."""
-    here = as_declared(rows)
-    assert not here.reads_otherwise
-    for part in ("base", "tool", "reading"):
-        shape = {"base": 6, "tool": 3, "reading": (ROWS, 6)}[part]
-        some = np.zeros(shape)
-        some.flat[-1] = 1e-6
-        assert replace(here, **{part: some}).reads_otherwise, part
-
-
 def test_what_finite_motions_add_is_added_to_the_linear_model_alone(rows, rng):
     added = 1e-3 * rng.normal(size=(ROWS, 6))
     here = as_declared(rows)

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from assembly.kinematics.posture import home_posture
-from assembly.measurement.conditions import ContactLaw, as_declared
-from assembly.measurement.predict import _linear
+from assembly.measurement.conditions import as_declared
 from assembly.measurement.settled_clearance import (
     fractions,
     with_clearances_at_rest,
@@ -65,30 +63,6 @@ def test_a_point_is_measured_where_it_is():
     expected = [1.0 + 0.1, 0.2 * c + 0.3 * s, 0.2 * s - 0.3 * c]
     assert conditions.measured_points[0] == pytest.approx(expected)
     assert conditions.measured_arms[0] == pytest.approx(np.array(expected) - [1, 0, 0])
-
-
-@pytest.mark.parametrize("force", [500.0, -2.0])
-def test_a_contact_in_one_of_two_springs_side_by_side_shifts_the_load(force):
-    """x = F_a / K + (F_a / c)^(2/3) = (F - F_a) / K along two sliders, by bisection."""
-    K, c = 1e6, 3e8
-    spring = np.diag([np.inf] * 5 + [K])
-    robot = Robot("pair", "end_a", (
-        Frame("a", joint="prismatic", actuated=True, joint_stiffness=spring),
-        Frame("end_a", "a", [0.1, 0, 0]),
-        Frame("b", joint="prismatic", actuated=True, joint_stiffness=spring),
-        Frame("end_b", "b", [0.1, 0, 0]),
-    ), (("end_a", "end_b"),))  # fmt: skip
-    conditions = at_home(robot, [0, 0, 0, 0, 0, force])
-    conditions = replace(conditions, laws=(ContactLaw("a", c, 1.5),))
-    screws, wrenches, solved = _linear(conditions)
-    F = abs(force)
-    own = brentq(lambda f: f / K + (f / c) ** (2 / 3) - (F - f) / K, 0.0, F, xtol=1e-13)
-    assert solved.all()
-    sign = np.sign(force)
-    assert screws[0, 5] == pytest.approx(sign * (F - own) / K, rel=1e-6)
-    through = wrenches[0].reshape(-1, 6)[:, 5]
-    assert through[[0, 2]] == pytest.approx([sign * own, sign * (F - own)], rel=1e-6)
-    assert own < 0.45 * F
 
 
 def test_play_at_rest_is_a_share_of_its_bounds_and_no_play_is_none():
