@@ -8,7 +8,6 @@ import pytest
 
 from assembly.effects import apply_effects, apply_known
 from assembly.effects.functions import apply_functions, basis
-from assembly.effects.units import units_of
 from assembly.kinematics.posture import place_many_joints, place_robot
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict
@@ -252,30 +251,3 @@ def test_what_settles_by_itself_and_what_jumps():
     )
     assert seen(rows, jump)[:, 2] == pytest.approx([0, 2e-5, 2e-5], abs=1e-15)
     assert seen(rows, slow)[:, 2] == pytest.approx([0, 3e-5, -3e-5], abs=1e-15)
-
-
-def test_units_follow_from_variables():
-    waves = at_drive({"1.sine": 1.0}, "waves")
-    assert units_of(RIGID, waves) == {"1.sine": "rad"}
-    bend = at_drive({"2": 1.0}, variables=("wrench.drive.mz",))
-    assert units_of(RIGID, bend) == {"2": "rad/(N^2 m^2)"}
-    soft = at_drive({"0": 1.0, "1": 1.0}, kind="compliance")
-    assert units_of(RIGID, soft) == {"0": "rad/(N m)", "1": "rad/(N m)"}
-    warm = Function("tip", ("tx",), ("cov.temperature",), "powers", {"2": 1.0})
-    assert units_of(RIGID, warm) == {"2": "m/K^2"}
-    # a gain is per unit of what is followed, but of time, which only passes
-    memory = {"gain": 1.0, "start": 1.0, "time_constant": 1.0}
-    lag = at_drive(memory, "lag", ("cov.temperature",))
-    assert units_of(RIGID, lag) == {
-        "gain": "rad/K",
-        "start": "rad",
-        "time_constant": "s",
-    }
-    creep = at_drive(memory, "creep", ("time",))
-    assert units_of(RIGID, creep) == {
-        "gain": "rad", "start": "rad", "time_constant": "s"
-    }  # fmt: skip
-    formula = at_drive(
-        {"a": 1.0, "k": 1.0}, "formula", ("time",), formula="a*exp(-k*time)"
-    )
-    assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}  # rad is a number

@@ -56,6 +56,10 @@ UNITS = [
      "spline first.1 last.1 first.2 last.2", "m, m, K, K"),
     ("tip rz", "load.fz", "spline first last", "N, N"),
     ("tip tx", "load.fz", "step at size", "N, m"),
+    ("drive rz", "wrench.drive.mz", "powers 2", "rad/(N^2 m^2)"),
+    # a gain is per unit of what is followed, but of time, which only passes
+    ("drive rz", "cov.temperature", "lag gain start time_constant", "rad/K, rad, s"),
+    ("drive rz", "time", "creep gain start time_constant", "rad, rad, s"),
 ]  # fmt: skip
 # a compliance is over the wrench of its component
 COMPLIANCES = [
@@ -79,3 +83,9 @@ def test_units_of_a_function_follow_from_its_variables(
         dict.fromkeys(numbers, 1.0), kind,
     )  # fmt: skip
     assert ", ".join(units_of(RIGID, function).values()) == units
+
+
+def test_units_of_a_formula_make_its_value_an_angle():
+    formula = Function("drive", ("rz",), ("time",), "formula", {"a": 1.0, "k": 1.0},
+                       formula="a*exp(-k*time)")  # fmt: skip
+    assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}
