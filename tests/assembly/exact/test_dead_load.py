@@ -9,10 +9,9 @@ from scipy.optimize import brentq
 from assembly.exact.dead_load import (
     dead_loads,
     work_gradient,
-    work_of,
 )
 from assembly.exact.exact import solve_exact
-from assembly.exact.finite_robot import LINK, FiniteRobot
+from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import virtual_joints
@@ -21,7 +20,6 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
-from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
 from validation.multibody.simulation import (
     SimulationModel,
@@ -50,32 +48,6 @@ def on_a_hinge(stiffness, *frames):
     """Rigid bodies on an elastic hinge about z."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
     return home_posture(Robot("arm", frames[-1].name, (hinge, *frames)))
-
-
-def some_loads(posture, rng):
-    count = len(posture.robot.frames)
-    return rng.normal(size=6), rng.normal(size=(count, 6)), rng.normal(size=3) * G
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_at_rest_the_loads_pull_as_in_the_linear_model(seed):
-    rng = np.random.default_rng(seed)
-    robot = heavy(random_robot(rng, legs=3), rng)
-    posture = home_posture(robot.with_errors(0 * robot.errors))
-    load, bodies, gravity = some_loads(posture, rng)
-    linear = solve_assembly(posture, load, bodies, gravity)
-    model = moved_unknowns(posture, rng, 0.0)[0]
-    loads = dead_loads(posture, load, bodies, gravity)
-    here = place(model, np.zeros(len(model.frame)))
-    forces = np.where(model.motion == LINK, *(
-        np.einsum(
-            "ij,ij->i", model.columns, forces.reshape(-1, 6)[model.frame]
-        ) for forces in (linear.frame_loads.body, linear.frame_loads.joint)
-    ))  # fmt: skip
-    assert work_of(here, loads) == pytest.approx(0.0, abs=1e-13)
-    assert (
-        np.abs(work_gradient(here, loads) - forces).max() < 1e-12 * np.abs(forces).max()
-    )
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])

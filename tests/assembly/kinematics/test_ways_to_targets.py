@@ -146,19 +146,3 @@ def test_a_free_body_is_turned_and_put_where_it_is_told(given, rng):
     if given != "place":
         R = Rotation.from_rotvec(wanted[:, 3:]).as_matrix()
         np.testing.assert_allclose(T[:, :3, :3], R, rtol=0, atol=1e-8)
-
-
-def test_one_component_of_a_turn_is_that_of_scipys_vector(rng):
-    """The others are left open; beside a place."""
-    robot = BALL
-    wanted = np.full((12, 6), np.nan)
-    wanted[:, :3] = 0.2 * rng.normal(size=(12, 3))
-    wanted[np.arange(12), 3 + np.arange(12) % 3] = rng.uniform(-0.8, 0.8, 12)
-    track = follow(robot, np.zeros(7), Target(pose=wanted))
-    assert track.reached.sum() > 6
-    T = track.transforms[track.reached, robot.index("body")]
-    wanted = wanted[track.reached]
-    vectors = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
-    found = np.c_[T[:, :3, 3], vectors]
-    asked = np.isfinite(wanted)
-    np.testing.assert_allclose(found[asked], wanted[asked], rtol=0, atol=1e-8)

@@ -135,18 +135,6 @@ def test_errors_and_clearances_times_s_give_energy_times_s_squared(scale):
     )
 
 
-def test_swapping_the_chains_of_a_closure_changes_only_its_wrenchs_sign():
-    robot = irsbot2_with(NUMBERS["cases"][1])
-    swapped = replace(robot, closures=tuple((b, a) for a, b in robot.closures))
-    pose = {"tx": -0.2, "tz": -0.45}
-    one = solve_assembly(place_robot(robot, pose=pose))
-    other = solve_assembly(place_robot(swapped, pose=pose))
-    assert other.energy == pytest.approx(one.energy, rel=1e-10)
-    scale = np.abs(one.closure_wrenches[-1]).reshape(2, 3).max(axis=1).repeat(3)
-    left = (other.closure_wrenches[-1] + one.closure_wrenches[-1]) / scale
-    assert np.abs(left).max() < 1e-6
-
-
 def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
     """Another reference point on the same body: a rigid body's small motion."""
     robot = irsbot2_with(NUMBERS["cases"][0])
@@ -297,17 +285,6 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
             assert exact[0] == pytest.approx(exact[1], rel=1e-6, abs=scale)
         compared += 1
     assert compared > 10
-
-
-def test_frames_in_another_order_give_the_same_answer():
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    turned = Robot(robot.name, robot.platform, robot.frames[::-1], robot.closures)
-    one = solve_assembly(home_posture(robot))
-    other = solve_assembly(home_posture(turned))
-    assert other.energy == pytest.approx(one.energy, rel=1e-10)
-    name = "leg2.link_b"
-    a, b = one.wrenches[robot.index(name)], other.wrenches[turned.index(name)]
-    assert np.allclose(a, b, rtol=1e-6, atol=1e-6 * np.abs(a).max())
 
 
 @settings(deadline=None, max_examples=25)

@@ -13,7 +13,6 @@ from assembly.linear.reference import pose_error as reach
 from assembly.linear.zone import zone_margin
 from assembly.model.robot import Clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from assembly.robots import BUILT_IN
 from assembly.solvers import one_problem
 from assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
@@ -129,21 +128,6 @@ def test_only_the_point_that_is_not_proved_is_the_references(monkeypatch):
     assert found.energy[1] == asked.energy
     assert np.array_equal(found.energy[[0, 2]], whole.energy[[0, 2]])
     assert found.to_xarray().method.values.tolist() == found.method.tolist()
-
-
-@pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_brackets_of_both_methods_share_a_point_on_every_built_in_robot(name):
-    """Of the same solution of (22); the searches have nothing in common."""
-    answer = solve_assembly(home_posture(BUILT_IN[name]()))
-    for reading in reach.ASSUMPTIONS:
-        one, other = (
-            bound_pose_error(answer, reading, method=method) for method in METHODS
-        )
-        for half in ("rotation_error", "translation_error"):
-            (low, high), (least, most) = getattr(one, half), getattr(other, half)
-            assert low <= most * (1 + 1e-9)
-            assert least <= high * (1 + 1e-9)
-            assert max(high - low, most - least) <= 1e-6
 
 
 def test_the_classical_stiffness_is_the_reference():

@@ -132,6 +132,8 @@ def test_the_true_error_is_below_the_stated_one_however_stiff_the_links(name, yo
         assert off > 1e-6
         assert "the platform's rotation is proved to" in unproved(answer)
         assert "stiffnesses differ" in unproved(answer)
+    batch = solve_assembly([answer.posture])
+    assert (batch.status[0] == "ok") == (unproved(answer) == "")
 
 
 def two_springs(k, gap, open_):

@@ -11,6 +11,8 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.reference.as_printed import margin_as_printed
 from assembly.linear.zone import Zone, zone_margin
 from assembly.model.robot import Clearance, Frame, Robot
+from assembly.robots import BUILT_IN
+from assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -57,22 +59,24 @@ def test_passive_joints_take_up_what_they_can_for_nothing():
     assert zone_margin(home_posture(robot.with_errors(errors))).margin == np.inf
 
 
-def test_range_of_a_passive_joint_does_not_scale_with_the_margin():
-    """Slider of range 1e-4 and an axial play of 1e-5: (3e-4 - 1e-4) / 1e-5."""
+@pytest.mark.parametrize("method", METHODS)
+def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
+    """Slider of range 1e-4, axial clearance of 1e-5: (3e-4 - 1e-4) / 1e-5."""
     frames = (
         Frame("slide", joint="prismatic", clearance=Clearance(axial=1e-4)),
         Frame("joint", "slide", clearance=Clearance(axial=1e-5)),
         Frame("end", "joint"),
         Frame("wall", geometric_error=[0, 0, 0, 0, 0, 3e-4]),
     )
-    robot = Robot("slider", "end", frames, (("end", "wall"),))
-    assert zone_margin(home_posture(robot)).margin == pytest.approx(20.0, rel=1e-9)
     wide = replace(frames[0], clearance=Clearance(axial=4e-4))
-    robot = replace(robot, frames=(wide, *frames[1:]))
-    assert zone_margin(home_posture(robot)).margin == pytest.approx(0.0, abs=1e-12)
     tight = replace(frames[1], clearance=None)
-    robot = replace(robot, frames=(frames[0], tight, *frames[2:]))
-    assert zone_margin(home_posture(robot)).margin == np.inf
+    for slide, joint, margin in (
+        (*frames[:2], 20.0), (wide, frames[1], 0.0), (frames[0], tight, np.inf)
+    ):  # fmt: skip
+        robot = Robot("slider", "end", (slide, joint, *frames[2:]), (("end", "wall"),))
+        zone = zone_margin(home_posture(robot), method=method)
+        assert zone.margin == pytest.approx(margin, rel=1e-9, abs=1e-12)
+        assert zone.bound == pytest.approx(margin, rel=1e-6, abs=1e-12)
 
 
 def test_scaling_the_clearances_by_the_margin_just_assembles():
@@ -117,6 +121,26 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs):
             assert zone.margin == pytest.approx(expected, rel=1e-6, abs=1e-7)
             assert zone.bound <= zone.margin * (1 + 1e-9) + 1e-12
             assert zone.bound == pytest.approx(zone.margin, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("compliant", ["rigid", "free"])
+def test_margins_of_many_robots_are_the_references(compliant, rng):
+    """Both margins lie within 1e-8 of their common certified bounds."""
+    homes = [home_posture(make()) for make in BUILT_IN.values()]
+    for seed in range(80):
+        draw = np.random.default_rng(seed)
+        homes.append(home_posture(random_robot(draw, 1 + seed % 3, 1 + seed // 3 % 3)))
+    compiled = 0
+    for home in homes:
+        errors = 1e-4 * rng.normal(size=(len(home.robot.frames), 6))
+        erring = replace(home, robot=home.robot.with_errors(errors))
+        (zone,) = zone_margin([erring], compliant)
+        compiled += zone.method == "compiled"
+        one = zone_margin(erring, compliant, method="reference")
+        assert zone.margin == pytest.approx(one.margin, rel=1e-7, abs=1e-10)
+        assert zone.bound <= zone.margin * (1 + 1e-11) + 1e-15
+        assert zone.bound <= one.margin * (1 + 1e-9) + 1e-10
+    assert compiled
 
 
 def test_many_errors_or_postures_have_their_own_margins():

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.effects.places import drives
 from assembly.kinematics.posture import Posture, home_posture, place_many_joints
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.exact_rows import solve_rows
-from assembly.measurement.predict import assemble_row, predict, read
+from assembly.measurement.predict import assemble_row, predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
@@ -68,22 +67,6 @@ def test_beams_in_pieces_together_as_one_by_one(rng):
         np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
     whole, _ = solve_rows(here, np.zeros((len(here), 0)))
     assert np.abs(screws - whole).max() > 1e-8  # it matters here
-
-
-def test_a_contact_at_one_drive_settles_as_one_by_one(rng):
-    """One by one the secant settles to 1e-5 of the finite part, some 1e-10 here."""
-    first = drives(load_robot("arm6"))[0]
-    here = loaded_rows("arm6", rng, (ContactLaw(first, 2e6, 1.5),))
-    together = predict(here).deviation
-    for row in range(len(here)):
-        alone = assemble_row(here, row).platform_screw
-        turned = read_alone(here, row, alone)
-        np.testing.assert_allclose(together[row], turned, rtol=0, atol=1e-8)
-
-
-def read_alone(here, row, screw):
-    """What the device makes of one platform screw."""
-    return read(here.take([row]), screw[None])[0]
 
 
 BAR = Robot(

@@ -1,7 +1,5 @@
 """One cone programme, and one farthest screw: closed forms, Clarabel, proofs."""
 
-from itertools import product
-
 import cvxpy as cp
 import numpy as np
 import pytest
@@ -154,30 +152,6 @@ def test_of_an_ellipse_two_supports_tell_all():
     assert low == pytest.approx(np.sqrt(6.5), abs=1e-6)
     assert high - low <= 1e-6
     assert supports <= 2
-
-
-@pytest.mark.parametrize("rows", [0, 1, 3])
-@pytest.mark.parametrize("seed", range(3))
-def test_of_a_zonotope_with_rows_the_farthest_is_one_of_its_corners(seed, rows):
-    """Of intervals with equations every corner has all but so many at their ends."""
-    rng = np.random.default_rng(seed)
-    body = body_of(rng, np.arange(6), rows)
-    right, farthest = body.rows @ body.start, 0.0
-    for free in product([False, True], repeat=6):
-        own = np.array(free)
-        if own.sum() != rows:
-            continue
-        for ends in product([-1.0, 1.0], repeat=6 - rows):
-            v = np.zeros(6)
-            v[~own] = ends
-            v[own] = np.linalg.solve(body.rows[:, own], right - body.rows @ v)
-            if np.abs(v).max() <= 1 + 1e-12:
-                point = body.centre + body.map @ (v - body.start)
-                farthest = max(farthest, float(np.linalg.norm(point[3:])))
-    (low, high), _, _ = body.farthest(3, 1e-3 * farthest)
-    assert low <= farthest * (1 + 1e-12)
-    assert high >= farthest * (1 - 1e-12)
-    assert high - low <= 1e-3 * farthest
 
 
 @pytest.mark.parametrize("widest", [2, 12])

@@ -16,21 +16,6 @@ from assembly.model.robot import Clearance, Frame, Robot
 from tests.robots_for_tests import coaxial_beams
 
 
-def test_how_far_a_disc_and_an_interval_extend(rng):
-    """Without rows: the centre, and each cone's column along the direction."""
-    X = 1e-3 * rng.normal(size=(6, 3))
-    start, centre = np.array([0.3, -0.2, 0.5]), 1e-3 * rng.normal(size=6)
-    reachable = ReachableSet(
-        centre, X, np.zeros((0, 3)), start, np.array([0, 0, 1])
-    )  # fmt: skip
-    for d in np.eye(6):
-        w = X.T @ d
-        expected = d @ centre - w @ start + np.hypot(*w[:2]) + abs(w[2])
-        found = reachable.support(d)
-        assert found.height == pytest.approx(expected, abs=1e-10)
-        assert d @ found.screw == pytest.approx(expected, abs=1e-9)
-
-
 def test_what_nothing_bounds_is_infinite_in_its_own_half():
     """A free shift along x of 2e-8 m leaves the rotation, and the other shifts."""
     free = np.zeros((6, 1))
