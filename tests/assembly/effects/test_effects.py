@@ -12,7 +12,7 @@ from assembly.effects import LIBRARY, apply_effects
 from assembly.effects.base_compliance import on_foundation
 from assembly.effects.friction_hysteresis import elastic_joints
 from assembly.effects.joint_clearance import moving_joints
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict, read
 from assembly.measurement.settled_clearance import with_clearances_taken_up
@@ -129,12 +129,7 @@ def test_a_body_without_a_beam_grows_along_the_line_between_its_joints(frame):
 def test_a_body_lengthens_later_than_the_sensor_warms():
     """Behind a ramp r t the body is at r (t - T + T exp(-t/T))."""
     time, late = np.array([0.0, 50.0, 80.0, 300.0]), 100.0
-    placed = place_robot(arm(), joints={"drive": 0.0})
-    rows = replace(
-        placed,
-        coordinates=np.stack([placed.coordinates] * 4),
-        transforms=np.stack([placed.transforms] * 4),
-    )
+    rows = together([place_robot(arm(), joints={"drive": 0.0})] * 4)
     covariates = {"temperature": 5.0 + 0.02 * time, "time": time}
     there = with_history(as_declared(rows, covariates=covariates))
     values = {"tip": 20e-6, "tip.time_constant": late}
@@ -286,12 +281,8 @@ def parallel():
         place_robot(robot, joints={n: robot.frame(n).position + d for n in drives})
         for d in (0.0, 0.05)
     ]
-    both = replace(
-        placed[0],
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]),
-    )
-    return as_declared(both, rng.normal(0, 20, (2, 6)), point=[0.02, 0.0, 0.05])
+    load = rng.normal(0, 20, (2, 6))
+    return as_declared(together(placed), load, point=[0.02, 0.0, 0.05])
 
 
 @pytest.mark.parametrize("name", CASES)

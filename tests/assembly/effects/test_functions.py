@@ -8,7 +8,7 @@ import pytest
 
 from assembly.effects import apply_effects, apply_known
 from assembly.effects.functions import apply_functions, basis
-from assembly.kinematics.posture import place_many_joints, place_robot
+from assembly.kinematics.posture import place_many_joints, place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict
 from assembly.measurement.variables import with_history
@@ -153,11 +153,7 @@ def campaign_of(times, **columns):
     q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
     coordinates = np.column_stack([q, np.zeros(len(q))])
     postures, _ = place_many_joints(RIGID, coordinates)
-    rows = replace(
-        postures[0],
-        coordinates=np.array([p.coordinates for p in postures]),
-        transforms=np.array([p.transforms for p in postures]),
-    )
+    rows = together(postures)
     session = columns.pop("session", None)
     known = {"time": times, **columns}
     return with_history(as_declared(rows, covariates=known | {"session": session}))

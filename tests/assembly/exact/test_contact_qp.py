@@ -19,14 +19,14 @@ def sizes(u):
     return np.sqrt(np.bincount(GROUP, u**2))
 
 
-def problem(rng, rows, push=3.0, units=1.0):
+def problem(rng, rows):
     """Convex, some cones at their bound at the minimum, others not."""
     A = rng.normal(size=(6, 6))
     inside = rng.normal(size=6)
     inside *= rng.uniform(0.2, 0.7, 3)[GROUP] / sizes(inside)[GROUP]
     H = rng.normal(size=(rows, 6))
     return ClearanceProblem(
-        S=units * (A @ A.T + 0.1 * np.eye(6)), s=units * push * rng.normal(size=6),
+        S=A @ A.T + 0.1 * np.eye(6), s=3.0 * rng.normal(size=6),
         start=inside, group=GROUP, rows=H, right=H @ inside,
     )  # fmt: skip
 
@@ -71,41 +71,6 @@ def test_a_convex_step_is_that_of_a_general_solver(seed, rows):
     assert unbalanced(p, step) < 1e-5
     least = least_by_slsqp(p)
     assert energy(p, p.start + step[0]) == pytest.approx(least, rel=1e-5)
-
-
-@given(seeds, st.integers(0, 2), st.sampled_from([1e-4, 1.0, 1e4]))
-@settings(max_examples=25, deadline=None)
-def test_near_its_end_a_step_is_exact_to_rounding(seed, rows, units):
-    """From a start that is 1e-6 off, in whatever units, also where closures hold."""
-    rng = np.random.default_rng(seed)
-    p = problem(rng, rows, units=units)
-    v, _ = clearance_step(p, near=False)
-    u = p.start + v
-    u = u / np.maximum(sizes(u), 1.0)[GROUP]
-    s, right = p.s + p.S @ (u - p.start), p.rows @ u
-    moved = ClearanceProblem(p.S, s, u, GROUP, p.rows, right)
-    assert unbalanced(moved, clearance_step(moved, near=True)) < 1e-12
-
-
-@given(seeds)
-@settings(max_examples=15, deadline=None)
-def test_negative_curvature_normal_to_a_bound_is_no_saddle(seed):
-    """-c n n' beside multipliers more than c: the minimum that holds without it."""
-    rng = np.random.default_rng(seed)
-    p = problem(rng, 0, push=30.0)
-    u = p.start + clearance_step(p, near=False)[0]
-    u = u / np.maximum(sizes(u), 1.0)[GROUP]
-    s = p.s + p.S @ (u - p.start)
-    force = np.maximum(-np.bincount(GROUP, s * u), 0.0)
-    k = int(np.argmax(force))
-    n = np.where(k == GROUP, u, 0.0)
-    bent = p.S - (n @ p.S @ n + 0.5 * force[k]) * np.outer(n, n)
-    assert np.linalg.eigvalsh(bent)[0] < 0
-    at = ClearanceProblem(bent, s, u, GROUP, p.rows, p.right)
-    near, far = clearance_step(at, True), clearance_step(at, False)
-    assert np.abs(near[0]).max() < 1e-5
-    assert np.abs(far[0]).max() < 1e-4
-    assert unbalanced(at, near) < 1e-12
 
 
 @pytest.mark.parametrize("near", [True, False])

@@ -1,7 +1,5 @@
 """Sizes and resultants of dead loads, of one condition or of many."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from assembly.exact.dead_load import (
     wrenches_on_frames,
 )
 from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, together
 from tests.assembly.exact.test_dead_load import heavy
 from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import random_robot, with_bodies
@@ -54,11 +52,7 @@ def test_loads_of_many_conditions_are_those_of_each(point):
     errors = 1e-2 * rng.normal(size=(rows, len(robot.frames), 6))
     load, gravity = rng.normal(size=(rows, 6)), 9.8 * rng.normal(size=(rows, 3))
     postures = [home_posture(robot.with_errors(one)) for one in errors]
-    many = replace(
-        postures[0],
-        transforms=np.stack([p.transforms for p in postures]),
-        coordinates=np.stack([p.coordinates for p in postures]),
-    )
+    many = together(postures)
     found = dead_loads_of_rows(many, errors, load, gravity, np.array(point))
     for k, posture in enumerate(postures):
         one = dead_loads(posture, load[k], gravity=gravity[k], point=point)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.pieces import cut_beams
-from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot, together
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 
 BEAM = BeamLink({"radius": 0.01}, 7e10, 0.3)
@@ -36,12 +36,7 @@ def test_a_posture_is_cut_as_the_cut_robot_is_placed():
     assert found.transforms == pytest.approx(expected.transforms, abs=1e-14)
     assert found.coordinates == pytest.approx(expected.coordinates, abs=1e-14)
     home = home_posture(robot)
-    many = replace(
-        home,
-        coordinates=np.stack([home.coordinates] * 2),
-        transforms=np.stack([home.transforms] * 2),
-    )
-    both = cut.cut(many)
+    both = cut.cut(together([home] * 2))
     assert both.transforms.shape == (2, 6, 4, 4)
     for row in both.transforms:
         assert row == pytest.approx(cut.cut(home).transforms, abs=1e-15)

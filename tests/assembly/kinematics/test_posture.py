@@ -10,20 +10,12 @@ from assembly.kinematics.posture import (
     home_posture,
     joint_target,
     place_robot,
+    together,
 )
 from assembly.model.robot import Frame, Robot
 from assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from tests.linkages_for_tests import GROUND, four_bar, four_bar_angles
-
-
-def many_of(*postures):
-    """Several postures of one robot in one."""
-    return replace(
-        postures[0],
-        coordinates=np.stack([p.coordinates for p in postures]),
-        transforms=np.stack([p.transforms for p in postures]),
-    )
 
 
 def turned(*angles):
@@ -34,7 +26,7 @@ def test_one_posture_shows_its_pose_and_many_their_number():
     one, other = turned(0.4, 0.9)
     assert "drives" in repr(one)
     assert "crank 0.4 [rad, m]" in repr(one)
-    many = many_of(one, other, one)
+    many = together([one, other, one])
     assert repr(many) == "Posture of bars\n  postures  (3,)"
     grid = replace(
         many, coordinates=many.coordinates[None], transforms=many.transforms[None]
@@ -51,7 +43,7 @@ def test_a_robot_without_drives_says_so():
 def test_paths_move_screws_from_each_frame_to_the_platform():
     """[R 0; [p_j - p]x R, R], of one posture and of each of many."""
     postures = turned(0.4, 0.9)
-    many = many_of(*postures)
+    many = together(postures)
     last = postures[0].robot.index(postures[0].robot.platform)
     for row, one in enumerate(postures):
         for j, T in enumerate(one.transforms):

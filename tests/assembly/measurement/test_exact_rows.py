@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from assembly.kinematics.posture import Posture, home_posture, place_many_joints
+from assembly.kinematics.posture import home_posture, place_many_joints, together
 from assembly.measurement.conditions import ContactLaw, as_declared
 from assembly.measurement.exact_rows import solve_rows
 from assembly.measurement.predict import assemble_row, predict
@@ -30,10 +30,7 @@ def loaded_rows(name, rng, laws=()):
     postures = [p for p in postures if p is not None] * 2
     count = len(postures)
     here = as_declared(
-        Posture(
-            robot, np.array([p.coordinates for p in postures]),
-            np.array([p.transforms for p in postures]), 1e-9,
-        ),
+        together(postures),
         rng.uniform(-1, 1, (count, 6)) * np.repeat([5.0, 100.0], 3),
         mismatch=[p.mismatch for p in postures],
         point=[0.02, -0.01, 0.03],
@@ -123,10 +120,7 @@ def test_rows_in_another_unit_of_length_turn_alike(seed, rng):
     load = rng.uniform(-1, 1, (1, 6)) * 0.1
     found = []
     for s in (1.0, 1e3, 1e-3):
-        at = home_posture(in_millimetres(robot, s))
-        postures = replace(
-            at, coordinates=at.coordinates[None], transforms=at.transforms[None]
-        )
+        postures = together([home_posture(in_millimetres(robot, s))])
         here = as_declared(postures, load * np.repeat([s, 1.0], 3))
         screws, converged = solve_rows(replace(here, exact=True), np.zeros((1, 0)))
         assert converged.all()

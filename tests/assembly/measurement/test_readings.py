@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from assembly.kinematics.posture import Posture, place_robot
+from assembly.kinematics.posture import place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, read
 from assembly.model.robot import Frame, Robot
@@ -28,10 +28,7 @@ def rows():
         place_robot(robot, joints={"one": 0.3 * k, "two": 1 - 0.5 * k})
         for k in range(ROWS)
     ]
-    return Posture(
-        robot, np.array([p.coordinates for p in placed]),
-        np.array([p.transforms for p in placed]), 0.0,
-    )  # fmt: skip
+    return together(placed)
 
 
 @pytest.mark.parametrize("own_targets", [False, True])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.settled_clearance import (
     fractions,
@@ -19,10 +19,7 @@ RADIAL, AXIAL = 1e-5, 3e-5
 
 def at_home(robot, load, **given):
     """One row."""
-    at = home_posture(robot)
-    postures = replace(
-        at, coordinates=at.coordinates[None], transforms=at.transforms[None]
-    )
+    postures = together([home_posture(robot)])
     return as_declared(postures, np.array([load], dtype=float), **given)
 
 

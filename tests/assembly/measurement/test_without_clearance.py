@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from assembly.kinematics.posture import home_posture
+from assembly.kinematics.posture import home_posture, together
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.load import loads_with_weight
 from assembly.measurement.conditions import as_declared
@@ -24,10 +24,7 @@ STILL = np.zeros((1, 3))
 
 def at_home(robot):
     """One posture, as a batch of one."""
-    here = home_posture(robot)
-    return replace(
-        here, coordinates=here.coordinates[None], transforms=here.transforms[None]
-    )
+    return together([home_posture(robot)])
 
 
 def solved(robot, load, errors=None):
