@@ -8,18 +8,21 @@ from scipy.optimize import brentq
 
 from assembly.exact.dead_load import (
     dead_loads,
+    dead_loads_of_rows,
     work_gradient,
+    wrenches_on_frames,
 )
 from assembly.exact.exact import solve_exact
 from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
-from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.posture import home_posture, place_robot, together
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
 from assembly.model.links import link_compliance
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from tests.assembly.exact.test_exact import only
+from tests.assembly.exact.test_placement import moved_unknowns
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot, with_bodies
 from validation.multibody.simulation import (
     SimulationModel,
@@ -209,3 +212,54 @@ def test_the_simulation_agrees_about_weight_at_full_errors(gravity):
     assert difference[3:].max() < 1e-8
     weight = sum(f.mass for f in robot.frames) * np.linalg.norm(gravity)
     assert other.energy == pytest.approx(answer.energy, abs=1e-8 * weight)
+
+
+def test_what_a_frame_holds_is_all_that_hangs_on_it():
+    """Moments and forces at points, summed up the tree; joints hold no own body."""
+    rng = np.random.default_rng(4)
+    robot = with_bodies(random_robot(rng, legs=2), rng)
+    posture = home_posture(robot)
+    model, x, _ = moved_unknowns(posture, rng, 0.1)
+    there, load = place(model, x), np.r_[np.zeros(3), rng.normal(size=3)]
+    bodies, gravity = rng.normal(size=(len(robot.frames), 6)), np.array([1.0, -2, -9])
+    bodies[:, :3] = 0.0
+    body, joint = wrenches_on_frames(there, dead_loads(posture, load, bodies, gravity))
+    origin, own = posture.platform[:3, 3], []
+    for i, frame in enumerate(robot.frames):
+        T = there.body_ends[i]
+        weight, at = frame.mass * gravity, T[:3, :3] @ frame.centre_of_mass + T[:3, 3]
+        parts = [(at, weight), (T[:3, 3], bodies[i, 3:])]
+        if frame.name == robot.platform:
+            parts.append((there.platform[:3, 3], load[3:]))
+        own.append(sum(np.r_[np.cross(p - origin, f), f] for p, f in parts))
+    for i, frame in enumerate(robot.frames):
+        behind = [
+            own[k] for k in range(len(robot.frames)) if robot.on_path[k, i] and k != i
+        ]
+        held = np.sum(behind, axis=0) if behind else np.zeros(6)
+        scale = np.abs(own).sum()
+        assert joint[i] == pytest.approx(held, abs=1e-12 * scale), frame.name
+        assert body[i] == pytest.approx(held + own[i], abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.05)])
+def test_loads_of_many_conditions_are_those_of_each(point):
+    """Weights with the errors of each row, loads and gravity of each."""
+    rng = np.random.default_rng(3)
+    robot = heavy(random_robot(rng, legs=2), rng)
+    rows = 3
+    errors = 1e-2 * rng.normal(size=(rows, len(robot.frames), 6))
+    load, gravity = rng.normal(size=(rows, 6)), 9.8 * rng.normal(size=(rows, 3))
+    postures = [home_posture(robot.with_errors(one)) for one in errors]
+    many = together(postures)
+    found = dead_loads_of_rows(many, errors, load, gravity, np.array(point))
+    for k, posture in enumerate(postures):
+        one = dead_loads(posture, load[k], gravity=gravity[k], point=point)
+        for name in ("load", "bodies", "carried"):
+            expected = getattr(one, name)
+            size = np.abs(expected).max()
+            assert getattr(found, name)[k] == pytest.approx(expected, abs=1e-12 * size)
+    assert np.abs(found.carried).max() > 0
+    still = dead_loads_of_rows(many, errors, load, 0 * gravity, np.zeros(3))
+    assert np.array_equal(still.load, load)
+    assert not still.beyond_platform

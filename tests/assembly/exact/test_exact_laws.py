@@ -19,6 +19,7 @@ from assembly.robots import load_robot
 from assembly.robots.delta import delta
 from assembly.robots.hexapod import hexapod
 from tests.assembly.exact.test_exact import pendulum
+from tests.assembly.kinematics.test_closing import parallelograms
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -257,3 +258,17 @@ def test_a_load_of_any_size_is_in_balance_whatever_it_acts_on(pieces, radius):
                 assert found == pytest.approx(
                     C[part], abs=1e-3 * np.abs(C[part]).max() + rounding
                 )
+
+
+def test_robot_without_errors_stays_where_it_is():
+    robot = hexapod()
+    answer = solve_exact(home_posture(robot.with_errors(0 * robot.errors)))
+    assert answer.energy == 0.0
+    assert np.abs(answer.platform_screw).max() < 1e-12
+
+
+def test_closures_open_by_rounding_of_a_file_store_no_energy():
+    """Cranks of six digits, open by up to 1e-6 m, are as closed as they can be."""
+    posture = home_posture(parallelograms(digits=6))
+    assert posture.mismatch > 1e-9
+    assert solve_exact(posture).energy == 0.0
