@@ -179,7 +179,7 @@ def test_a_softer_modulus_bends_more():
     assert seen[4] == pytest.approx(bent * (1 / factor - 1), rel=1e-6)
 
 
-def test_play_rests_where_the_load_pushes():
+def test_clearance_rests_where_the_load_pushes():
     """A disc of radius c and a cone of angle t, in the direction of the load."""
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
     # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive
@@ -190,7 +190,7 @@ def test_play_rests_where_the_load_pushes():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_play_without_load_is_said_to_be_open():
+def test_clearance_without_load_is_said_to_be_open():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
     assert found.undetermined.all()
@@ -297,7 +297,7 @@ def test_all_rows_at_once_agree_with_the_cone_solver(name, parallel):
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
 
 
-def test_play_in_an_open_chain_agrees_with_the_cone_solver():
+def test_clearance_in_an_open_chain_agrees_with_the_cone_solver():
     robot = arm(K)
     given = here(robot, (1.0, 2.0, 0.5, 3.0, -4.0, 5.0), q=0.3)
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
@@ -359,7 +359,7 @@ def test_what_moves_the_base_moves_a_frame_below_all_others(robot, new):
 
 
 def test_which_joints_may_have_friction_and_which_slip():
-    """A spring of their own, however soft; no play but a spin that is declared."""
+    """A spring of their own, however soft; no clearance but a spin that is declared."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (
         Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),

@@ -55,7 +55,7 @@ def test_an_expansion_has_the_potentials_slope_and_the_lagrangians_curvature(see
 
 
 def test_closures_that_no_clearance_within_its_bounds_closes_have_no_step():
-    """A gap of 1 mm, rigid but for a play of 0.1 mm."""
+    """A gap of 1 mm, rigid but for a clearance of 0.1 mm."""
     frames = (
         Frame("one", clearance=Clearance(axial=1e-4)), Frame("tip", "one"),
         Frame("two", geometric_error=[0, 0, 0, 0, 0, 1e-3]), Frame("end", "two"),

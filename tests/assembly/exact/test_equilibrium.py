@@ -19,7 +19,7 @@ from assembly.linear.closure import virtual_joints
 from assembly.model.robot import Clearance, Frame, Robot
 from tests.assembly.exact.test_exact import only, pendulum, two_bars
 
-C = 2e-3  # [m] of plays
+C = 2e-3  # [m] of clearances
 
 
 def at(posture, x, load):
@@ -30,14 +30,14 @@ def at(posture, x, load):
     return expand(place(model, x), dead_loads(posture, load), np.zeros(0))
 
 
-def pin(**play):
-    """A frame with a play and no stiffness, the tip of the robot."""
-    frames = Frame("pin", clearance=Clearance(**play)), Frame("tip", "pin")
+def pin(**clearance):
+    """A frame with a clearance and no stiffness, the tip of the robot."""
+    frames = Frame("pin", clearance=Clearance(**clearance)), Frame("tip", "pin")
     return home_posture(Robot("pin", "tip", frames))
 
 
 def two_slides(link=None):
-    """Plays of C along z, then along x; perhaps on a spring."""
+    """Clearances of C along z, then along x; perhaps on a spring."""
     quarter = [0, np.pi / 2, 0]
     return home_posture(Robot("slides", "tip", (
         Frame("near", clearance=Clearance(axial=C), link=link),
@@ -91,13 +91,15 @@ def test_two_springs_lack_the_mean_of_what_they_pull_beside_what_closes_them(
         (0.3, 0.0, 0.0),
     ],
 )
-def test_a_play_lacks_what_no_bound_holds(at_share, force, expected):
+def test_a_clearance_lacks_what_no_bound_holds(at_share, force, expected):
     local = at(pin(axial=C), [at_share], [0, 0, 0, 0, 0, force])
     assert imbalance(local) == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize("F", [1.0, 300.0])
-def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_plays_length(F):
+def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_clearances_length(
+    F,
+):
     """-F c cos a: F c^2 / c per squared length along the rim, and nothing normal."""
     local = at(pin(radial=C), [0.6, 0.8], [0, 0, 0, 0.6 * F, 0.8 * F, 0])
     active, force = active_clearances(local)
@@ -114,21 +116,21 @@ def test_a_pin_that_is_pressed_against_its_rim_is_a_pendulum_of_its_plays_length
     assert active_clearances(away)[1].tolist() == [0.0]
 
 
-def test_where_all_plays_are_pressed_nothing_moves():
+def test_where_all_clearances_are_pressed_nothing_moves():
     local = at(two_slides(), [1.0, 1.0], [0, 0, 0, 4.0, 0, 3.0])
     assert active_clearances(local)[1] == pytest.approx([3 * C, 4 * C], rel=1e-12)
     assert tangent_space(local)[0].shape == (2, 0)
     assert least_curvature(local) == np.inf
 
 
-def test_a_bound_presses_with_the_energy_that_a_larger_play_would_save():
-    """Of a closed chain: force times play is -c dE/dc, by central differences."""
-    play, step = 5e-3, 1e-6
+def test_a_bound_presses_with_the_energy_that_a_larger_clearance_would_save():
+    """Of a closed chain: force times clearance is -c dE/dc, by central differences."""
+    clearance, step = 5e-3, 1e-6
     low, here, high = (
         solve_exact(two_bars(0.06, Clearance(radial=c)))
-        for c in (play - step, play, play + step)
+        for c in (clearance - step, clearance, clearance + step)
     )
     active, force = active_clearances(here.expansion)
     assert active.tolist() == [True]
     saved = (low.energy - high.energy) / (2 * step)
-    assert force == pytest.approx([play * saved], rel=1e-6)
+    assert force == pytest.approx([clearance * saved], rel=1e-6)

@@ -89,7 +89,7 @@ def test_redundant_drives_are_preloaded_by_what_does_not_fit(apart):
     assert robot.remarks[-1].startswith("1 of 2 drives redundant")
 
 
-def test_redundant_drives_that_do_not_fit_are_told_the_way_out():
+def test_redundant_drives_that_do_not_fit_are_refused_with_the_option():
     with pytest.raises(BadInput, match="1 of 2 drives redundant: with --mismatch spr"):
         place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
 

@@ -13,7 +13,7 @@ from tests.assembly.linear.test_pose_error import hinged_frame
 from tests.robots_for_tests import coaxial_beams, random_robot
 
 PARTS = ("rotation_error", "translation_error")
-READINGS = ("frozen", "free")
+ASSUMPTIONS = ("frozen", "free")
 
 
 def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
@@ -31,8 +31,8 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
         assert np.linalg.norm(half) == pytest.approx(low, rel=1e-12, abs=1e-18)
 
 
-@pytest.mark.parametrize("reading", READINGS)
-def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
+@pytest.mark.parametrize("assumption", ASSUMPTIONS)
+def test_brackets_of_any_robot_share_a_point_with_the_references(assumption, rng):
     """At another point of the platform, with and without bounds of passive joints."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(24):
@@ -45,13 +45,13 @@ def test_brackets_of_any_robot_share_a_point_with_the_references(reading, rng):
             own = 1e-4 * rng.normal(size=own.shape)
         errors = own * np.array([0.0, 0.1, 0.5, -1.0])[:, None, None]
         assemblies = solve_assembly(home, errors=errors)
-        many = bound_pose_error(assemblies, reading, offset=at)
+        many = bound_pose_error(assemblies, assumption, offset=at)
         solved = np.flatnonzero((many.status == "ok") & ~many.one_by_one)
         compiled += len(solved)
         for i in solved[:2].tolist():
             # of the same solution of (22)
             one = bound_pose_error(
-                assemblies[i], reading, offset=at, method="reference"
+                assemblies[i], assumption, offset=at, method="reference"
             )
             assert_overlap(many, i, one, uncertain=1e-12)
     assert compiled
@@ -72,52 +72,52 @@ def test_tolerances_of_many_points_are_as_given(grid):
     assert np.diff(batch.translation_error).max() <= 1e-9
 
 
-@pytest.mark.parametrize("reading", READINGS)
-def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, reading):
+@pytest.mark.parametrize("assumption", ASSUMPTIONS)
+def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, assumption):
     """Other order, other neighbours, alone: not a bit changes."""
     robot, postures = grid
     at, count = together(postures), len(postures)
     errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
     errors[::7] = 0.0
-    whole = bound_pose_error(solve_assembly(at, errors=errors), reading)
+    whole = bound_pose_error(solve_assembly(at, errors=errors), assumption)
     orders = [rng.permutation(count) for _ in range(3)] + [[i] for i in range(8)]
     for order in orders:
         some = solve_assembly(at[order], errors=errors[order])
-        other = bound_pose_error(some, reading)
+        other = bound_pose_error(some, assumption)
         for name in ("rotation_error", "translation_error", "rotation_screw",
                      "translation_screw", "supports"):  # fmt: skip
             assert np.array_equal(getattr(other, name), getattr(whole, name)[order])
 
 
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
-@pytest.mark.parametrize("reading", ["frozen", "free"])
-def test_bounds_of_passive_joints_count_in_a_batch(spin, reading):
+@pytest.mark.parametrize("assumption", ["frozen", "free"])
+def test_bounds_of_passive_joints_count_in_a_batch(spin, assumption):
     """Compiled where no clearance comes near them, else set up in numpy."""
     posture = home_posture(hinged_frame(spin))
     one = bound_pose_error(
-        solve_assembly(posture, method="reference"), reading, method="reference"
+        solve_assembly(posture, method="reference"), assumption, method="reference"
     )
-    batch = bound_pose_error(solve_assembly([posture]), reading)
+    batch = bound_pose_error(solve_assembly([posture]), assumption)
     assert_overlap(batch, 0, one)
     assert batch.one_by_one[0] == (0.0 < spin < 1e-3)
     loose = home_posture(hinged_frame(None))
-    most = bound_pose_error(solve_assembly([loose]), reading)
+    most = bound_pose_error(solve_assembly([loose]), assumption)
     less = batch.rotation_error[0, 1] < 0.99 * most.rotation_error[0, 0]
     assert less == (spin < 1e-3)
 
 
-@pytest.mark.parametrize("reading", READINGS)
-def test_bounds_of_joints_count_at_the_points_that_reach_them(reading):
+@pytest.mark.parametrize("assumption", ASSUMPTIONS)
+def test_bounds_of_joints_count_at_the_points_that_reach_them(assumption):
     """Every other of six draws has errors so large that a clearance comes near them."""
     home = home_posture(hinged_frame(2e-3))
     sizes = 1e-4 * np.array([0, 1, 3, 10, 30, 100])[:, None]
     errors = np.zeros((6, 6, 6))
     errors[[0, 2, 4, 1, 3, 5], 2] = sizes * np.random.default_rng(0).normal(size=(6, 6))
     many = solve_assembly(home, errors=errors)
-    found = bound_pose_error(many, reading)
+    found = bound_pose_error(many, assumption)
     assert found.one_by_one.tolist() == [False, True] * 3
     for i in range(6):
-        one = bound_pose_error(many[i], reading, method="reference")
+        one = bound_pose_error(many[i], assumption, method="reference")
         assert_overlap(found, i, one, uncertain=1e-12)
 
 
@@ -140,8 +140,8 @@ def test_what_cannot_be_assembled_has_no_bounds():
     assert batch[0].unproved == batch.unproved[0] == batch.reason[0]
 
 
-def test_points_under_a_load_that_a_reading_cannot_carry_say_so():
-    """A hinge that a soft spring holds turns freely in the reading free."""
+def test_points_under_a_load_that_an_assumption_cannot_carry_say_so():
+    """A hinge that a soft spring holds turns freely in the assumption free."""
     spring = np.diag([np.inf, np.inf, 1e2, *[np.inf] * 3])
     robot = Robot("sprung door", "tip", (
         Frame("hinge", joint="revolute", joint_stiffness=spring),

@@ -57,9 +57,9 @@ def test_two_springs_in_series_take_the_gap(axis):
 )
 def test_clearance_is_used_up_before_anything_bends(gap, left):
     """Radial clearance of 1e-4 m: the springs close only the rest of the gap."""
-    play = Clearance(radial=1e-4)
+    clearance = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
-    robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=play)
+    robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=clearance)
     answer = solve_assembly(home_posture(robot))
     assert answer.energy == pytest.approx(0.5e6 * left**2 / 2, rel=1e-9, abs=1e-15)
     assert answer.clearance_excess() < 1e-12
@@ -250,7 +250,7 @@ def as_bearings(robot):
 
 
 def test_a_bearing_is_its_springs_and_then_a_free_joint():
-    """In every solver; energies to 1e-8 of those without play, 1e-12 where linear."""
+    """In every solver; energies to 1e-8 of those without clearance."""
     compared = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -295,7 +295,7 @@ def test_a_bearing_is_its_springs_and_then_a_free_joint():
 @example(seed=17, legs=3, joints=1)
 @example(seed=58, legs=2, joints=2)
 def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
-    """Tolerance 1e-6 of the energy without play: what cvxpy's solver reaches."""
+    """Tolerance 1e-6 of the energy without clearance: what cvxpy's solver reaches."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, joints)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10] if rng.random() < 0.5 else None
@@ -316,7 +316,7 @@ def test_random_robots_equal_the_printed_problem_in_cvxpy(seed, legs, joints):
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_closure_out_of_reach_is_told_from_one_within_it(turned):
+def test_a_closure_out_of_reach_is_infeasible(turned):
     """H u reaches 5 over the disc and 2 over the interval: 7, and not 7 + 1e-6."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H

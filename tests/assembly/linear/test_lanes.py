@@ -98,7 +98,7 @@ def test_within_bounds_of_motions_the_energy_is_the_references(loaded):
     assert held >= 5
 
 
-def test_postures_of_different_rank_stand_side_by_side(rng):
+def test_postures_of_different_rank_do_not_depend_on_each_other(rng):
     """Three parallel hinges: their turns are independent unless they stand in line."""
     home = home_posture(BUILT_IN["five_bar"]())
     robot, T = home.robot, np.repeat(home.transforms[None], 8, axis=0)
@@ -118,7 +118,7 @@ def test_postures_of_different_rank_stand_side_by_side(rng):
 
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_a_margin_does_not_depend_on_its_neighbours(grid, rng, compliant):
+def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant):
     robot, postures = grid
     at, count = together(postures), len(postures)
     errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))

@@ -106,7 +106,7 @@ def test_where_a_loop_is_cut_changes_nothing():
 
 
 def test_reciprocity_two_loads_do_each_others_work(rng):
-    """Maxwell-Betti on the paper's closed loops without play: w1 . x2 = w2 . x1."""
+    """Maxwell-Betti on closed loops without clearance: w1 . x2 = w2 . x1."""
     robot = irsbot2()
     tight = replace(robot, frames=tuple(
         replace(f, clearance=None) for f in robot.frames

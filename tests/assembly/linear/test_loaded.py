@@ -39,7 +39,7 @@ def compiled(posture, *loads, **others):
 
 
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
-def test_a_pin_rattles_to_its_rim_before_both_springs_give(force):
+def test_a_pin_moves_to_its_rim_before_both_springs_deform(force):
     """Radial clearance c: the platform's spring gives alone until it reaches the rim.
 
     From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,

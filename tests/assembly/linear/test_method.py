@@ -87,8 +87,8 @@ def test_the_reference_calls_nothing_compiled(monkeypatch):
     found = solve_assembly(posture, method="reference")
     assert found.energy > 0.0
     assert zone_margin(posture, method="reference").margin > 0.0
-    for reading in reach.ASSUMPTIONS:
-        bounds = bound_pose_error(found, reading, method="reference")
+    for assumption in reach.ASSUMPTIONS:
+        bounds = bound_pose_error(found, assumption, method="reference")
         assert 0.0 < np.diff(bounds.translation_error) <= 1e-6
     many = solve_assembly([posture], method="reference")
     many = bound_pose_error(many, method="reference")

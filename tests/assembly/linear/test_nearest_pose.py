@@ -1,4 +1,4 @@
-"""Where play leaves the pose free, the nearest to nominal is predicted, and marked."""
+"""Poses that clearance leaves free: the nearest to nominal is predicted, and marked."""
 
 import json
 import warnings
@@ -149,14 +149,14 @@ def test_under_a_load_springs_stay_and_what_is_loose_goes_nearest(name, margin):
     assert np.linalg.norm(at_point(answer, posture)) > (1 + margin) * size
 
 
-@pytest.mark.parametrize("play", [2e-5, 8e-5])
-def test_two_pins_side_by_side_by_hand(play):
+@pytest.mark.parametrize("clearance", [2e-5, 8e-5])
+def test_platform_on_two_pins_is_off_by_what_one_clearance_leaves(clearance):
     """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
 
     The platform stands where both pins reach it: nearest to nominal it is off by
-    what the first pin's play does not make good, 0.1 mm - c.
+    what the first pin's clearance does not make good, 0.1 mm - c.
     """
-    pin = Clearance(radial=play, spin=0.0)
+    pin = Clearance(radial=clearance, spin=0.0)
     frames = (
         Frame("one", geometric_error=[0, 0, 0, 1e-4, 0, 0], joint="revolute",
               clearance=pin),
@@ -168,12 +168,12 @@ def test_two_pins_side_by_side_by_hand(play):
     posture = home_posture(Robot("pins", "end", frames, (("end", "meets"),)))
     found = predict(as_declared(posture))
     assert found.undetermined.tolist() == [True]
-    expected = [0, 0, 0, 1e-4 - play, 0, 0]
+    expected = [0, 0, 0, 1e-4 - clearance, 0, 0]
     assert found.deviation[0] == pytest.approx(expected, abs=1e-10)
 
 
 def test_a_pose_that_nothing_leaves_free_is_not_marked():
-    """A load that presses all play; no clearance at all."""
+    """A load that presses all clearance; no clearance at all."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4, spin=1e-4)
@@ -195,7 +195,7 @@ def test_a_pose_that_nothing_leaves_free_is_not_marked():
         assert found.deviation[0] == pytest.approx(pushed, abs=1e-10)
 
 
-def test_settled_play_reads_as_the_prediction_that_settled_it():
+def test_settled_clearance_reads_as_the_prediction_that_settled_it():
     """Effects are tried from there: without one nothing may change."""
     here = as_declared(erring("five_bar", 5), point=POINT)
     found, held = predict(here), predict(with_rest_positions(here))
@@ -239,7 +239,7 @@ frames = ["end", "meets"]
 
 @pytest.fixture(scope="module")
 def with_clearance(tmp_path_factory):
-    """A slide whose play lets its platform hang loose, 24 readings of noise."""
+    """A slide whose clearance lets its platform hang loose, 24 readings of noise."""
     rng = np.random.default_rng(1)
     rows = [
         ",".join([f"r{k}", str(0.02 * (k % 8)), *map(str, rng.normal(0, 5e-6, 3))])
@@ -251,7 +251,7 @@ def with_clearance(tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", ["inspect", "diagnose"])
-def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
+def test_rows_that_clearance_leaves_free_are_marked_in_what_is_printed(
     command, with_clearance, tmp_path, run
 ):
     target = tmp_path / "found.json"
@@ -265,7 +265,7 @@ def test_rows_that_play_leaves_free_are_marked_in_what_is_printed(
 def test_the_nearest_pose_keeps_to_the_bound_of_a_joints_own_motion():
     """A pin of 1e-3 rad at most, off by 1.5e-3: it cannot come back to nominal.
 
-    Closed against a play of 2e-3 the platform turns by q + 1.5e-3 = v: 5e-4 at least.
+    Closed against a clearance of 2e-3 it turns by q + 1.5e-3 = v: 5e-4 at least.
     """
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3),

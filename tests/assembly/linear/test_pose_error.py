@@ -31,9 +31,9 @@ CASES = [
 def serial(*clearances, arm=0.3):
     """Fixed joints with clearance, ``arm`` apart along x."""
     frames, above = [], "base"
-    for i, play in enumerate(clearances):
+    for i, clearance in enumerate(clearances):
         shift = [arm * bool(i), 0, 0]
-        frames.append(Frame(f"j{i}", above, shift, clearance=play))
+        frames.append(Frame(f"j{i}", above, shift, clearance=clearance))
         above = f"j{i}"
     frames.append(Frame("tip", above, [arm, 0, 0]))
     return Robot("serial", "tip", tuple(frames))
@@ -58,8 +58,8 @@ def test_one_joint_gives_its_own_cones():
     """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
     the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
     """
-    play = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
-    found = bounds(serial(play))
+    clearance = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
+    found = bounds(serial(clearance))
     assert_holds(found.rotation_error, 5e-4, 1e-9)
     # x: r cos a; y: r sin a + 0.3 spin; z: axial + 0.3 tilt
     a = np.linspace(0, 2 * np.pi, 2_000_001)
@@ -68,7 +68,7 @@ def test_one_joint_gives_its_own_cones():
     assert_holds(found.translation_error, expected, 1e-9)
 
 
-def test_play_of_parallel_joints_adds_up_along_a_serial_chain():
+def test_clearance_of_parallel_joints_adds_up_along_a_serial_chain():
     found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
     assert_holds(found.translation_error, 3e-5, 1e-9)
     assert_holds(found.rotation_error, 0.0, 1e-9)
@@ -97,8 +97,8 @@ def test_a_platform_that_moves_freely_has_no_bound():
 @pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
 def test_a_passive_joint_with_a_bound_turns_up_to_it(spin):
     """An arm L on it: y: radial + L spin, z: axial + L tilt, both at once, by hand."""
-    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
-    hub = Frame("hub", joint="revolute", clearance=play)
+    clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
+    hub = Frame("hub", joint="revolute", clearance=clearance)
     found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
     far = np.hypot(1e-5 + 0.2 * spin, 2e-5 + 0.2 * 3e-4)
     assert_holds(found.translation_error, far, 1e-7 * spin + 1e-9)
@@ -110,8 +110,8 @@ def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
 
     Off the axis the point runs round without bound.
     """
-    play = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
-    hub = Frame("hub", joint="revolute", clearance=play)
+    clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
+    hub = Frame("hub", joint="revolute", clearance=clearance)
     robot = Robot("spindle", "tool", (hub, Frame("tool", "hub", [0, 0, 0.4])))
     found = bounds(robot)
     assert np.isinf(found.rotation_error).all()
@@ -126,9 +126,9 @@ def test_a_tool_on_a_bearing_turns_freely_and_its_point_has_a_largest_error():
 
 def hinged_frame(spin):
     """A four-bar with clearance in its pins, two of them bounded to +-spin."""
-    play = small_clearance(spin=spin)
+    clearance = small_clearance(spin=spin)
     robot = planar_four_bar()
-    limited = {"pin_a": play, "rocker": play, "pin_b": small_clearance()}
+    limited = {"pin_a": clearance, "rocker": clearance, "pin_b": small_clearance()}
     return replace(robot, frames=tuple(
         replace(f, clearance=limited.get(f.name)) for f in robot.frames
     ))  # fmt: skip
@@ -172,7 +172,7 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
 
 
 def test_planar_loop_by_vertex_enumeration():
-    """Two play joints along x and y meet a third: a polygon's farthest vertex.
+    """Two clearance joints along x and y meet a third: a polygon's farthest vertex.
 
     Chain A can be at |x| <= 3, |y| <= 4 (units of 1e-5 m); chain B within |x| <= 5,
     |y| <= 1: the platform's box is 3 x 1, its farthest corner sqrt(10).
@@ -208,19 +208,19 @@ def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
     assert_holds(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
 
 
-def test_frozen_deformations_leave_a_loaded_joint_no_play():
+def test_frozen_deformations_leave_a_loaded_joint_no_clearance():
     robot = coaxial_beams(
         np.array([0, 0, 0, 3e-4, 0, 0]), clearance=Clearance(radial=1e-4, axial=2e-5)
     )
     answer = solve_assembly(home_posture(robot))
     found = bounds(robot)
-    # the loaded disc is held; the unloaded interval along z plays, but the springs
+    # the loaded disc is held; the unloaded interval along z is loose, but the springs
     # that would have to follow it are frozen
     size = float(np.linalg.norm(answer.platform_screw[3:]))
     assert_holds(found.translation_error, size, 1e-9)
 
 
-def test_reading_must_be_known_and_budget_needs_no_load():
+def test_assumption_must_be_known_and_budget_needs_no_load():
     many = solve_assembly(
         [home_posture(coaxial_beams(np.zeros(6)))], [1, 0, 0, 0, 0, 0]
     )
@@ -232,15 +232,15 @@ def test_reading_must_be_known_and_budget_needs_no_load():
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
-@pytest.mark.parametrize(("key", "reading"), [("rigid", "frozen"), ("free", "free")])
-def test_brackets_meet_the_reference_brackets(case, point, key, reading):
+@pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
+def test_brackets_meet_the_reference_brackets(case, point, key, assumption):
     """Both hold the truth, so they overlap; 1e-7 is what the reference's own
     deformations leave uncertain where the energy is nearly zero.
     """
     pose = {"tx": point["x"], "tz": point["z"]}
     for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):
         answer = solve_assembly(place_robot(robot, pose=pose))
-        found = bound_pose_error(answer, reading)
+        found = bound_pose_error(answer, assumption)
         for letter, bracket in (
             ("R", found.rotation_error),
             ("T", found.translation_error),

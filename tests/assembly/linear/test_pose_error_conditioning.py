@@ -57,11 +57,11 @@ def test_vertices_of_intervals_meet_outer_approximation(seed, rows):
         assert high - low <= 1e-9
 
 
-@pytest.mark.parametrize("reading", ["frozen", "free", "budget"])
-def test_supports_of_the_paper_robot_equal_cvxpys(reading, rng):
-    robot = irsbot2() if reading == "frozen" else irsbot2_with(NUMBERS["cases"][0])
+@pytest.mark.parametrize("assumption", ["frozen", "free", "budget"])
+def test_supports_of_the_paper_robot_equal_cvxpys(assumption, rng):
+    robot = irsbot2() if assumption == "frozen" else irsbot2_with(NUMBERS["cases"][0])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
-    reach = reachable_screws(solve_assembly(posture), reading)
+    reach = reachable_screws(solve_assembly(posture), assumption)
     for _ in range(3):
         direction = rng.normal(size=6) * [1, 1, 1, 5, 5, 5]
         found = reach.support(direction)

@@ -48,7 +48,7 @@ def solved(K, right):
 
 
 def exact_screw(answer):
-    """Platform screw of least energy of a robot without play, every digit right.
+    """Platform screw of least energy of a robot without clearance, every digit right.
 
     y = -A_y' l, A_y y + A_q q = -misfit and A_q' l = 0, with the columns as given.
     """
@@ -72,7 +72,7 @@ def exact_screw(answer):
 
 
 def tight(robot, change):
-    """The robot without play, its links changed."""
+    """The robot without clearance, its links changed."""
     return replace(robot, frames=tuple(
         replace(f, clearance=None, link=change(f.link) if f.link else None)
         for f in robot.frames
@@ -175,8 +175,8 @@ def test_a_residual_adds_to_what_rounding_leaves_open():
     assert bound_screw(apart).translation == pytest.approx(expected, rel=1e-4)
 
 
-def test_play_outside_the_loop_is_open_and_no_error():
-    """A hand with radial and axial play on two bent beams: a disc r and a length a."""
+def test_clearance_outside_the_loop_is_open_and_no_error():
+    """A hand with radial and axial clearance on two bent beams: disc r, length a."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
     hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))

@@ -30,12 +30,12 @@ PLAY = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3, spin=2e-3)
         ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # 5e-5 m across, 2e-5 m of clearance
         ([0, 0, 0, 0, 0, -7e-6], 0.7),  # along
         ([6e-4, 8e-4, 0, 0, 0, 0], 1.0),  # tilt
-        ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin, play on a fixed joint
+        ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin, clearance on a fixed joint
         ([0, 0, 0, 2e-5, 0, 2e-5], 2.0),  # the worst of several
         ([0] * 6, 0.0),
     ],
 )
-def test_margin_of_one_joint_is_gap_over_play(gap, margin):
+def test_margin_of_one_joint_is_gap_over_clearance(gap, margin):
     robot = coaxial_beams(np.array(gap, dtype=float), clearance=PLAY)
     zone = zone_margin(home_posture(robot))
     assert zone.margin == pytest.approx(margin, rel=1e-9, abs=1e-12)
@@ -43,7 +43,7 @@ def test_margin_of_one_joint_is_gap_over_play(gap, margin):
     assert zone.assemblable == (margin <= 1)
 
 
-def test_no_factor_helps_where_there_is_no_play():
+def test_no_factor_helps_where_there_is_no_clearance():
     robot = coaxial_beams(np.array([0, 0, 0, 0, 0, 1e-5]), clearance=Clearance(tilt=1))
     zone = zone_margin(home_posture(robot))
     assert (zone.margin, zone.bound, zone.assemblable) == (np.inf, np.inf, False)
@@ -86,9 +86,9 @@ def test_scaling_the_clearances_by_the_margin_just_assembles():
     def scaled(frame, factor):
         if frame.clearance is None:
             return frame
-        play = vars(frame.clearance)
-        larger = {k: v * factor for k, v in play.items() if k != "spin"}
-        return replace(frame, clearance=Clearance(**{**play, **larger}))
+        clearance = vars(frame.clearance)
+        larger = {k: v * factor for k, v in clearance.items() if k != "spin"}
+        return replace(frame, clearance=Clearance(**{**clearance, **larger}))
 
     for factor, inside in ((margin * 1.0001, True), (margin * 0.9999, False)):
         frames = tuple(scaled(f, factor) for f in robot.frames)
@@ -96,7 +96,7 @@ def test_scaling_the_clearances_by_the_margin_just_assembles():
         assert zone.assemblable == inside
 
 
-def test_the_reading_of_compliant_joints_must_be_one_of_two():
+def test_compliant_joints_must_be_rigid_or_free():
     at = home_posture(planar_four_bar())
     for posture in (at, [at]):
         with pytest.raises(ValueError, match="compliant is 'soft', expected 'rigid'"):
@@ -144,7 +144,7 @@ def test_margins_of_many_robots_are_the_references(compliant, rng):
 
 
 def test_many_errors_or_postures_have_their_own_margins():
-    """Sets at one posture, a set for each, and postures alone: gap over play."""
+    """Sets at one posture, a set for each, and postures alone: gap over clearance."""
     gaps = np.array([1e-5, 4e-5, -3e-5])
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = gaps
@@ -162,7 +162,7 @@ def test_many_errors_or_postures_have_their_own_margins():
 
 
 def test_points_are_taken_out_of_many_and_one_has_no_length():
-    """Gap over play at one point; the sizes of the forces on its cones add up to 1."""
+    """Gap over clearance at one point; sizes of the forces on its cones add up to 1."""
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = [1e-5, 4e-5, -3e-5]
     at = home_posture(coaxial_beams(np.zeros(6), clearance=PLAY))

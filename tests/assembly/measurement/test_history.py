@@ -43,7 +43,7 @@ def test_a_lag_solves_its_equation(held, time_constant):
     )
 
 
-def test_sessions_begin_anew_and_rows_may_come_in_any_order(rng):
+def test_sessions_begin_at_rest_and_rows_may_come_in_any_order(rng):
     """Each row has the state that its own session gives it, whatever the others do."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]

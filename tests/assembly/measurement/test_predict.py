@@ -124,7 +124,7 @@ def test_a_law_of_its_own_gives_under_the_moment_of_finite_motions():
         assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
+def test_a_row_that_cannot_close_has_no_answer_and_its_clearance_is_centred():
     """A four-bar with a loose pin, of which one row's coupler is out of the plane."""
     robot = four_bar()
     frames = tuple(
@@ -151,7 +151,7 @@ def test_a_row_that_cannot_close_has_no_answer_and_its_play_is_centred():
     assert held.deviation[0] == pytest.approx(seen.deviation[0], abs=1e-9)
 
 
-def test_play_of_an_open_chain_is_taken_up_by_finite_motions_too():
+def test_clearance_of_an_open_chain_is_taken_up_by_finite_motions_too():
     """A radius along the force; a joint without load in that way is undetermined."""
     c = 1e-4
     rigid = Frame("drive", joint="revolute", actuated=True)

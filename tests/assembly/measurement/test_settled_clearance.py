@@ -23,28 +23,28 @@ def at_home(robot, load, **given):
     return as_declared(postures, np.array([load], dtype=float), **given)
 
 
-def pin(**play):
+def pin(**clearance):
     """A passive pin about z, turned about x, whose arm points along its x."""
     return Robot("pin", "tip", (
         Frame("pin", joint="revolute", rotation=[0.7, 0, 0],
-              clearance=Clearance(**play)),
+              clearance=Clearance(**clearance)),
         Frame("tip", "pin", [1.0, 0, 0]),
     ))  # fmt: skip
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_play_goes_the_way_of_the_load_of_any_size(unit):
+def test_clearance_goes_the_way_of_the_load_of_any_size(unit):
     """Through a pin: radially along x by its radius, axially by nothing."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
     expected = np.zeros((1, 2, 6))
     expected[0, 0, 3] = RADIAL
     assert settled.errors == pytest.approx(expected, abs=1e-18)
-    # its own motion is no play that could be undetermined
+    # its own motion is no clearance that could be undetermined
     assert undetermined.tolist() == [False]
 
 
-def test_play_that_no_load_takes_up_is_undetermined_and_centred():
+def test_clearance_that_no_load_takes_up_is_undetermined_and_centred():
     conditions = at_home(pin(radial=RADIAL, axial=AXIAL), [0, 0, 0, 2.0, 0, 0])
     settled, undetermined = with_clearances_taken_up(conditions)
     assert undetermined.tolist() == [True]
@@ -62,8 +62,8 @@ def test_a_point_is_measured_where_it_is():
     assert conditions.measured_arms[0] == pytest.approx(np.array(expected) - [1, 0, 0])
 
 
-def test_play_at_rest_is_a_share_of_its_bounds_and_no_play_is_none():
-    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no play."""
+def test_clearance_at_rest_is_a_share_of_its_bounds_and_no_clearance_is_none():
+    """Tilt, spin, radial and axial bounds; a pin's own spin is motion, no clearance."""
     robot = Robot("two", "tip", (
         Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
         Frame("pin", "fixed", joint="revolute",

@@ -49,7 +49,7 @@ def test_springs_that_give_without_end_are_refused():
         Yields(here).correction(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1, 1)))
 
 
-def test_laws_that_never_settle_are_told():
+def test_laws_that_never_settle_are_refused():
     """It gives as soon as it is loaded, and then it is not: forty steps, no answer."""
     with pytest.raises(SolverFailed, match="do not settle in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))

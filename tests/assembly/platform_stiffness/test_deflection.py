@@ -44,8 +44,8 @@ def test_platform_that_a_load_does_not_move_is_rigid_and_never_jumps(exact):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_free_play_then_contact_then_a_spring(exact):
-    """Deflection = sign(F) c + F / k; at no load anything within the play."""
+def test_free_clearance_then_contact_then_a_spring(exact):
+    """Deflection = sign(F) c + F / k; at no load anything within the clearance."""
     c, k = 1e-4, 1e5
     curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), exact=exact)
     loaded = curve.loads != 0.0
@@ -82,7 +82,7 @@ def test_an_error_is_pressed_back_at_the_load_that_it_took():
     first, *_ = curve.events
     assert (first.kind, first.what) == ("release", "one axial")
     assert first.load == pytest.approx(k * (e - c), abs=0.01)
-    # then the play, 2 c wide, is crossed on one spring alone
+    # then the clearance, 2 c wide, is crossed on one spring alone
     second = curve.events[1]
     assert (second.kind, second.what) == ("contact", "one axial")
     assert second.load == pytest.approx(k * (e + c), abs=0.01)

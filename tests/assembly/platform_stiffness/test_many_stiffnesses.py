@@ -128,9 +128,9 @@ def test_one_of_many_read_anywhere_is_that_of_its_posture(method):
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_a_tangent_of_many_postures_is_that_of_each(state):
     """To the last bit, whatever is asked of all."""
-    play = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
+    clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     gap = np.array([0, 0, 0, 1e-4, 0, 0])
-    posture = home_posture(coaxial_beams(gap, clearance=play))
+    posture = home_posture(coaxial_beams(gap, clearance=clearance))
     many = platform_stiffness([posture] * 2, state, LOAD, at=[0, 0.1, 0])
     one = platform_stiffness(posture, state, LOAD, at=[0, 0.1, 0])
     for own in many:

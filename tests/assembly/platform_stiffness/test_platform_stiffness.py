@@ -334,7 +334,7 @@ def test_within_its_clearance_nothing_holds_the_platform(state):
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_both_sides_of_a_change_of_contact(state):
-    """An error just takes up the play: against the stop rigid, away from it a spring.
+    """An error just takes up the clearance: rigid against the stop, else a spring.
 
     The stop is met without a force, so both are true, each for one sense of the load.
     """

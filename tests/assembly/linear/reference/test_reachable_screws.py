@@ -36,21 +36,21 @@ def test_what_nothing_bounds_is_infinite_in_its_own_half():
         assert reachable.support(1e-3 * d[3] + d[4]).height < np.inf
 
 
-E3 = 1e-3  # [rad] of play about z, three times, and of an error
+E3 = 1e-3  # [rad] of clearance about z, three times, and of an error
 
 
 def pin_against_plays(limit, start):
-    """A pin of a bounded turn about z against three plays in a row, E3 each.
+    """A pin of a bounded turn about z against three clearances in a row, E3 each.
 
-    Closed by q + E3 = v_1 + v_2 + v_3; the plays stand at ``start`` of their bounds.
+    Closed by q + E3 = v_1 + v_2 + v_3; clearances are at ``start`` of their bounds.
     """
-    play = Clearance(spin=E3)
+    clearance = Clearance(spin=E3)
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=limit),
               geometric_error=[0, 0, E3, 0, 0, 0]),
         Frame("end", "pin", [1.0, 0, 0]),
-        Frame("a", clearance=play), Frame("b", "a", clearance=play),
-        Frame("c", "b", clearance=play), Frame("stop", "c", [1.0, 0, 0]),
+        Frame("a", clearance=clearance), Frame("b", "a", clearance=clearance),
+        Frame("c", "b", clearance=clearance), Frame("stop", "c", [1.0, 0, 0]),
     ), (("end", "stop"),))  # fmt: skip
     assembly = solve_assembly(home_posture(robot))
     assert assembly.clearances.shape == (3,)
@@ -71,10 +71,10 @@ def test_a_joints_own_bound_counts_where_its_motion_may_pass_it(start):
 
 
 @pytest.mark.parametrize("stiffness", [1e6, 1e-6, 1e-12])
-def test_plays_on_their_bound_under_a_wrench_are_held(stiffness):
-    """A gap of five times the radial play holds it, in soft robots as in stiff ones."""
-    play = Clearance(radial=2e-5, axial=3e-5, tilt=1e-3)
-    robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], (stiffness,) * 2, clearance=play)
+def test_clearances_on_their_bound_under_a_wrench_are_held(stiffness):
+    """A gap of five radial clearances holds it, in soft robots as in stiff ones."""
+    clearance = Clearance(radial=2e-5, axial=3e-5, tilt=1e-3)
+    robot = coaxial_beams([0, 0, 0, 0, 1e-4, 0], (stiffness,) * 2, clearance=clearance)
     assembly = solve_assembly(home_posture(robot))
     joints = assembly.joints
     held = loaded_cones(assembly, joints)
