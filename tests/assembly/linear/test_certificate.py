@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear import energy
 from assembly.linear.certificate import (
     bound_screw,
     unproved,
@@ -56,38 +55,6 @@ def spoilt(solve):
     return solver
 
 
-@pytest.mark.slow
-def test_what_no_solver_proves_is_not_certified(monkeypatch):
-    """The edge of the zone with Newton's method taken away and the others spoilt."""
-    from assembly.report.results import solution_of, solution_text
-    from assembly.solvers import conic
-
-    robot = irsbot2_with(NUMBERS["cases"][0])
-    posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.5})
-    good = solve_assembly(posture)
-    assert_proved(good)
-    worse = tuple(map(spoilt, conic._SOLVERS["reference"]))
-    monkeypatch.setitem(conic._SOLVERS, "reference", worse)
-    monkeypatch.setattr(conic, "refine", lambda *_: iter(()))
-    monkeypatch.setattr(
-        energy, "assemble_side_by_side", lambda *given: given[5]["outcome"].fill(4)
-    )
-    answer = solve_assembly(posture)
-    # 1e-4 of some clearances more energy than the least: far above 1e-8
-    assert answer.energy > good.energy * (1 + 1e-8)
-    assert "the energy is proved least to" in unproved(answer)
-    found = solution_of(posture)
-    assert found["status"] == "not proved"
-    assert found["reason"] == unproved(answer)
-    assert found["energy"] == answer.energy
-    assert f"not proved: {unproved(answer)}" in solution_text(found)
-    assert "certificate" in solution_text(found)
-    energies = assemble_at(robot, posture.transforms[None])
-    assert (energies.status[0], energies.reason[0]) == (
-        "solver failed", unproved(answer)
-    )  # fmt: skip
-
-
 def test_values_that_are_no_numbers_prove_nothing():
     answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
     for spoilt_answer in (
@@ -96,6 +63,8 @@ def test_values_that_are_no_numbers_prove_nothing():
         replace(answer, clearances=answer.clearances * np.nan),
     ):
         assert unproved(spoilt_answer)
+    weaker = replace(answer, multipliers=0.9 * answer.multipliers)
+    assert "the energy is proved least to" in unproved(weaker)
     assert "stays open" in unproved(replace(answer, elastic=1.1 * answer.elastic))
     assert "exceeded by" in unproved(replace(answer, clearances=2 * answer.clearances))
 

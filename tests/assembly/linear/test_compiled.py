@@ -35,7 +35,7 @@ def assert_same(batch, i, one):
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 @pytest.mark.parametrize("size", [1e-6, 1e-3])
-def test_every_built_in_robot_gives_the_single_answer(name, size, rng):
+def test_every_built_in_robot_gives_the_references_answer(name, size, rng):
     home = home_posture(BUILT_IN[name]())
     robot = home.robot
     T = np.broadcast_to(home.transforms, (3, *home.transforms.shape))
