@@ -169,15 +169,6 @@ def test_a_lag_settles_exponentially():
     )
 
 
-def test_a_lag_behind_a_ramp_runs_one_time_constant_late():
-    """z = s (t - tau (1 - exp(-t / tau))), exact however far apart the rows are."""
-    t = np.array([0.0, 10.0, 400.0, 1000.0])
-    rows = campaign_of(t, temperature=0.02 * t)
-    lag = at_drive({"gain": 1.0, "time_constant": 300.0}, "lag", ("cov.temperature",))
-    expected = 0.02 * (t - 300 * (1 - np.exp(-t / 300)))
-    assert basis(rows, lag, ["gain"])[:, 0] == pytest.approx(expected, rel=1e-12)
-
-
 def test_rows_set_aside_are_remembered():
     t = np.linspace(0, 900, 10)
     rows = campaign_of(t, temperature=5 * np.sin(t / 200), q=np.sin(t / 100))
@@ -216,13 +207,6 @@ def test_backlash_may_vary_around_a_turn():
     scaled = at_drive({"1.cosine": 1e-5}, "scaled_waves", ("q.drive", "approach"))
     expected = -1e-5 * np.cos(q)
     assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
-
-
-def test_rows_are_taken_in_the_order_of_time_session_by_session():
-    q, t = [0.3, 0.0, 0.9, 0.1], [5.0, 0.0, 9.0, 0.0]
-    rows = campaign_of(np.array(t), q=q, session=np.array(["a", "a", "a", "b"]))
-    back = at_drive({}, "reversal", ("q.drive",))
-    assert basis(rows, back, ["0"])[:, 0].tolist() == [1.0, 0.0, 1.0, 0.0]
 
 
 def test_a_session_has_its_own_effects():

@@ -109,30 +109,3 @@ def test_first_derivatives_of_closures_and_platform(seed):
     assert np.abs(here.rows @ h - difference).max() < 1e-7
     difference = (ahead.platform_screw - behind.platform_screw) / (2 * step)
     assert np.abs(here.platform_rows @ h - difference).max() < 1e-7
-
-
-@pytest.mark.parametrize("load", [[0] * 6, [0, 0, 0, 1, -2, 3], [2, 1, -3, 1, -2, 3]])
-@pytest.mark.parametrize("size", [0.02, 0.4])
-@pytest.mark.parametrize("seed", range(4))
-def test_second_derivatives_of_closures_and_platform(seed, size, load):
-    """Where the closures hold, against differences of the first derivatives.
-
-    At the larger size the platform turns by a radian, and moments work on it.
-    """
-    rng = np.random.default_rng(seed)
-    model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, size)
-    T, (first, second) = place(model, x).transforms, model.closed_frames.T
-    vars(model)["nominal_closures"] = (
-        inverse(T[first]) @ T[second]
-    )  # close it where it stands
-    here, step, load = place(model, x), 1e-5, np.array(load, dtype=float)
-    multipliers = rng.normal(size=len(here.residual))
-
-    def slope(place):
-        return multipliers @ place.rows + load @ place.platform_rows
-
-    difference = slope(place(model, x + step * h)) - slope(place(model, x - step * h))
-    expected = difference / (2 * step)
-    found = here.curvature(multipliers, load) @ h
-    assert here.largest_gap < 1e-14
-    assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.kinematics.nominal import motion_screws, size_of
+from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import (
     home_posture,
     joint_target,
@@ -112,26 +112,6 @@ def test_joints_at_and_beyond_a_closure_stay_where_they_are():
     there = place_robot(robot, pose={"tx": posture.platform[0, 3]})
     for name in closed:
         assert there.coordinates[robot.index(name)] == 0.3
-
-
-def test_unit_joint_motions_move_as_differences_of_postures_say():
-    """[z, p x z] of a hinge, [0, z] of a slide, nothing of what is fixed."""
-    robot = Robot("arm", "tip", (
-        Frame("a", "base", [0.1, -0.2, 0.3], [0.4, 0.2, -0.5], joint="revolute",
-              actuated=True),
-        Frame("b", "a", [0.3, 0.1, 0.2], [1.0, -0.3, 0.4], joint="prismatic",
-              actuated=True),
-        Frame("tip", "b", [0.2, 0, 0]),
-    ))  # fmt: skip
-    here = home_posture(robot)
-    screws = motion_screws(robot, here.transforms)
-    h = 1e-6
-    for k, name in enumerate("ab"):
-        ends = [place_robot(robot, joints={name: s * h}).platform for s in (1, -1)]
-        slope = (ends[0] - ends[1]) @ np.linalg.inv(here.platform) / (2 * h)
-        turn = slope[[2, 0, 1], [1, 2, 0]]
-        assert screws[k] == pytest.approx([*turn, *slope[:3, 3]], abs=1e-9)
-    assert not screws[2].any()
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.model.clearance import CONES, clearance_bounds
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.robots.irsbot2 import irsbot2
+from assembly.solvers.method import METHODS
 from tests.robots_for_tests import (
     NUMBERS,
     coaxial_beams,
@@ -208,10 +209,30 @@ def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
     assert_holds(found.rotation_error, radius, 1e-9)  # all six stiffnesses are equal
 
 
-def test_frozen_deformations_leave_a_loaded_joint_no_clearance():
+@pytest.mark.parametrize("limit", [4.1, 1.5, 0.5])
+def test_a_joints_own_bound_limits_the_platform_of_a_closed_chain(limit):
+    """Closed by q + E = v_1 + v_2 + v_3, |v| <= E and |q| <= limit E: min(3, limit + 1)
+    E is the farthest turn q + E of the platform.
+    """
+    E, loose = 1e-3, Clearance(spin=1e-3)
+    robot = Robot("pin", "end", (
+        Frame("pin", joint="revolute", clearance=Clearance(spin=limit * E),
+              geometric_error=[0, 0, E, 0, 0, 0]),
+        Frame("end", "pin", [1.0, 0, 0]),
+        Frame("a", clearance=loose), Frame("b", "a", clearance=loose),
+        Frame("c", "b", clearance=loose), Frame("stop", "c", [1.0, 0, 0]),
+    ), (("end", "stop"),))  # fmt: skip
+    for method in METHODS:
+        found = bounds(robot, "free", method=method)
+        assert_holds(found.rotation_error, min(3, limit + 1) * E, 1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e-6, 1e-12])
+def test_frozen_deformations_leave_a_loaded_joint_no_clearance(stiffness):
     robot = coaxial_beams(
-        np.array([0, 0, 0, 3e-4, 0, 0]), clearance=Clearance(radial=1e-4, axial=2e-5)
-    )
+        np.array([0, 0, 0, 3e-4, 0, 0]), (stiffness, stiffness),
+        clearance=Clearance(radial=1e-4, axial=2e-5),
+    )  # fmt: skip
     answer = solve_assembly(home_posture(robot))
     found = bounds(robot)
     # the loaded disc is held; the unloaded interval along z is loose, but the springs

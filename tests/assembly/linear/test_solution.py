@@ -33,18 +33,6 @@ def rigid_pins(gaps):
     return home_posture(robot), errors
 
 
-def test_many_loads_at_one_posture_are_a_row_each():
-    """Two springs side by side: F^2 / 4 K and F / 2 K, and no load no energy."""
-    forces = np.array([0.0, 10.0, -30.0])
-    loads = np.zeros((3, 6))
-    loads[:, 5] = forces
-    found = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (K, K))), loads)
-    assert found.energy == pytest.approx(forces**2 / (4 * K), rel=1e-12)
-    assert found.platform_screw[:, 5] == pytest.approx(forces / (2 * K), rel=1e-12)
-    assert found.loaded.tolist() == [False, True, True]
-    assert found[2].load.tolist() == loads[2].tolist()
-
-
 def test_a_load_and_gravity_of_each_posture_add_up(rng):
     """Linear in the loads where nothing has clearance: superposition, row by row."""
     home = home_posture(coaxial_beams(np.zeros(6), (K, 3 * K)))

@@ -96,17 +96,6 @@ def test_nothing_settles_in_no_time():
     assert held == pytest.approx([0.0, settled, settled])
 
 
-def test_what_slips_follows_until_it_stands_at_an_end():
-    """By hand, depth 2: from the middle to an end; it turns when the variable does."""
-    values = np.array([0.0, 1.0, 3.0, 9.0, 8.0, 5.0, 4.0, 4.0, 5.0])
-    nothing = np.zeros(9)
-    history, _ = in_order(
-        {"time": np.arange(9.0), "u": values, "approach": nothing}, None
-    )
-    expected = [0.0, 0.5, 1.0, 1.0, 0.5, -1.0, -1.0, -1.0, -0.5]
-    assert history.slip("u", 2.0) == pytest.approx(expected)
-
-
 def test_what_slips_at_once_is_the_direction():
     values = np.array([0.0, 1.0, 3.0, 9.0, 8.0, 5.0, 6.0])
     sides = np.full(7, -1.0)

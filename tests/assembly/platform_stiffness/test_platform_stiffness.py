@@ -17,10 +17,10 @@ from assembly.robots import load_robot
 from assembly.robots.hexapod import HexapodParameters, hexapod, points
 from benchmarks.evidence.stiffness_random_robots import by_differences
 from stiffness.screws import screw_map
+from tests.assembly.exact.test_exact import only
 from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 
 UNIT = np.eye(6)
-RIGID = np.diag([np.inf] * 6)
 
 
 def assert_same_matrix(M, expected, tolerance):
@@ -38,13 +38,6 @@ def serial(*frames):
         chain.append(replace(frame, parent=above))
         above = frame.name
     return home_posture(Robot("chain", above, tuple(chain)))
-
-
-def only(row, stiffness):
-    """K_B rigid but for one direction."""
-    K = RIGID.copy()
-    K[row, row] = stiffness
-    return K
 
 
 def test_a_cantilever_has_the_textbook_compliance():
