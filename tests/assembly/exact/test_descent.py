@@ -5,12 +5,7 @@ import pytest
 
 import assembly.exact.descent as descent
 from assembly.exact.dead_load import dead_loads, work_gradient
-from assembly.exact.descent import (
-    NotConverged,
-    advance,
-    expand,
-    potential,
-)
+from assembly.exact.descent import NotConverged, advance, expand, potential
 from assembly.exact.finite_robot import FiniteRobot
 from assembly.exact.placement import place
 from assembly.kinematics.posture import home_posture

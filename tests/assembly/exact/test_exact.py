@@ -15,12 +15,7 @@ from assembly.model.links import link_compliance
 from assembly.model.robot import Clearance, Frame, Robot
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import rotation_matrix, rotation_vector
-from tests.robots_for_tests import (
-    NUMBERS,
-    coaxial_beams,
-    irsbot2_with,
-    small_clearance,
-)
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, small_clearance
 from validation.multibody.simulation import SimulationModel, without_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}

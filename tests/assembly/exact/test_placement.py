@@ -17,9 +17,7 @@ from assembly.kinematics.se3 import (
 )
 from assembly.linear.closure import virtual_joints
 from assembly.linear.energy import solve_assembly
-from tests.robots_for_tests import (
-    random_robot,
-)
+from tests.robots_for_tests import random_robot
 
 
 def moved_unknowns(posture, rng, size):

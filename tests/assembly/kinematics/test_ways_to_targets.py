@@ -16,9 +16,7 @@ from assembly.kinematics.posture import (
 )
 from assembly.model.robot import Frame, Robot
 from assembly.robots import BUILT_IN, load_robot
-from tests.linkages_for_tests import (
-    five_bar,
-)
+from tests.linkages_for_tests import five_bar
 
 EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
 

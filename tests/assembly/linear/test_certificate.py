@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
-from assembly.linear.certificate import (
-    bound_screw,
-    unproved,
-    unproved_screw,
-)
+from assembly.linear.certificate import bound_screw, unproved, unproved_screw
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot

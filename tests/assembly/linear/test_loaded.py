@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
-from assembly.linear.energy import (
-    CannotAssemble,
-    solve_assembly,
-)
+from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot

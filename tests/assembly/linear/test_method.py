@@ -10,11 +10,7 @@ from assembly.linear import energy
 from assembly.linear.energy import solve_assembly
 from assembly.model.robot import Clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from tests.robots_for_tests import (
-    NUMBERS,
-    coaxial_beams,
-    irsbot2_with,
-)
+from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with
 
 GAP = np.array([0, 0, 0, 1e-4, 0, 0])
 LOAD = [0.0, 0, 0, 10, 0, -50]

@@ -10,9 +10,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.energy import solve_assembly
-from assembly.linear.nearest_pose import (
-    nearest_pose,
-)
+from assembly.linear.nearest_pose import nearest_pose
 from assembly.linear.reference.as_printed import energy_as_printed
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict, with_rest_positions

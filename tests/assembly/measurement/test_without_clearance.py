@@ -13,9 +13,7 @@ from assembly.linear.load import loads_with_weight
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
-from assembly.measurement.without_clearance import (
-    flexibility,
-)
+from assembly.measurement.without_clearance import flexibility
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 
 seeds = st.integers(0, 2**32 - 1)
