@@ -1,4 +1,4 @@
-"""An effect that a file declares and the difference found for it: one effect again."""
+"""A declared effect and a difference found for it combine to one effect."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Functions against closed forms on an arm, and against springs that stand there."""
+"""Functions against closed forms on an arm, and against springs in their place."""
 
 from dataclasses import replace
 from math import cos, exp, sin

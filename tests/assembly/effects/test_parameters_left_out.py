@@ -1,4 +1,4 @@
-"""Effects whose parameters are left out in part, and what fits give instead of them."""
+"""Effects with some parameters left out, and public parameters of fitted ones."""
 
 from dataclasses import replace
 from math import atan2, cos, hypot, sin

@@ -1,4 +1,4 @@
-"""Places that give by a law of what goes through them, or of another place's wrench."""
+"""Places that deform by a law of their own wrench, or of another place's wrench."""
 
 from dataclasses import replace
 from math import cos

@@ -14,7 +14,7 @@ from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def disturbed(rng, seed):
-    """A random robot's assembly, and the same with anything else for its solution."""
+    """A random robot's assembly, and the same with a disturbed solution."""
     robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
     best = solve_assembly(home_posture(robot), load)
@@ -48,7 +48,7 @@ SEEDS = (1, 3, 4, 6, 9, 12)
 
 
 def solvable(rng):
-    """Random assemblies, where there are any."""
+    """Assemblies of the random robots that have one."""
     for seed in SEEDS:
         try:
             yield disturbed(rng, seed)
@@ -57,7 +57,7 @@ def solvable(rng):
 
 
 def test_any_wrenches_bound_the_energy(rng):
-    """Weak duality, and the bound as its docstring has it."""
+    """Weak duality; the bound is the sum that its docstring defines."""
     some = list(solvable(rng))
     assert len(some) >= 3
     assert any(len(other.motions) for _, other in some)
@@ -84,7 +84,7 @@ def test_the_uncertainty_is_the_gap_without_cancellation(rng):
 
 
 def test_the_largest_force_is_named_by_the_first_body_that_carries_it():
-    """Bodies in a row carry the same, whatever rounding says; the idle one none."""
+    """Bodies in series carry equal forces but for rounding; the idle one none."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 2e-5, 3e-5])
     idle = replace(
         robot, frames=(Frame("idle", translation=[0.1, 0, 0]), *robot.frames)

@@ -74,7 +74,7 @@ def test_tolerances_of_many_points_are_as_given(grid):
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
 def test_a_bound_does_not_depend_on_its_neighbours(grid, rng, assumption):
-    """Other order, other neighbours, alone: not a bit changes."""
+    """In another order, among other points, alone: bit-identical."""
     robot, postures = grid
     at, count = together(postures), len(postures)
     errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))

@@ -1,4 +1,4 @@
-"""Problems side by side: each by itself, proved, and whatever its neighbours are."""
+"""Many points in one call: each as if alone, and proved."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
 def test_where_bounds_of_motions_matter_no_answer_depends_on_its_neighbours(
     seed, loaded
 ):
-    """Draws of which some leave a bound: in other company, alone, by one posture."""
+    """Some draws reach a bound: in another order, alone, by one posture."""
     rng = np.random.default_rng(seed)
     home = home_posture(with_bounded_motion(random_robot(rng, joints=4), rng))
     load = rng.normal(size=6) if loaded else None
@@ -134,7 +134,7 @@ def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 @pytest.mark.parametrize("kappa", [0.05, 0.2, 1.0])
 def test_margins_are_proportional_to_the_errors_and_proved(grid, compliant, kappa):
-    """All clearances scale with the margin: no solver has a say in that."""
+    """All clearances scale with the margin."""
     robot, postures = grid
     lanes = zone_margin(postures, compliant, kappa * robot.errors)
     whole = zone_margin(postures, compliant)

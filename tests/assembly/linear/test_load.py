@@ -21,7 +21,7 @@ Q = RHO * AREA * G  # [N/m]
 
 
 def cantilever(cuts=1, theory="euler", turn=(0.0, 0.0, 0.0)):
-    """A beam along x in as many pieces as asked, base turned."""
+    """A beam along x in ``cuts`` pieces, its base turned."""
     link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO, theory=theory)
     frames = [Frame("root", rotation=turn)]
     for i in range(cuts):
@@ -129,7 +129,7 @@ def test_reactions_of_a_closed_loop_carry_its_weight():
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
 def test_a_load_however_large_moves_what_is_pressed_by_the_compliance(size):
-    """Rows that springs enter but by rounding stay open by as much of the load."""
+    """The least energy under a load of 1e8 N adds the compliance times the load."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (
         solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]

@@ -171,7 +171,7 @@ def test_platform_on_two_pins_is_off_by_what_one_clearance_leaves(clearance):
 
 
 def test_a_pose_that_nothing_leaves_free_is_not_marked():
-    """A load that presses all clearance; no clearance at all."""
+    """A load that presses all clearances, or no clearance."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4, spin=1e-4)
@@ -194,7 +194,7 @@ def test_a_pose_that_nothing_leaves_free_is_not_marked():
 
 
 def test_settled_clearance_reads_as_the_prediction_that_settled_it():
-    """Effects are tried from there: without one nothing may change."""
+    """Without an effect the prediction from settled clearances is the same."""
     here = as_declared(erring("five_bar", 5), point=POINT)
     found, held = predict(here), predict(with_rest_positions(here))
     assert held.deviation == pytest.approx(found.deviation, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Many exact equilibria at once are those found one by one."""
+"""Many exact equilibria together are those found one by one."""
 
 from dataclasses import replace
 

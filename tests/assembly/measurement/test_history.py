@@ -1,4 +1,4 @@
-"""States that lag behind what was varied, against the differential equation itself."""
+"""States that lag behind a variable, against the differential equation."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What effects may depend on, by public name, and what came before a row."""
+"""Variables of effects by public name, and the rows before a row."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""All rows at once against the cone solver, and what reciprocity asks of them."""
+"""All rows together against the cone solver, and reciprocity."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Slopes of places that give by laws of their own, by hand."""
+"""Places that deform by laws of their own, by bisection."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def test_springs_that_give_without_end_are_refused():
 
 
 def test_laws_that_never_settle_are_refused():
-    """It gives as soon as it is loaded, and then it is not: forty steps, no answer."""
+    """It deforms under any load, and so far that the load is gone."""
     with pytest.raises(SolverFailed, match="do not settle in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))
 
