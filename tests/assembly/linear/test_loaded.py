@@ -1,4 +1,4 @@
-"""Problem (22) under loads, compiled: closed forms, cvxpy, reference, certificates."""
+"""Problem (22), compiled, loaded or not: closed forms, reference, certificates."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture
+from assembly.linear.certificate import unproved
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.measurement.settled_clearance import without_joint_clearances
@@ -127,7 +128,8 @@ def cases_at_random():
         yield home_posture(random_robot(rng, 1 + seed % 3, 1 + seed // 3 % 3))
 
 
-def test_random_robots_have_the_references_answers_or_its_reasons():
+@pytest.mark.parametrize("loaded", [False, True])
+def test_random_robots_have_the_references_answers_or_its_reasons(loaded):
     """Loads on every body, sizes and errors over decades; potentials within gaps."""
     solved = 0
     for number, home in enumerate(cases_at_random()):
@@ -142,19 +144,24 @@ def test_random_robots_have_the_references_answers_or_its_reasons():
         given = (
             size * rng.normal(size=6), 0.3 * size * rng.normal(size=errors.shape),
             GRAVITY,
-        )  # fmt: skip
+        ) if loaded else ()  # fmt: skip
         many = solve_assembly([posture], *given)
         try:
             reference = solve_assembly(posture, *given, method="reference")
         except FreeMotion:
             assert many.status[0] == "no equilibrium"
             continue
-        except (CannotAssemble, SolverFailed):
+        except (CannotAssemble, SolverFailed) as error:
+            reason = str(error)
             assert many.status[0] != "ok"
+            assert many.reason[0] == reason
+            assert np.isnan(many.energy[0])
             continue
         if many.method[0] == "reference":
             continue
         solved += 1
+        assert many.certified[0]
+        assert unproved(reference) == ""
         on_errors = reference.frame_loads.body @ errors.ravel()
         potential = many.energy[0] - many.work[0] - on_errors
         # that of the reference counts what rounding leaves open in the closures
@@ -163,6 +170,10 @@ def test_random_robots_have_the_references_answers_or_its_reasons():
         assert many.energy_without_clearance[0] == pytest.approx(
             reference.energy_without_clearance, rel=1e-7, abs=1e-15
         )
+        if not len(reference.clearances):  # else clearance may leave the screw open
+            size = np.abs(reference.platform_screw).max() + 1e-12
+            off = np.abs(many.platform_screw[0] - reference.platform_screw)
+            assert off.max() < 1e-6 * size
     assert solved
 
 
