@@ -76,6 +76,16 @@ def test_an_array_of_22_with_other_points_than_the_frames_is_named(name):
         kernels.assemble_all(**right | {name: array[:-1]})
 
 
+def test_the_message_says_what_was_found_and_what_was_expected():
+    wrong = given() | {"T": np.zeros((K, N, 4, 3), dtype=np.float32)}
+    message = (
+        f"T: float32 of shape ({K}, {N}, 4, 3), expected float64 of shape "
+        f"(any, {N}, 4, 4), row after row"
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        kernels.assemble_all(**wrong)
+
+
 @pytest.mark.parametrize("name", ["outcome", "energy", "elastic"])
 def test_what_is_filled_must_be_writable(name):
     wrong = given()

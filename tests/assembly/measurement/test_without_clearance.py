@@ -14,6 +14,7 @@ from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import predict
 from assembly.measurement.settled_clearance import without_joint_clearances
 from assembly.measurement.without_clearance import flexibility
+from assembly.model.robot import Clearance
 from tests.robots_for_tests import coaxial_beams, planar_four_bar, random_robot
 
 seeds = st.integers(0, 2**32 - 1)
@@ -128,6 +129,12 @@ def test_a_rigid_linkage_cannot_take_up_errors_out_of_its_plane(row, size):
     told = predict(as_declared(at_home(robot)))
     assert np.isnan(told.deviation).all()
     assert told.reason[0]
+
+
+def test_clearance_is_refused():
+    robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
+    with pytest.raises(ValueError, match="has clearance, which is not linear"):
+        flexibility(at_home(robot))
 
 
 @settings(max_examples=20, deadline=None)
