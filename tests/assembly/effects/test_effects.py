@@ -15,7 +15,6 @@ from assembly.effects.joint_clearance import moving_joints
 from assembly.kinematics.posture import place_robot, together
 from assembly.measurement.conditions import as_declared
 from assembly.measurement.predict import assemble_row, predict, read
-from assembly.measurement.settled_clearance import with_clearances_taken_up
 from assembly.measurement.variables import with_history
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
@@ -295,18 +294,6 @@ def test_all_rows_at_once_agree_with_the_cone_solver(name, parallel):
     moved = np.abs(fast - predict(parallel).deviation).max()
     assert moved > 1e-7
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
-
-
-def test_clearance_in_an_open_chain_agrees_with_the_cone_solver():
-    robot = arm(K)
-    given = here(robot, (1.0, 2.0, 0.5, 3.0, -4.0, 5.0), q=0.3)
-    values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
-    there = apply_effects(given, {"joint_clearance": values})
-    slow = read(there, assemble_row(there, 0).platform_screw[None])
-    assert np.abs(predict(there).deviation - slow).max() < 1e-13
-    closed_form, open_ = with_clearances_taken_up(there)
-    assert not open_.any()
-    assert np.allclose(predict(closed_form).deviation, slow, atol=1e-13)
 
 
 @pytest.mark.parametrize("robot", ["arm6", "irsbot2", "delta"])

@@ -44,16 +44,6 @@ def test_waves_of_a_joint_turn_the_arm(q):
     assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
 
 
-def test_a_wave_once_a_turn_is_an_eccentric_encoder():
-    """a sin(q + p) = a cos p sin q + a sin p cos q: the library's effect."""
-    there = here(RIGID, q=0.6)
-    values = {"drive.amplitude": 1e-4, "drive.phase": 0.5}
-    library = predict(apply_effects(there, {"encoder_eccentricity": values})).deviation
-    waves = {"1.sine": 1e-4 * cos(0.5), "1.cosine": 1e-4 * sin(0.5)}
-    found = predict(apply_functions(there, [at_drive(waves, "waves")])).deviation
-    assert found == pytest.approx(library, rel=1e-12, abs=1e-18)
-
-
 def test_a_formula_is_what_it_says():
     formula = at_drive(
         {"a": 1e-5, "b": 2e-6, "n": 2.0}, "formula", formula="a*sin(3*q)**n - b/2"

@@ -88,16 +88,3 @@ def test_curvature_that_is_negative_inside_leads_to_a_bound(units):
     )  # fmt: skip
     step, _ = clearance_step(p, near=False)
     assert step == pytest.approx([1.0], abs=1e-6)
-
-
-@pytest.mark.parametrize("push", [0.4, 3.0])
-def test_of_one_interval_the_step_is_the_least_of_a_parabola(push):
-    """-push / curvature, or the end before it; near or not."""
-    p = ClearanceProblem(
-        np.array([[2.0]]), np.array([-2.0 * push]), np.array([0.2]), np.array([0]),
-        np.zeros((0, 1)), np.zeros(0),
-    )  # fmt: skip
-    for near in (True, False):
-        step, rigid = clearance_step(p, near)
-        assert step == pytest.approx([min(push, 0.8)], abs=1e-7)
-        assert len(rigid) == 0

@@ -110,31 +110,6 @@ def test_a_robot_without_clearances_stores_what_it_would_without_them(name, rng)
         assert answer.energy_without_clearance == pytest.approx(answer.energy, rel=1e-9)
 
 
-@pytest.mark.parametrize("scale", [0.1, 3.0])
-def test_errors_and_clearances_times_s_give_energy_times_s_squared(scale):
-    case = NUMBERS["cases"][0]
-    robot = irsbot2_with(case)
-    scaled = replace(
-        robot.with_errors(robot.errors * scale),
-        frames=tuple(
-            replace(
-                f,
-                geometric_error=f.geometric_error * scale,
-                clearance=f.clearance
-                and Clearance(*(scale * v for v in vars(f.clearance).values())),
-            )
-            for f in robot.frames
-        ),
-    )
-    pose = {"tx": 0.1, "tz": -0.4}
-    one = solve_assembly(place_robot(robot, pose=pose))
-    other = solve_assembly(place_robot(scaled, pose=pose))
-    assert other.energy == pytest.approx(scale**2 * one.energy, rel=1e-8)
-    assert np.allclose(
-        other.platform_screw, scale * one.platform_screw, rtol=1e-5, atol=1e-9 * scale
-    )
-
-
 def test_moving_the_platform_frame_moves_the_screw_and_not_the_energy():
     """Another reference point on the same body: a rigid body's small motion."""
     robot = irsbot2_with(NUMBERS["cases"][0])

@@ -172,31 +172,6 @@ def test_what_attains_the_bound_keeps_every_bound_of_the_closed_chain(spin, rng)
         assert height == pytest.approx(most.value / 1e4, rel=1e-6, abs=1e-11)
 
 
-def test_planar_loop_by_vertex_enumeration():
-    """Two clearance joints along x and y meet a third: a polygon's farthest vertex.
-
-    Chain A can be at |x| <= 3, |y| <= 4 (units of 1e-5 m); chain B within |x| <= 5,
-    |y| <= 1: the platform's box is 3 x 1, its farthest corner sqrt(10).
-    """
-
-    def slider(name, above, turn, bound):
-        return Frame(name, above, rotation=turn, clearance=Clearance(axial=bound))
-
-    to_x, to_y = [0, np.pi / 2, 0], [-np.pi / 2, 0, 0]
-    frames = []
-    for leg, (x, y) in (("a", (3e-5, 4e-5)), ("b", (5e-5, 1e-5))):
-        frames += [
-            slider(f"{leg}x", "base", to_x, x),
-            Frame(f"{leg}m", f"{leg}x", rotation=[0, -np.pi / 2, 0]),
-            slider(f"{leg}y", f"{leg}m", to_y, y),
-            Frame(f"{leg}e", f"{leg}y", rotation=[np.pi / 2, 0, 0]),
-        ]
-    robot = Robot("table", "ae", tuple(frames), (("ae", "be"),))
-    found = bounds(robot)
-    assert_holds(found.translation_error, np.sqrt(10) * 1e-5, 1e-9)
-    assert np.abs(np.abs(found.translation_screw[3:5]) - [3e-5, 1e-5]).max() < 1e-9
-
-
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
 def test_budget_around_two_springs_is_a_ball_known_in_closed_form(asked):
     """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
