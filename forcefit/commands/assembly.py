@@ -9,6 +9,7 @@ import typer
 
 from forcefit.commands.deflection import deflection
 from forcefit.commands.frequencies import frequencies
+from forcefit.commands.help import Commands
 from forcefit.commands.options import (
     AlongOption,
     AtOption,
@@ -39,7 +40,7 @@ from forcefit.inputs.writing import (
     write_json,
 )
 
-app = typer.Typer(no_args_is_help=True)
+app = Commands(no_args_is_help=True)
 
 
 @app.command()

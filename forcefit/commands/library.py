@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
+from forcefit.commands.help import Commands
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
-library = typer.Typer(no_args_is_help=True)
+library = Commands(no_args_is_help=True)
 Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
 
 

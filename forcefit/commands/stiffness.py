@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from forcefit.commands.help import Commands
 from forcefit.commands.library import library
 from forcefit.commands.link_exchange import export, import_
 from forcefit.commands.options import FigureOption, JsonOption
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from stiffness.link import LinkStiffness
     from stiffness.surface.interface import Interface
 
-app = typer.Typer(no_args_is_help=True)
+app = Commands(no_args_is_help=True)
 app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
 app.command("import")(import_)
 app.command()(export)

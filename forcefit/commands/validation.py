@@ -11,6 +11,7 @@ from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
 from forcefit.commands.exchange import import_, iso
 from forcefit.commands.generate import generate
+from forcefit.commands.help import Commands
 from forcefit.commands.inspect import inspect
 from forcefit.commands.options import (
     FigureOption,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from assembly.kinematics.posture import Posture
     from assembly.model.robot import Robot
 
-app = typer.Typer(no_args_is_help=True)
+app = Commands(no_args_is_help=True)
 app.command()(diagnose)
 app.command()(generate)
 app.command()(inspect)
