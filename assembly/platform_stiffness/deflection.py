@@ -13,6 +13,7 @@ side is met, and the jump past the rest is named.  :mod:`.arc_length` follows th
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,7 @@ from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 from forcefit.inputs.display import html_table, largest_row, numbers, short_repr
 from forcefit.inputs.errors import BadInput
+from forcefit.inputs.renamed import renamed_keywords
 
 _HALVINGS = 14  # of a step of the load, to bracket what happens in it: 6e-5 of it
 _CARRIES = 1e-6  # of the largest force, work along its bound: what is pressed
@@ -115,13 +117,14 @@ Progress = Callable[[str, int, int], None]
 _Solver = Callable[[float, _Point | None], _Point]
 
 
+@renamed_keywords(exact=("state", {True: "exact", False: "contact"}))
 def deflection_curve(
     posture: Posture,
     component: int,
     loads: Sequence[float],
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["contact", "exact"] = "contact",
     progress: Progress = lambda what, done, most: None,
     method: Method = "compiled",
 ) -> DeflectionCurve:
@@ -133,7 +136,7 @@ def deflection_curve(
         loads: [N m or N] its values, in the order in which they act.
         load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether with finite motions, else by problem (22).
+        state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
         progress: called at each load with the steps taken there and how many there
             may be.
         method: of :func:`assembly.linear.energy.solve_assembly` or
@@ -147,9 +150,11 @@ def deflection_curve(
         FreeMotion: the load drives a motion that nothing resists.
         SolverFailed: no equilibrium was found; the load at which is in the message.
         BadInput: no such component, no loads, or not numbers.
-        ValueError: no such method.
+        ValueError: no such state or method.
     """
     check_method(method)
+    if state not in {"contact", "exact"}:
+        raise ValueError(f"deflection_curve: no state {state!r}")
     if component not in range(6) or not len(loads):
         raise BadInput(
             f"deflection_curve: found component {component} and {len(loads)} loads, "
@@ -164,7 +169,7 @@ def deflection_curve(
         wrench[component] = value
         what = f"steps at load {value:.6g}"
         return _solve(
-            posture, value, wrench, gravity, exact, near,
+            posture, value, wrench, gravity, state == "exact", near,
             lambda done, most: progress(what, done, most), method,
         )  # fmt: skip
 

@@ -46,6 +46,16 @@ def test_modes_of_the_exact_state_by_the_old_flag():
     np.testing.assert_array_equal(found.frequencies, expected.frequencies)
 
 
+def test_a_deflection_curve_of_the_exact_state_by_the_old_flag():
+    posture = ff.home_posture(ff.load_robot("four_bar"))
+    with pytest.warns(FutureWarning, match="state='exact'"):
+        found = ff.deflection_curve(posture, 3, [0.0, 10.0], exact=True)
+    expected = ff.deflection_curve(posture, 3, [0.0, 10.0], state="exact")
+    np.testing.assert_array_equal(found.screws, expected.screws)
+    with pytest.raises(ValueError, match="no state 'nominal'"):
+        ff.deflection_curve(posture, 3, [0.0, 10.0], state="nominal")
+
+
 def test_a_data_set_of_an_older_release_has_the_present_names(tmp_path):
     variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
     old = xarray.Dataset(variables, attrs={"play": "worst", "reading": "free"})

@@ -48,7 +48,7 @@ def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsy
 def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
     for words in (
         ["assembly", "sweep", "--", "--tangent"],
-        ["validation", "crosscheck", "r", "--stiffness"],
+        ["validation", "validity", "r", "--stiffness"],
     ):
         assert with_new_names(words) == words
     assert capsys.readouterr().err == ""
