@@ -35,7 +35,7 @@ from assembly.linear.load import (
 from assembly.linear.reference.reduction import reduce_problem
 from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_zero
 from assembly.linear.solution import Solution
-from assembly.model.clearance import Compliant, clearance_bounds, clearance_excess
+from assembly.model.clearance import clearance_bounds, clearance_excess
 from assembly.model.point_results import N, plain
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
@@ -268,11 +268,11 @@ class Assembly(Solution[N]):
         residual = np.abs(_times(self.linearisation.rows, _flat(self.screws)))
         return plain(residual.max(axis=-1, initial=0.0))
 
-    def clearance_excess(self, compliant: Compliant = "elastic") -> N:
+    def clearance_excess(self, own_axes_free: bool = False) -> N:
         """(...) [-] by how much the worst clearance leaves its cone, of its size."""
-        if compliant == "elastic" and "_excess" in vars(self):
+        if not own_axes_free and "_excess" in vars(self):
             return self._excess
-        bounds = clearance_bounds(self.posture.robot, compliant)
+        bounds = clearance_bounds(self.posture.robot, own_axes_free)
         return plain(clearance_excess(self.clearance_screws, bounds))
 
     @cached_property

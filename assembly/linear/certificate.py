@@ -181,8 +181,8 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     kept: frozenset[int] = frozenset()
-    total = _extents(within_bounds(assembly, "elastic", kept, uncertain))
-    open_set = within_bounds(assembly, "elastic", kept, unloaded)
+    total = _extents(within_bounds(assembly, kept, uncertain))
+    open_set = within_bounds(assembly, kept, unloaded)
     not_unique = _extents(open_set)
     with np.errstate(invalid="ignore"):
         error = np.maximum(total - not_unique, 0.0)

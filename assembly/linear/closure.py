@@ -29,7 +29,6 @@ from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
     CONES,
-    Compliant,
     clearance_bounds,
     scales_with_margin,
 )
@@ -68,17 +67,17 @@ class VirtualJoints:
 
 
 def virtual_joints(
-    robot: Robot, compliant: Compliant = "elastic",
+    robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
     """Columns of all that may move.
 
     Args:
         robot: of n frames.
-        compliant: what passive joints with stiffness do: ``"elastic"``, all springs
-            act; ``"hinged"``, all but the one about (or along) the joint's own z, which
-            is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and the own
-            z is locked or free: the two margins of problem (21).
+        springs: whether links and joints deform; problem (21) has no springs.
+        own_axes_free: whether passive joints with stiffness move freely about (or
+            along) their own z, without its spring; else that axis is elastic, or
+            without springs rigid: the two margins of problem (21).
         bounded_motion: keep the bounds of passive joints' own motion, of all or of
             these frames.  They are large and almost never active, so they are left
             out first and checked afterwards.
@@ -88,7 +87,8 @@ def virtual_joints(
     """
     if isinstance(bounded_motion, bool):
         bounded_motion = frozenset(range(len(robot.frames)) if bounded_motion else ())
-    return _virtual_joints(_JointsKey(_parts(robot), robot), compliant, bounded_motion)
+    key = _JointsKey(_parts(robot), robot)
+    return _virtual_joints(key, springs, own_axes_free, bounded_motion)
 
 
 @dataclass(frozen=True)
@@ -113,20 +113,21 @@ def _parts(robot: Robot) -> tuple:
 
 @lru_cache(maxsize=16)
 def _virtual_joints(
-    key: _JointsKey, compliant: Compliant, bounded_motion: frozenset[int]
-) -> VirtualJoints:
+    key: _JointsKey, springs: bool, own_axes_free: bool,
+    bounded_motion: frozenset[int],
+) -> VirtualJoints:  # fmt: skip
     """The columns, once for all robots of the same parts."""
     robot = key.robot
-    bounds = clearance_bounds(robot, compliant)
+    bounds = clearance_bounds(robot, own_axes_free)
     scaled = scales_with_margin(robot)
     left_out = [i not in bounded_motion for i in range(len(bounds))]
     bounds = np.where(
         np.array(left_out)[:, None] & ~scaled & (bounds > 0), np.inf, bounds
     )
     links = joints = np.zeros((0, 6, 6))
-    if compliant in {"elastic", "hinged"}:
+    if springs:
         links, joints = link_compliances(robot), joint_compliances(robot)
-    if compliant == "hinged":
+    if springs and own_axes_free:
         for C, frame in zip(joints, robot.frames, strict=True):
             if frame.compliant:
                 C[frame.own_axis] = C[:, frame.own_axis] = 0.0

@@ -33,7 +33,6 @@ from assembly.linear.rounding import (
     stiffness_spread,
 )
 from assembly.linear.solution import with_known
-from assembly.model.clearance import Compliant
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
 from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, SOLVER_FAILED
@@ -126,7 +125,7 @@ def solve_assembly(
     if posture.transforms.ndim == 3 and errors is None and loads.body.ndim == 1:
         return _solve_one(posture, wrench, loads, method)
     sets = None if errors is None else np.asarray(errors, dtype=float)
-    return _solve_many(posture, sets, wrench, loads, "elastic", method)
+    return _solve_many(posture, sets, wrench, loads, False, method)
 
 
 def with_free_own_axes(assembly: Assembly) -> Assembly:
@@ -136,11 +135,11 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
         assembly: of many points.
 
     Returns:
-        The same points under the same loads, see ``"hinged"`` of
+        The same points under the same loads, see ``own_axes_free`` of
         :func:`assembly.linear.closure.virtual_joints`.
     """
     posture, load, loads = assembly.posture, assembly.load, assembly.frame_loads
-    return _solve_many(posture, assembly.errors, load, loads, "hinged", "compiled")
+    return _solve_many(posture, assembly.errors, load, loads, True, "compiled")
 
 
 def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
@@ -190,7 +189,7 @@ def _solve_one(
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
-        joints, structure = structure_of(robot, "elastic", bounded)
+        joints, structure = structure_of(robot, bounded_motion=bounded)
         rows = _compiled(joints, structure, T, robot.errors[None], off, acting)
         if rows["outcome"][0] < _LEFT:
             break
@@ -220,12 +219,12 @@ def _rounding_of(robot: Robot) -> float:
 
 def _solve_many(
     posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
-    compliant: Compliant, method: Method,
+    own_axes_free: bool, method: Method,
 ) -> Assembly:  # fmt: skip
     """All points compiled, unless asked otherwise; one by one what that leaves."""
     robot = posture.robot
     T, sets, off = _checked(posture, errors)
-    joints, structure = structure_of(robot, compliant)
+    joints, structure = structure_of(robot, True, own_axes_free)
     acting = loads.rows() if loads else None
     if acting is not None and len(T) == len(sets) == 1:  # loads alone differ
         sets = np.repeat(sets, len(acting), axis=0)
@@ -235,7 +234,7 @@ def _solve_many(
     held = _bounds_matter(structure, rows["outcome"])
     within = None
     if held.any():
-        given, own_joints = (T, sets, off, acting), (robot, compliant, True)
+        given, own_joints = (T, sets, off, acting), (robot, True, own_axes_free, True)
         within = _within_bounds(*structure_of(*own_joints), held, given, rows)
     rows |= _unsaid(count)
     if len(T) == 1 and posture.transforms.ndim > 3:
@@ -244,7 +243,7 @@ def _solve_many(
     points = _of_rows(posture, joints, rows, load, loads, own)
     for i in np.flatnonzero(rows["outcome"] >= _LEFT).tolist():
         one = points[i]  # where it stands, and its loads
-        _record(rows, points.apart, i, _by_reference(one, compliant))
+        _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
     _certify(rows, points)
@@ -406,10 +405,10 @@ def _of_rows(
     return with_known(points, {name: rows[key] for name, key in known.items()})
 
 
-def _by_reference(where: Assembly, compliant: Compliant) -> Assembly | Exception:
+def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
     """One point solved by the reference, or why there is no solution."""
     try:
-        return least_energy(where.posture, where.load, where.frame_loads, compliant)
+        return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return error
 

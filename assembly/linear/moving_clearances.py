@@ -12,7 +12,6 @@ from assembly.linear.energy import with_free_own_axes
 from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
 from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.linear.robot_structure import Structure, structure_of
-from assembly.model.clearance import Compliant
 from assembly.model.robot import Robot
 from assembly.solvers.method import Method, check_method
 
@@ -129,9 +128,9 @@ class _Places(NamedTuple):
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
     """Places of one assumption, once for each robot."""
-    rigid: Compliant = "free" if assumption == "free" else "rigid"
-    moving, all_of = structure_of(robot, rigid)[1], structure_of(robot)[1]
-    loaded = structure_of(robot, "hinged")[1] if assumption == "free" else all_of
+    free = assumption == "free"
+    moving, all_of = structure_of(robot, False, free)[1], structure_of(robot)[1]
+    loaded = structure_of(robot, True, free)[1] if free else all_of
     own = _columns(moving.cone_frame, moving.cone_axis)
     in_loaded = _indices(own, _columns(loaded.cone_frame, loaded.cone_axis))
     cone_of = np.searchsorted(loaded.starts, in_loaded, side="right") - 1

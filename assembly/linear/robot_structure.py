@@ -13,7 +13,7 @@ from assembly.linear.closure import (
     closure_signs,
     virtual_joints,
 )
-from assembly.model.clearance import Compliant, clearance_bounds, component_bounds
+from assembly.model.clearance import clearance_bounds, component_bounds
 from assembly.model.robot import Robot
 from assembly.solvers.cones import cone_starts
 
@@ -67,22 +67,24 @@ class Structure(NamedTuple):
 
 @lru_cache(maxsize=32)
 def structure_of(
-    robot: Robot, compliant: Compliant = "elastic", bounded_motion: bool = False
-) -> tuple[VirtualJoints, Structure]:
+    robot: Robot, springs: bool = True, own_axes_free: bool = False,
+    bounded_motion: bool = False,
+) -> tuple[VirtualJoints, Structure]:  # fmt: skip
     """What may move, as columns and as arrays.
 
     Args:
         robot: any.
-        compliant: as for :func:`assembly.linear.closure.virtual_joints`.
+        springs: as for :func:`assembly.linear.closure.virtual_joints`.
+        own_axes_free: likewise.
         bounded_motion: likewise.
 
     Returns:
         The columns; the same as arrays.
     """
-    joints = virtual_joints(robot, compliant, bounded_motion)
+    joints = virtual_joints(robot, springs, own_axes_free, bounded_motion)
     rows = tuple((robot.index(a), robot.index(b)) for a, b in robot.closures)
     tree = _Tree(robot.index(robot.platform), rows, robot)
-    return joints, _structure(joints, tree, compliant)
+    return joints, _structure(joints, tree, own_axes_free)
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class _Tree:
 
 
 @lru_cache(maxsize=32)
-def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Structure:
+def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
     """The arrays, once for all robots that differ in their errors alone."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
@@ -112,7 +114,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Stru
     order = np.append(order, alone)
     cone_frame, cones = _by_frame(joints.cones)
     free_frame, free = _by_frame(joints.free)
-    bounds = component_bounds(clearance_bounds(robot, compliant))
+    bounds = component_bounds(clearance_bounds(robot, own_axes_free))
     free_axis = np.abs(free).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     return Structure(

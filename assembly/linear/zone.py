@@ -10,7 +10,7 @@ As printed, (21) makes compliant joints rigid in every direction (``"rigid"``);
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, overload
+from typing import Any, ClassVar, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,6 @@ from assembly.linear.closure import checked_size
 from assembly.linear.lanes import COMPILED, REFERENCE, margins_side_by_side
 from assembly.linear.reference.zone import least_margin
 from assembly.linear.robot_structure import structure_of
-from assembly.model.clearance import Compliant
 from assembly.model.point_results import N, PointResults
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
@@ -28,7 +27,8 @@ from forcefit.inputs.display import Figures
 
 MARGIN_GAP = 1e-8  # of a margin, accepted above its bound ..
 _GAP_ABSOLUTE = 1e-12  # .. plus this
-# what compliant joints do about their own axis, by the names of the two margins
+# what compliant joints are about their own axis, by the names of the two margins
+Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
 ASSEMBLABLE = 1.0 + 1e-6  # a margin within rounding of 1 counts as inside
 
@@ -156,14 +156,16 @@ def zone_margin(
     if posture.transforms.ndim == 3 and own.ndim == 2:
         if not left[0]:
             return Zone(float(margin[0]), float(bound[0]), "compiled", forces[0], "")
-        found = least_margin(_erring(posture, own, 0), compliant)
+        found = least_margin(_erring(posture, own, 0), compliant == "free")
         return Zone(*found, "reference", np.full(len(forces[0]), np.nan), "")
     forces[left] = np.nan
     reason = np.full(len(margin), "", dtype=object)
     for i in np.flatnonzero(left).tolist():
         margin[i] = bound[i] = np.nan
         try:
-            margin[i], bound[i] = least_margin(_erring(posture, own, i), compliant)
+            margin[i], bound[i] = least_margin(
+                _erring(posture, own, i), compliant == "free"
+            )
         except SolverFailed as error:
             reason[i] = str(error)
     gave = np.where(left, "reference", "compiled").astype(object)
@@ -186,7 +188,7 @@ def _compiled(
     """Margins, their bounds and forces, and whether each is left to the reference."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
-    joints, structure = structure_of(posture.robot, compliant)
+    joints, structure = structure_of(posture.robot, False, compliant == "free")
     T = posture.transforms if posture.transforms.ndim > 3 else posture.transforms[None]
     count = len(own) if len(T) == 1 and own.ndim == 3 else len(T)
     forces = np.zeros((count, joints.cones.shape[1]))

@@ -10,29 +10,24 @@ The free motion of a passive joint is one of these directions without a bound (o
 the bound the file gives for it), so a joint's own motion needs no special place.
 """
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.model.robot import Clearance, Frame, Robot
 
-# what passive joints with stiffness do, see assembly.linear.closure.virtual_joints
-Compliant = Literal["elastic", "hinged", "rigid", "free"]
 CONES = ((0, 1), (2,), (3, 4), (5,))  # components of the screw that each bound limits
 BOUND_OF_COMPONENT = (0, 0, 1, 2, 2, 3)  # the bound that limits each component
 _KEYS = ("tilt", "spin", "radial", "axial")
 
 
-def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
+def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
     """Bounds of every joint's clearance.
 
     Args:
         robot: of n frames.
-        compliant: what a passive joint with stiffness does about or along its own z:
-            ``"elastic"``, only its spring moves (and ``spin``, if given, is a clearance
-            in series); ``"free"``, it moves freely: the second margin of problem (21);
-            ``"rigid"`` bounds are the elastic ones, ``"hinged"`` the free ones.
+        own_axes_free: whether passive joints with stiffness move freely about or along
+            their own z; else only the spring moves there (and ``spin``, if given, is a
+            clearance in series).
 
     Returns:
         (n, 4) [rad, rad, m, m] for [RXY RZ TXY TZ]: 0 is rigid, inf is free.
@@ -45,7 +40,7 @@ def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
         if own is not None:
             given = getattr(clearance, _KEYS[own])
             bounds[i, own] = np.inf if given is None else given
-        elif frame.compliant and compliant in {"free", "hinged"}:
+        elif frame.compliant and own_axes_free:
             bounds[i, 3 if frame.joint == "prismatic" else 1] = np.inf
     return bounds
 

@@ -14,8 +14,7 @@ from assembly.kinematics.posture import Posture
 from assembly.kinematics.ranks import RANK
 from assembly.linear.closure import linearise, virtual_joints
 from assembly.linear.reference.reduction import complement, reduce_problem
-from assembly.linear.zone import Zone, zone_margin
-from assembly.model.clearance import Compliant
+from assembly.linear.zone import Compliant, Zone, zone_margin
 from assembly.solvers.cones import cone_starts
 from assembly.statistics.linear_response import checked_errors
 
@@ -96,7 +95,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     robot = posture.robot
-    lin, joints = linearise(posture), virtual_joints(robot, compliant)
+    lin, joints = linearise(posture), virtual_joints(robot, False, compliant == "free")
     reduced = reduce_problem(lin, joints)
     # orthonormal rows, whatever the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)

@@ -12,7 +12,7 @@ from assembly.kinematics.nominal import Target
 from assembly.kinematics.posture import Posture, place_many
 from assembly.kinematics.verdict import SINGULAR_WORDS, verdicts
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.clearance import Compliant
+from assembly.linear.zone import Compliant
 from assembly.model.robot import Robot
 from assembly.model.statuses import OUT_OF_REACH, SINGULAR
 from assembly.solvers.conic import SolverFailed

@@ -36,7 +36,7 @@ def compare_printed(
 
     try:
         energy, screw = energy_as_printed(posture)
-        margin, free = (margin_as_printed(posture, key) for key in ("rigid", "free"))
+        margin, free = (margin_as_printed(posture, free) for free in (False, True))
     except RuntimeError as error:
         return {"verdict": "no answer", "passed": False, "reason": str(error)}
     checks = {

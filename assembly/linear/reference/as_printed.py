@@ -19,7 +19,6 @@ from scipy.linalg import block_diag
 from assembly.kinematics.posture import Posture
 from assembly.model.clearance import (
     CONES,
-    Compliant,
     clearance_bounds,
     scales_with_margin,
 )
@@ -66,12 +65,13 @@ def energy_as_printed(
     return float(energy.value), np.asarray(x_p.value) * _UNIT
 
 
-def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float | None:
+def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | None:
     """Margin of problem (21): the least factor on the clearances that assembles.
 
     Args:
         posture: where the robot stands.
-        compliant: ``"rigid"`` as printed, or ``"free"``.
+        own_axes_free: whether compliant joints are free about their own axis; as
+            printed they are rigid.
 
     Returns:
         The factor; None if no factor helps.
@@ -81,7 +81,7 @@ def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float
     count = len(posture.robot.frames)
     c = cp.Variable((count, 6))
     x_p, t = cp.Variable(6), cp.Variable(nonneg=True)
-    bounds = clearance_bounds(posture.robot, compliant) / _UNIT
+    bounds = clearance_bounds(posture.robot, own_axes_free) / _UNIT
     factor = np.where(scales_with_margin(posture.robot), t, 1.0)
     constraints = _clearance_constraints(c, bounds, factor)
     errors = posture.robot.errors / _UNIT

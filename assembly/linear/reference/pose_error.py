@@ -34,7 +34,6 @@ from assembly.linear.closure import VirtualJoints, virtual_joints
 from assembly.linear.reference.energy import least_energy
 from assembly.linear.reference.reduction import complement
 from assembly.model.clearance import (
-    Compliant,
     clearance_bounds,
     component_bounds,
     scales_with_margin,
@@ -237,13 +236,13 @@ def reachable_screws(
         raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
     if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
         raise ValueError("the budget assumption needs no load and a budget >= 0")
-    compliant: Compliant = "free" if assumption == "free" else "elastic"
+    free = assumption == "free"
     loaded = assembly
-    if assumption == "free":
+    if free:
         # turning about the own axis costs nothing here: a clearance is held only if it
         # stays loaded without those soft springs
         loaded = least_energy(
-            assembly.posture, assembly.load, assembly.frame_loads, "hinged"
+            assembly.posture, assembly.load, assembly.frame_loads, own_axes_free=True
         )
 
     def moving(joints: VirtualJoints) -> MovingCones:
@@ -262,27 +261,30 @@ def reachable_screws(
         lin = assembly.linearisation
         return MovingCones(lin.rows @ columns, lin.platform @ columns, start, group)
 
-    return within_bounds(assembly, compliant, loaded.joints.bounded_motion, moving)
+    return within_bounds(assembly, loaded.joints.bounded_motion, moving, free)
 
 
 def within_bounds(
-    assembly: Assembly, compliant: Compliant, kept: frozenset[int],
-    moving: Callable[[VirtualJoints], MovingCones],
+    assembly: Assembly, kept: frozenset[int],
+    moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
     """Platform screws as cones move about an assembly and free motions follow.
 
     Args:
         assembly: where they start.
-        compliant: see :func:`assembly.linear.closure.virtual_joints`.
         kept: frames whose bound of the joint's own motion is certain to count.
         moving: the cones that move, of given virtual joints.
+        own_axes_free: see :func:`assembly.linear.closure.virtual_joints`; then no
+            spring acts.
 
     Returns:
         The set, within all bounds.
     """
     kept = kept | assembly.joints.bounded_motion
     while True:
-        joints = virtual_joints(assembly.posture.robot, compliant, bounded_motion=kept)
+        joints = virtual_joints(
+            assembly.posture.robot, not own_axes_free, own_axes_free, kept
+        )
         cones = moving(joints)
         group = np.unique(cones.group, return_inverse=True)[1]
         motion = _Motion(assembly, joints, cones._replace(group=group))

@@ -13,7 +13,6 @@ from assembly.linear.closure import (
 )
 from assembly.linear.reference.reduction import Reduction, reduce_problem
 from assembly.model.clearance import (
-    Compliant,
     clearance_bounds,
     clearance_excess,
     scales_with_margin,
@@ -22,12 +21,12 @@ from assembly.solvers.cones import cone_sizes, cone_starts
 from assembly.solvers.conic import least_factor
 
 
-def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
+def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
     """Factor on all clearances at which a rigid manipulator just assembles, (21).
 
     Args:
         posture: where the robot stands.
-        compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
+        own_axes_free: whether compliant joints are free about their own axis.
 
     Returns:
         The margin and its certified lower bound; inf for both if no factor does.
@@ -35,13 +34,14 @@ def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
     Raises:
         SolverFailed: the cone solver gave up.
     """
-    lin = linearise(posture)
-    margin, bound, screws = margin_with(lin, virtual_joints(posture.robot, compliant))
-    bounds = clearance_bounds(posture.robot, compliant)
-    ranges = np.where(scales_with_margin(posture.robot), np.inf, bounds)
+    lin, robot = linearise(posture), posture.robot
+    joints = virtual_joints(robot, False, own_axes_free)
+    margin, bound, screws = margin_with(lin, joints)
+    bounds = clearance_bounds(robot, own_axes_free)
+    ranges = np.where(scales_with_margin(robot), np.inf, bounds)
     if clearance_excess(screws, ranges) > 1e-9:
         # the range of a passive joint's motion was left out, but it is active
-        joints = virtual_joints(posture.robot, compliant, bounded_motion=True)
+        joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
     return margin, bound
 
