@@ -116,7 +116,7 @@ def check_covariates(
     if finite_ones and not finite:
         raise BadInput(
             f'{robot.name}: effect "{finite_ones[0]}" asks for finite '
-            "motions; expected the command forcefit assembly exact"
+            "motions; expected forcefit assembly solve --state exact"
         )
     for name in (*robot.effects, *robot.session_effects.get(str(session), ())):
         needed |= dict.fromkeys(LIBRARY[name].needs, name)

@@ -131,7 +131,7 @@ class ExactAssembly:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """What ``forcefit assembly exact`` prints of it."""
+        """What ``forcefit assembly solve --state exact`` prints of it."""
         return {
             "pose": f"{numbers(self.posture.pose().values())} m, rad",
             **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),

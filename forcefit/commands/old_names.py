@@ -1,4 +1,4 @@
-"""Old names of options: each works for one release, with a line on stderr.
+"""Old names of commands and options: each works for one release, with a line on stderr.
 
 The commands themselves know the new names only; ``--help`` shows no others.  Those that
 the public formats name stay for good, and nothing is said of them.
@@ -7,6 +7,18 @@ the public formats name stay for good, and nothing is said of them.
 import sys
 from collections.abc import Sequence
 
+# new words by the words of a command that is part of another one now
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "assembly exact": ("assembly", "solve", "--state", "exact"),
+    "assembly zone": ("assembly", "solve", "--quantities", "margin"),
+    "assembly table": ("assembly", "plot"),
+    "stiffness curve": ("stiffness", "beam"),
+    "stiffness solids": ("stiffness", "fea", "--part", "list"),
+    "stiffness library list": ("stiffness", "library", "read"),
+    "stiffness library look-up": ("stiffness", "library", "read"),
+    "stiffness library export": ("stiffness", "library", "read", "--to", "csv"),
+    "validation iso": ("validation", "inspect", "--iso"),
+}
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
 # new words by command and old option; a value follows where the option takes one
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
@@ -39,6 +51,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
     "assembly tolerances": {"--play": ("--clearance",)},
     "assembly deflection": _PICTURE | {"--exact": ("--state", "exact")},
+    "assembly table": {"-o": ("--csv",), "--output": ("--csv",)},
     "assembly plot": _PICTURE | {"--quantity": ("--quantities",)},
     "report compare": {"-o": ("--report",), "--output": ("--report",)},
     "validation crosscheck": {
@@ -54,7 +67,9 @@ STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
 
 def with_new_names(words: Sequence[str]) -> list[str]:
-    """Replace options given by their old names, each reported on stderr once.
+    """Replace commands and options given by their old names.
+
+    Each is reported on stderr once.
 
     Args:
         words: of the command line, without the program's name.
@@ -76,7 +91,17 @@ def with_new_names(words: Sequence[str]) -> list[str]:
             print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
         reported.append(option)
         new_words += [*new[:-1], new[-1] + equals + value]
-    return new_words + list(words[end:])
+    return _with_new_command(new_words) + list(words[end:])
+
+
+def _with_new_command(words: list[str]) -> list[str]:
+    """Replace a command that is part of another one now."""
+    for old, new in COMMANDS.items():
+        count = len(old.split())
+        if words[:count] == old.split():
+            print(f"forcefit: {old} is now {' '.join(new)}", file=sys.stderr)
+            return [*new, *words[count:]]
+    return words
 
 
 def _parts(word: str) -> tuple[str, str, str]:

@@ -24,9 +24,9 @@ from forcefit.commands.options import (
     parse_load,
     posture_of,
 )
+from forcefit.commands.plot import CsvOption
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
-from forcefit.commands.sweep import CsvOption
 from forcefit.inputs.errors import BadInput, nearest
 from forcefit.inputs.packages import need
 from forcefit.inputs.writing import (

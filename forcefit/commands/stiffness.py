@@ -20,6 +20,8 @@ from forcefit.commands.stiffness_options import (
     InnerRadius,
     Kind,
     Masses,
+    OptionalBase,
+    OptionalTip,
     Parts,
     Poisson,
     PoissonOfRest,
@@ -63,10 +65,13 @@ def _tell_progress() -> None:
     log.handlers = [logging.StreamHandler()]
 
 
-def _interfaces(base: str, tip: str) -> "tuple[Interface, Interface]":
+def _interfaces(base: str | None, tip: str | None) -> "tuple[Interface, Interface]":
     """Both interfaces of the options."""
     from stiffness.surface.interface import parse_interface
 
+    if base is None or tip is None:
+        option = "--base" if base is None else "--tip"
+        raise BadInput(f'{option}: missing; expected an interface, such as "z=0"')
     return parse_interface(base, "--base"), parse_interface(tip, "--tip")
 
 
@@ -128,61 +133,70 @@ def _curve_link(
 
 @app.command()
 def beam(
-    length: Annotated[float, typer.Option(help="Base to tip [m].")],
     young: Young,
     poisson: Poisson,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="Pieces of a curved beam (TOML)."),
+    ] = None,
+    length: Annotated[
+        float | None, typer.Option(help="Of a straight beam, base to tip [m].")
+    ] = None,
     radius: Radius = None,
     inner_radius: InnerRadius = None,
     width: Width = None,
     height: Height = None,
     section: SectionText = None,
-    along: Annotated[str, typer.Option(help="Base to tip: x, y, z or 1,0,2.")] = "x",
+    along: Annotated[
+        str | None, typer.Option(help="Base to tip: x (the default), y, z or 1,0,2.")
+    ] = None,
     up: Up = None,
     theory: Theory = "timoshenko",
     json: JsonOption = None,
 ) -> None:
-    """K_E of a straight beam of constant section, in closed form."""
-    import numpy as np
+    """K_E of a beam: straight in closed form, or along a curve.
 
+    A straight beam has a length and a constant section.  A FILE describes a tapered,
+    bent or L-shaped one by its pieces.
+    """
     from forcefit.commands.beam_options import BeamOptions
-    from forcefit.commands.options import parse_axis
-    from forcefit.inputs.errors import checked
     from stiffness.report.results import link_results, link_text
 
     options = BeamOptions(
         young, poisson, radius, inner_radius, width, height, section, theory
     )
+    if file is None:
+        link = _straight_link(options, length, along or "x", up)
+    elif options.has_section() or not length is along is up is None:
+        raise BadInput(f"{file}: a curve's file has all lengths, sections and axes")
+    else:
+        link, _, _ = _curve_link(file, options)
+    write_json(link_results(link), json)
+    if json != "-":
+        print(link_text(link))
+
+
+def _straight_link(
+    options: "BeamOptions", length: float | None, along: str, up: str | None
+) -> "LinkStiffness":
+    """A straight beam of constant section."""
+    import numpy as np
+
+    from forcefit.commands.options import parse_axis
+    from forcefit.inputs.errors import checked
+
+    if length is None:
+        raise BadInput("--length: missing; expected [m], or a FILE of a curve's pieces")
     axis = parse_axis("--along", along)
     tip = checked("--length", length, "m", above=0) * axis / np.linalg.norm(axis)
-    link = options.link(np.zeros(3), tip, _up(up))
-    write_json(link_results(link), json)
-    if json != "-":
-        print(link_text(link))
-
-
-@app.command()
-def curve(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Pieces (TOML).")],
-    young: Young,
-    poisson: Poisson,
-    theory: Theory = "timoshenko",
-    json: JsonOption = None,
-) -> None:
-    """K_E of a beam along a curve: tapered, bent, L-shaped."""
-    from forcefit.commands.beam_options import BeamOptions
-    from stiffness.report.results import link_results, link_text
-
-    link, _, _ = _curve_link(file, BeamOptions(young, poisson, theory=theory))
-    write_json(link_results(link), json)
-    if json != "-":
-        print(link_text(link))
+    return options.link(np.zeros(3), tip, _up(up))
 
 
 @app.command()
 def fea(
     surface: Surface,
-    base: Base,
-    tip: Tip,
+    base: OptionalBase = None,
+    tip: OptionalTip = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,
     unit: Unit = "m",
@@ -194,13 +208,19 @@ def fea(
     time_limit: TimeLimit = 300.0,
     json: JsonOption = None,
 ) -> None:
-    """K_E by finite elements, refined to the asked accuracy."""
+    """K_E by finite elements, refined to the required accuracy.
+
+    --part list prints the solids of a STEP file: name, volume, bounding box.
+    """
     from forcefit.inputs.errors import checked
     from stiffness.fem.fea import Budget, FemOptions, solve_link
     from stiffness.fem.part_text import parse_mass
     from stiffness.report.results import link_results, link_text
     from stiffness.surface.surface import read_surface
 
+    if part == ["list"]:
+        _list_solids(surface, json)
+        return
     held, moved = _interfaces(base, tip)
     budget = Budget(seconds=checked("--time-limit", time_limit, "s", above=0))
     options = FemOptions(_accuracy(accuracy), interface, budget)
@@ -216,11 +236,7 @@ def fea(
         print(link_text(link))
 
 
-@app.command()
-def solids(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="STEP.")],
-    json: JsonOption = None,
-) -> None:
+def _list_solids(file: Path, json: str | None) -> None:
     """The solids of a STEP file: name, volume, bounding box."""
     from dataclasses import asdict
 

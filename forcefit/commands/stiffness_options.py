@@ -48,11 +48,21 @@ Parts = Annotated[
         "--part",
         help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800", '
         'a box along the mesh\'s axes [m], or "solid=one+other/young=...", of a STEP '
-        "file. May be repeated; the last counts.",
+        "file (fea: list prints its solids). May be repeated; the last counts.",
     ),
 ]
 Masses = Annotated[
     list[str] | None,
     typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
+]
+OptionalBase = Annotated[
+    str | None,
+    typer.Option(
+        help='Held, required: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].'
+    ),
+]
+OptionalTip = Annotated[
+    str | None,
+    typer.Option(help="Where the screw is read, required, like --base [m]."),
 ]
 TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]

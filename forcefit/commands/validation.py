@@ -9,7 +9,7 @@ import typer
 
 from forcefit.commands.correction import carry, compensate, explain, predict
 from forcefit.commands.diagnose import diagnose
-from forcefit.commands.exchange import import_, iso
+from forcefit.commands.exchange import import_
 from forcefit.commands.generate import generate
 from forcefit.commands.help import Commands
 from forcefit.commands.inspect import inspect
@@ -48,7 +48,6 @@ app.command()(generate)
 app.command()(inspect)
 app.command()(plan)
 app.command("import")(import_)
-app.command()(iso)
 app.command()(carry)
 app.command()(explain)
 app.command()(predict)

@@ -164,7 +164,7 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
         raise BadInput(
             f"{path}: found {len(solids)} solids ({names}), expected which one, such "
             f"as {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
-            f"them as one; forcefit stiffness solids {path.name} lists them"
+            f"them as one; forcefit stiffness fea {path.name} --part list lists them"
         )
     if not solid:
         return solids

@@ -26,7 +26,7 @@ def titles_of_options(out):
     for line in out.splitlines():
         if re.fullmatch(r"\S.*:", line):
             title = line[:-1]
-        elif option := re.match(r"  (?:-\w, )?(--[\w-]+)", line):
+        elif title and (option := re.match(r"  (?:-\w, )?(--[\w-]+)", line)):
             titles.setdefault(option[1], []).append(title)
     return titles
 

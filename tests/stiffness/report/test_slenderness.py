@@ -180,7 +180,7 @@ def test_an_l_from_a_file_is_two_beams(tmp_path):
     for a force along y at the tip: both legs bend, the first twists."""
     path = curve_file(tmp_path, L_BRACKET)
     result = CliRunner().invoke(
-        app, ["curve", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
+        app, ["beam", str(path), *MATERIAL, "--theory", "euler", "--json", "-"]
     )
     C = np.array(json.loads(result.stdout)["compliance"])
     pieces = read_curve(path, 0.3)
