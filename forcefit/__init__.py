@@ -64,33 +64,25 @@ _refuse_namesakes()
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "stiffness.beam.beam": ("beam_compliance",),
-    "stiffness.beam.sections": ("Section", "rectangular_section", "round_section"),
-    "stiffness.fem.fea": ("FemOptions", "mesh_link"),
+    "stiffness.beam.sections": ("rectangular_section", "round_section"),
+    "stiffness.fem.fea": ("mesh_link",),
     "stiffness.fem.material": ("Material",),
-    "stiffness.link": ("LinkStiffness", "turn_link"),
-    "stiffness.report.library": ("look_up", "read_library"),
-    "stiffness.report.library_build": ("build_library",),
-    "stiffness.surface.interface": ("Interface", "parse_interface"),
+    "stiffness.surface.interface": ("parse_interface",),
     "assembly.exact.exact": ("solve_exact",),
     "assembly.exchange.convert": ("convert",),
     "assembly.exchange.robot_files": ("load_robot", "write_robot"),
-    "assembly.kinematics.closing": ("preloaded", "rest_in"),
-    "assembly.kinematics.posture": ("Posture", "home_posture", "place_robot"),
-    "assembly.kinematics.singular_posture": ("is_singular",),
-    "assembly.linear.energy": ("Assembly", "CannotAssemble", "solve_assembly"),
+    "assembly.kinematics.posture": ("place_robot",),
+    "assembly.linear.energy": ("CannotAssemble", "solve_assembly"),
     "assembly.kinematics.mobility": ("mobility",),
-    "assembly.linear.pose_error": ("PoseError", "bound_pose_error"),
+    "assembly.linear.pose_error": ("bound_pose_error",),
     "assembly.linear.zone": ("zone_margin",),
     "assembly.model.error_distributions": ("read_sources",),
-    "assembly.model.random_errors": ("draw_errors",),
     "assembly.platform_stiffness.deflection": ("deflection_curve",),
-    "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
     "assembly.platform_stiffness.platform_stiffness": ("platform_stiffness",),
     "assembly.platform_stiffness.vibration": ("natural_modes",),
     "assembly.model.robot": (
         "BeamLink", "Clearance", "Frame", "MatrixLink", "Robot",
     ),
-    "assembly.statistics.allocation": ("allocate",),
     "assembly.statistics.experiment": ("Experiment",),
     "assembly.statistics.monte_carlo": ("run_draws",),
     "assembly.statistics.summary": ("summarise",),
@@ -114,12 +106,31 @@ _OWNERS = {
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
+    "home_posture": ("place_robot", "assembly.kinematics.posture", "home_posture"),
     "SweepOptions": ("sweep", "assembly.sweeps.robot_sweep", "options_by_old_names"),
     "ask_sweep": ("sweep", "assembly.sweeps.request", "ask_sweep"),
     "run_sweep": ("sweep", "assembly.sweeps.sweep", "run_sweep"),
     "sweep_in_memory": ("sweep", "assembly.sweeps.sweep", "sweep_in_memory"),
 }  # fmt: skip
+# public names of the last release that are imported from their module now
+_MOVED = {
+    "stiffness.beam.sections": ("Section",),
+    "stiffness.fem.fea": ("FemOptions",),
+    "stiffness.link": ("LinkStiffness", "turn_link"),
+    "stiffness.report.library": ("look_up", "read_library"),
+    "stiffness.report.library_build": ("build_library",),
+    "stiffness.surface.interface": ("Interface",),
+    "assembly.kinematics.closing": ("preloaded", "rest_in"),
+    "assembly.kinematics.posture": ("Posture",),
+    "assembly.kinematics.singular_posture": ("is_singular",),
+    "assembly.linear.energy": ("Assembly",),
+    "assembly.linear.pose_error": ("PoseError",),
+    "assembly.model.random_errors": ("draw_errors",),
+    "assembly.platform_stiffness.matrices": ("PlatformStiffness",),
+    "assembly.statistics.allocation": ("allocate",),
+}
 _OWNER_OF = {name: owner for owner, names in _OWNERS.items() for name in names}
+_MOVED_TO = {name: owner for owner, names in _MOVED.items() for name in names}
 __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
@@ -127,7 +138,7 @@ def __getattr__(name: str) -> object:
     """Import a public name when it is first needed; an old one with a warning."""
     if name == "__version__":
         return _version()
-    if name not in _OWNER_OF and name not in _RENAMED:
+    if name not in _OWNER_OF and name not in _RENAMED and name not in _MOVED_TO:
         raise AttributeError(f"module 'forcefit' has no attribute {name!r}")
     from importlib import import_module
 
@@ -135,6 +146,10 @@ def __getattr__(name: str) -> object:
         return getattr(import_module(_OWNER_OF[name]), name)
     from warnings import warn
 
+    if name in _MOVED_TO:
+        owner = _MOVED_TO[name]
+        warn(f"forcefit.{name} is now {owner}.{name}", FutureWarning, stacklevel=2)
+        return getattr(import_module(owner), name)
     new, *place = _RENAMED[name]
     warn(f"forcefit.{name} is now forcefit.{new}", FutureWarning, stacklevel=2)
     owner, attribute = place or (_OWNER_OF[new], new)

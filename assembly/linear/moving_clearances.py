@@ -128,9 +128,10 @@ class _Places(NamedTuple):
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
     """Places of one assumption, once for each robot."""
-    free = assumption == "free"
-    moving, all_of = structure_of(robot, False, free)[1], structure_of(robot)[1]
-    loaded = structure_of(robot, True, free)[1] if free else all_of
+    own_axes_free = assumption == "free"
+    moving = structure_of(robot, False, own_axes_free)[1]
+    all_of = structure_of(robot)[1]
+    loaded = structure_of(robot, True, True)[1] if own_axes_free else all_of
     own = _columns(moving.cone_frame, moving.cone_axis)
     in_loaded = _indices(own, _columns(loaded.cone_frame, loaded.cone_axis))
     cone_of = np.searchsorted(loaded.starts, in_loaded, side="right") - 1

@@ -97,7 +97,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
         },
         "proven_scale": allocation.proven_scale,
         "verification": allocation.verification,
-        "clearance": plan.clearance_model if plan.limits_pose else None,
+        "clearance": plan.clearance if plan.limits_pose else None,
         "contact_length": _contact_length(plan),
         **_distribution(plan),
         "draws": plan.draws,
@@ -155,7 +155,7 @@ def _distribution(plan: Plan) -> dict[str, Any]:
 
 def _contact_length(plan: Plan) -> float | None:
     """[m] contact length of the contact model, None for the others."""
-    if not plan.limits_pose or plan.clearance_model != "contact":
+    if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
 

@@ -42,7 +42,7 @@ CLEARANCE_STREAM = 1  # of random numbers; 0 is the errors'
 def position_clearances(
     prepared: LinearResponse,
     draws: Assembly,
-    clearance_model: str,
+    clearance: str,
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
@@ -51,7 +51,7 @@ def position_clearances(
     Args:
         prepared: the posture.
         draws: k of them, of its ``solve``.
-        clearance_model: one of :data:`CLEARANCE_MODELS` but the worst.
+        clearance: one of :data:`CLEARANCE_MODELS` but the worst.
         generators: of random numbers, one for each draw; none for "least".
         contact_length: [m] of the contact model, see :func:`contact_length_of`.
 
@@ -61,16 +61,16 @@ def position_clearances(
         :func:`assembly.statistics.uniform_clearance.sample_uniform_position`.
 
     Raises:
-        ValueError: ``clearance_model`` is something else.
+        ValueError: ``clearance`` is something else.
     """
-    if clearance_model not in CLEARANCE_MODELS or clearance_model == "worst":
+    if clearance not in CLEARANCE_MODELS or clearance == "worst":
         valid = tuple(name for name in CLEARANCE_MODELS if name != "worst")
-        raise ValueError(f"clearance is {clearance_model!r}, expected one of {valid}")
+        raise ValueError(f"clearance is {clearance!r}, expected one of {valid}")
     mixed = np.ones(len(draws.energy), dtype=bool)
-    if clearance_model == "least":
+    if clearance == "least":
         return draws.platform_screw, mixed
     wrenches = None
-    if clearance_model == "contact":
+    if clearance == "contact":
         length = contact_length or contact_length_of(prepared.posture.robot)
         wrenches = _random_wrenches(generators, length)
     screws = draws.platform_screw.copy()
@@ -114,10 +114,10 @@ def contact_length_of(robot: Robot) -> float:
     return size_of(robot)
 
 
-def clearance_means(clearance_model: str, contact_length: float | None = None) -> str:
+def clearance_means(clearance: str, contact_length: float | None = None) -> str:
     """A clearance model in words, with the length that the contact model needs."""
-    words = CLEARANCE_MODELS[clearance_model]
-    if clearance_model != "contact" or contact_length is None:
+    words = CLEARANCE_MODELS[clearance]
+    if clearance != "contact" or contact_length is None:
         return words
     return f"{words} (moments / {contact_length:.4g} m, contact length, as forces)"
 

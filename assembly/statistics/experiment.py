@@ -25,11 +25,13 @@ from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.stiffness_spread import draw_stiffnesses
 from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
 from forcefit.inputs.display import html_table, short_repr
+from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 
 _PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
 
 
+@renamed_fields(clearance_model="clearance")
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """Distributions of the errors at a posture, and the quantities of each draw.
@@ -38,7 +40,7 @@ class Experiment:
         posture: of the robot; drawn errors replace its own.
         sources: of the errors.
         seed: of all draws.
-        clearance_model: one of
+        clearance: one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
         stress: whether the stress of the links is computed.
@@ -56,7 +58,7 @@ class Experiment:
     posture: Posture
     sources: ErrorSources
     seed: int = 1
-    clearance_model: str = "worst"
+    clearance: str = "worst"
     margins: bool = True
     stress: bool = True
     load: tuple[float, ...] | None = None
@@ -68,18 +70,24 @@ class Experiment:
     __repr__, _repr_html_ = short_repr, html_table
 
     def __post_init__(self) -> None:
-        if self.clearance_model not in CLEARANCE_MODELS:
+        if self.clearance not in CLEARANCE_MODELS:
             raise ValueError(
-                f"clearance is {self.clearance_model!r}, expected one of "
+                f"clearance is {self.clearance!r}, expected one of "
                 f"{tuple(CLEARANCE_MODELS)}"
             )
         if self.contact_length is not None and not 0 < self.contact_length < np.inf:
             raise ValueError(f"contact length is {self.contact_length}, expected > 0 m")
 
     @property
+    def clearance_model(self) -> str:
+        """The old name of ``clearance``, for one release."""
+        warn_renamed("Experiment.clearance_model", "Experiment.clearance")
+        return self.clearance
+
+    @property
     def used_contact_length(self) -> float | None:
         """[m] contact length of the contact model, None for the others."""
-        if self.clearance_model != "contact":
+        if self.clearance != "contact":
             return None
         return self.contact_length or contact_length_of(self.posture.robot)
 
@@ -123,13 +131,13 @@ class Experiment:
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
         }  # fmt: skip
-        if self.clearance_model == "worst":
+        if self.clearance == "worst":
             shapes |= {f"{name}_lower": () for name in POSE_ERRORS}
         shapes |= dict.fromkeys(self.zones, ())
         if self.stiffness:
             shapes |= {"stiffness": (6,), "free_motion": (6, 6)}
         fields = [(name, "<f8", shape) for name, shape in shapes.items()]
-        flags = ["clearance_mixed"] if self.clearance_model == "uniform" else []
+        flags = ["clearance_mixed"] if self.clearance == "uniform" else []
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
@@ -171,22 +179,20 @@ class Experiment:
         rows["duality_gap"] = solved.duality_gap()
         rows["status"] = ~np.isfinite(solved.energy)
         screws = solved.platform_screw
-        if self.clearance_model == "worst":
+        if self.clearance == "worst":
             bounds, _ = bound_worst_errors(solved, self.precision)
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
             # the positions of "least" are not random, and generators are slow to make
-            numbers = (
-                np.asarray(draws).tolist() if self.clearance_model != "least" else []
-            )
+            numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
-                self.energies, solved, self.clearance_model, rngs, self.contact_length
+                self.energies, solved, self.clearance, rngs, self.contact_length
             )
             for i, name in enumerate(POSE_ERRORS):
                 rows[name] = np.linalg.norm(screws[:, 3 * i : 3 * i + 3], axis=1)
-            if self.clearance_model == "uniform":
+            if self.clearance == "uniform":
                 rows["clearance_mixed"] = mixed
         rows["platform_screw"] = screws
         at_tips = solved.frame_loads.at_tips

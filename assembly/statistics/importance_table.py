@@ -98,7 +98,7 @@ def importance_rows(
         (count,) of the experiment's record type.
     """
     asked = replace(
-        experiment, clearance_model=importance_clearance_model(experiment), stiffness=""
+        experiment, clearance=importance_clearance_model(experiment), stiffness=""
     )
     evaluated = asked.evaluate(design.rows(first, count), range(count))
     rows = np.zeros(count, dtype=experiment.record_type)
@@ -109,7 +109,7 @@ def importance_rows(
 
 def importance_clearance_model(experiment: Experiment) -> str:
     """Clearance model of the importance of an experiment's errors."""
-    return "worst" if experiment.clearance_model == "worst" else "least"
+    return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(

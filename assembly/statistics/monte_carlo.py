@@ -176,7 +176,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
         "robot_sha256": robot_hash(posture.robot),
         "sources_and_posture_sha256": digest.hexdigest(),
         "seed": experiment.seed,
-        "clearance": experiment.clearance_model,
+        "clearance": experiment.clearance,
         **({} if contact is None else {"contact_length": contact}),
         "precision": " ".join(map(repr, experiment.precision)),
         "margins": int(experiment.margins),
@@ -206,10 +206,10 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
             "free_motion": ("draw", "motion", "screw")}  # fmt: skip
     meanings = MEANINGS | {
         k: f"{MEANINGS[k]}; "
-        f"{clearance_means(experiment.clearance_model, experiment.used_contact_length)}"
+        f"{clearance_means(experiment.clearance, experiment.used_contact_length)}"
         for k in POSE_ERRORS
     }
-    if experiment.clearance_model == "worst":
+    if experiment.clearance == "worst":
         meanings |= {k: f"upper bound of the {meanings[k]}" for k in POSE_ERRORS}
         meanings["platform_screw"] += f"; {clearance_means('least')}"
     variables = {

@@ -41,7 +41,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         the part [rad or m] of each kind of clearance, the largest first.  Empty where
         perfect parts have no solution.
     """
-    random = experiment.clearance_model in {"uniform", "contact"}
+    random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
     rows = experiment.evaluate(np.zeros((count, len(experiment.sources))), range(count))
     reached: dict[str, Any] = {}
@@ -53,7 +53,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         if not np.isnan(value):  # infinite where the platform moves freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
-    if experiment.clearance_model == "worst" and prepared.loads is None:
+    if experiment.clearance == "worst" and prepared.loads is None:
         for key, parts in _clearance_parts(prepared).items():
             whole = reached.get(key, {}).get("reached", np.nan)
             if np.isfinite(whole):

@@ -44,7 +44,7 @@ class Plan:
             limit at every posture.
         draws: training draws at every posture.
         seed: of all draws.
-        clearance_model: for limits of pose errors, one of
+        clearance: for limits of pose errors, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         contact_length: [m] of the contact model, see
             :class:`assembly.statistics.experiment.Experiment`.
@@ -61,7 +61,7 @@ class Plan:
     asked_yield: float = 1.0
     draws: int = 1000
     seed: int = 1
-    clearance_model: str = "worst"
+    clearance: str = "worst"
     contact_length: float | None = None
 
     @property
@@ -116,7 +116,7 @@ class Requirement:
         experiments = [
             Experiment(
                 p, plan.sources, margins=False, stress="stress" in plan.limits,
-                clearance_model=plan.clearance_model if plan.limits_pose else "least",
+                clearance=plan.clearance if plan.limits_pose else "least",
                 contact_length=plan.contact_length, precision=(rotation, translation),
             )
             for p in self.postures
@@ -226,7 +226,7 @@ class Requirement:
                 self.plan.sources,
                 values,
                 key,
-                self.plan.clearance_model,
+                self.plan.clearance,
                 self.plan.contact_length,
             ),
             values,
@@ -242,7 +242,7 @@ class Requirement:
         def search() -> tuple:
             corner = worst_corner(
                 self.prepared[key][i], self.plan.sources, spread, corners, key,
-                self.plan.clearance_model, self.plan.contact_length,
+                self.plan.clearance, self.plan.contact_length,
             )  # fmt: skip
             return corner.value, corner.signs, corner.slopes
 
@@ -259,7 +259,7 @@ class Requirement:
         Raises:
             BadInput: one of them exceeds its limit.
         """
-        if self.plan.clearance_model != "worst" or not self.plan.limits_pose:
+        if self.plan.clearance != "worst" or not self.plan.limits_pose:
             return {}
         lower, _ = self.utilisations(np.zeros((1, len(self.plan.sources))))
         reached = {}

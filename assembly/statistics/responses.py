@@ -23,7 +23,7 @@ _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 def respond(
     prepared: PostureMargins | LinearResponse, sources: ErrorSources, values: NDArray,
-    key: str = "energy", clearance_model: str = "worst",
+    key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
     """A quantity for given errors, and its slopes with each of them.
@@ -34,7 +34,7 @@ def respond(
         values: (k, m) [rad or m].
         key: which quantity, of a posture prepared for energies: energy [J], force [N],
             moment [N m], stress [Pa], rotation [rad] or translation [m].
-        clearance_model: for a pose error, one of
+        clearance: for a pose error, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
             worst, value and slopes are those of the largest error found.  With uniform
             and contact positions the slopes are those of the solution of (22).
@@ -61,7 +61,7 @@ def respond(
         some = draws[solved]
         if key in POSE_ERRORS:
             size[solved], by_screw, by_clearance = _pose_error(
-                prepared, some, key, (clearance_model, contact_length), solved
+                prepared, some, key, (clearance, contact_length), solved
             )
             by_wrench = np.zeros_like(errors[solved])
         else:
@@ -78,8 +78,8 @@ def _pose_error(
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
     """Size of a pose error, and its slopes with platform screw and clearances."""
-    part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
-    if clearance_model == "worst":
+    part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
+    if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
         bounds, screws = bound_worst_errors(draws, precision)
         which = POSE_ERRORS.index(key)
@@ -89,7 +89,7 @@ def _pose_error(
         return bounds[:, which, 0], by_screw, -by_clearance
     generators = [draw_generator(1, i, CLEARANCE_STREAM) for i in numbers.tolist()]
     screws, _ = position_clearances(
-        prepared, draws, clearance_model, generators, contact_length
+        prepared, draws, clearance, generators, contact_length
     )
     slopes = np.zeros_like(screws)
     size, slopes[:, part : part + 3] = _size(screws[:, part : part + 3])

@@ -77,7 +77,7 @@ def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str
         "plan_and_postures_sha256": digest.hexdigest(),
         "limits": str(dict(plan.limits)),
         "cost": plan.cost,
-        "clearance": plan.clearance_model,
+        "clearance": plan.clearance,
         "contact_length": plan.contact_length or 0.0,
         "yield": plan.asked_yield,
         "draws": plan.draws,

@@ -44,7 +44,7 @@ class Corner:
 def worst_corner(
     prepared: PostureMargins | LinearResponse, sources: ErrorSources,
     tolerances: NDArray, corners: NDArray, key: str = "energy",
-    clearance_model: str = "worst",
+    clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
     """Local search from corner to corner; the worst of all searches.
@@ -55,7 +55,7 @@ def worst_corner(
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
         key: the quantity, see :func:`assembly.statistics.responses.respond`.
-        clearance_model: see there.
+        clearance: see there.
         contact_length: [m] see there.
 
     Returns:
@@ -71,7 +71,7 @@ def worst_corner(
     best = Corner(-np.inf, signs[0], np.zeros(len(sources)))
     for _ in range(_ITERATIONS):
         values, slopes = respond(
-            prepared, sources, signs * tolerances, key, clearance_model, contact_length
+            prepared, sources, signs * tolerances, key, clearance, contact_length
         )
         i = int(np.argmax(np.where(np.isnan(values), -np.inf, values)))
         if values[i] > best.value:

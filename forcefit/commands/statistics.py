@@ -292,7 +292,7 @@ def tolerances(
         if plan is None
         else replace(
             read_plan(plan, machine),
-            clearance_model=clearance,
+            clearance=clearance,
             contact_length=contact_length,
         )
     )

@@ -1,4 +1,4 @@
-"""Old names of arguments and values: each works for one release, with a warning."""
+"""Old names of arguments, fields and values: they work for one release and warn."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -7,6 +7,7 @@ from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+C = TypeVar("C", bound=type)
 
 
 def warn_renamed(old: str, new: str, frames: int = 3) -> None:
@@ -37,7 +38,8 @@ def renamed_keywords(
         @wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             for old in new_names.keys() & kwargs.keys():
-                given, entry, name = kwargs.pop(old), new_names[old], function.__name__
+                given, entry = kwargs.pop(old), new_names[old]
+                name = function.__qualname__.removesuffix(".__init__")
                 new, values = (entry, {}) if isinstance(entry, str) else entry
                 kwargs[new] = values.get(given, given)
                 warn_renamed(
@@ -46,6 +48,24 @@ def renamed_keywords(
             return function(*args, **kwargs)
 
         return call
+
+    return decorate
+
+
+def renamed_fields(**new_names: str) -> Callable[[C], C]:
+    """Let a dataclass be made with fields by their old names too, with a warning.
+
+    Args:
+        new_names: the new field by the old one.
+
+    Returns:
+        A decorator.
+    """
+
+    def decorate(cls: C) -> C:
+        init = renamed_keywords(**new_names)(cls.__init__)  # type: ignore[misc]
+        cls.__init__ = init  # type: ignore[misc]
+        return cls
 
     return decorate
 
