@@ -37,6 +37,7 @@ from assembly.linear.rounding import ROUNDING, closure_rounding, differs_from_ze
 from assembly.linear.solution import Solution
 from assembly.model.clearance import clearance_bounds, clearance_excess
 from assembly.model.point_results import N, plain
+from assembly.model.statuses import OK
 from assembly.solvers.cones import cone_sizes, cone_sums
 from assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE
 from forcefit.inputs.display import (
@@ -329,7 +330,7 @@ class Assembly(Solution[N]):
         """
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
-        return (self.duality_gap() <= allowed) & (np.asarray(self.status) == "ok")
+        return (self.duality_gap() <= allowed) & (np.asarray(self.status) == OK)
 
 
 def _flat(screws: NDArray) -> NDArray:

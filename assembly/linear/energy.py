@@ -35,7 +35,7 @@ from assembly.linear.rounding import (
 from assembly.linear.solution import with_known
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import Robot
-from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, SOLVER_FAILED
+from assembly.model.statuses import CANNOT_ASSEMBLE, NO_EQUILIBRIUM, OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method, check_method
 
@@ -352,7 +352,7 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 def _unsaid(count: int) -> _Rows:
     """What the kernel does not fill of k points: method, status, proof."""
-    texts = {"method": "compiled", "status": "ok", "reason": ""}
+    texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 

@@ -13,6 +13,7 @@ from assembly.linear.lanes import COMPILED, REFERENCE, bounds_side_by_side
 from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.linear.robot_structure import Structure, structure_of
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK
 from assembly.solvers.method import Method, check_method
 
 
@@ -66,7 +67,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         "supports": np.zeros(count, np.int64),
     }
     outcome = np.full(count, COMPILED, np.int64)
-    left = assembly.status != "ok"
+    left = assembly.status != OK
     if assembly.frame_loads:
         left |= assembly.loaded
     left[list(assembly.apart)] = True

@@ -41,7 +41,7 @@ from assembly.linear.reference.pose_error import reachable_screws
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.linear.robot_structure import structure_of
 from assembly.model.point_results import Numbers, PointResults
-from assembly.model.statuses import SOLVER_FAILED
+from assembly.model.statuses import OK, SOLVER_FAILED
 from assembly.solvers.conic import SolverFailed
 from assembly.solvers.method import Method
 from forcefit.inputs.display import Figures, bracket, short_repr
@@ -77,7 +77,7 @@ class PoseError(PointResults):
     supports: Numbers
     method: Any
     one_by_one: Any
-    status: Any = "ok"
+    status: Any = OK
     reason: Any = ""
     proof: Callable[[], str] = str
 
@@ -117,7 +117,7 @@ class PoseError(PointResults):
         figures = {"assumption": self.assumption}
         rotation, translation = self.rotation_error, self.translation_error
         if self.of_many:
-            known = self.status == "ok"
+            known = self.status == OK
             figures["points"] = f"{len(self)}, {np.count_nonzero(known)} bounded"
             rotation, translation = (
                 one[known].max(axis=0, initial=0.0) for one in (rotation, translation)
@@ -186,7 +186,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
     """Compiled bounds; one by one what that leaves of what has a solution."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
-    left &= status == "ok"
+    left &= status == OK
     for i in np.flatnonzero(left).tolist():
         try:
             one = _bounds_of_one(assembly[i], asked)

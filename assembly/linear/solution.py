@@ -14,6 +14,7 @@ from assembly.kinematics.posture import Posture, together
 from assembly.linear.closure import Linearisation, VirtualJoints
 from assembly.linear.load import FrameLoads
 from assembly.model.point_results import N, PointResults, plain
+from assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
 # what may be known besides the fields: properties, and parts of its certificate
@@ -61,7 +62,7 @@ class Solution(PointResults, Generic[N]):
     energy_without_clearance: N
     method: Any
     errors: Any = None
-    status: Any = "ok"
+    status: Any = OK
     reason: Any = ""
     apart: dict[int, Any] = field(default_factory=dict)
     held: Any = None

@@ -44,6 +44,12 @@ UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
+# .. and on a whole comparison: NO_SIGNAL, or
+PASSED = "passed"
+FAILED = "failed"
+NOT_DECIDED = "not decided"
+NOT_RUN = "not run"
+NO_ANSWER = "no answer"
 
 # verdicts of a diagnosis
 NONE_NEEDED = "none_needed"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.model.statuses import OK
 from assembly.sweeps.panels import Panel, named_panels, quantity, usual_panels
 from forcefit.inputs.errors import plot_label
 from forcefit.inputs.table import BadInput, nearest, quoted
@@ -125,7 +126,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
     status = data["status"].transpose(..., "draw")
-    bad = (status != "ok").values
+    bad = (status != OK).values
     shown = np.take_along_axis(
         status.values, bad.argmax(axis=-1)[..., None], axis=-1
     )[..., 0]  # fmt: skip

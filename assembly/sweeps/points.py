@@ -24,6 +24,7 @@ from assembly.model.statuses import (
     BEYOND_SINGULARITY,
     INVALID_ROBOT,
     OF_POINTS,
+    OK,
     OUT_OF_REACH,
     SINGULAR,
     SOLVER_FAILED,
@@ -278,7 +279,7 @@ def _solved_rows(
         status, reason = energies.status[i], energies.reason[i]
         if i in failed:
             status, reason = SOLVER_FAILED, failed[i]
-        if status == "ok":
+        if status == OK:
             ok.append(i)
         else:
             _fail(solved, range(row, row + 1), status, reason)
@@ -346,7 +347,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
-        if bounds.status[i] != "ok":
+        if bounds.status[i] != OK:
             _fail(solved, range(row, row + 1), bounds.status[i], bounds.reason[i])
             continue
         out["rotation_error"][row] = bounds.rotation_error[i]
@@ -366,7 +367,7 @@ def _bound_clearance_only(
         solved.records["translation_error_clearance"][rows[run]] = (
             bounds.translation_error[i]
         )
-        if bounds.status[i] != "ok":
+        if bounds.status[i] != OK:
             for row in rows[run].tolist():
                 reason = f"clearances alone: {bounds.reason[i]}"
                 solved.texts["reason"].setdefault(row, reason)

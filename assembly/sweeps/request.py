@@ -16,6 +16,7 @@ from assembly.kinematics.posture import home_posture
 from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.link_stress import stressed_names
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK, OUT_OF_REACH
 from assembly.platform_stiffness.vibration import check_masses
 from assembly.sweeps.parameters import Design, load_design
 from assembly.sweeps.plan import Sweep
@@ -304,7 +305,7 @@ def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:
-        if name not in {"ok", "out of reach"} and "reason" in data.data_vars:
+        if name not in {OK, OUT_OF_REACH} and "reason" in data.data_vars:
             first = int(np.flatnonzero(status == name)[0])
             reasons = data.data_vars["reason"]
             reason = str(reasons.values.ravel()[first])

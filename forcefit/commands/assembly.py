@@ -78,6 +78,7 @@ def error(
     """Certified bounds of the largest pose error, problem (27)."""
     from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
+    from assembly.model.statuses import OK
     from assembly.report.pose_errors import pose_error_of, pose_error_text
 
     for name in assumption or ():
@@ -107,7 +108,7 @@ def error(
     write_json(results, json)
     if json != "-":
         print(pose_error_text(results))
-    if results["status"] != "ok":
+    if results["status"] != OK:
         raise typer.Exit(1)
 
 

@@ -63,6 +63,7 @@ def deflection(
 
     Free motion in clearances, contacts, elastic deformation, jumps.
     """
+    from assembly.model.statuses import OK
     from assembly.report.deflection import (
         deflection_of,
         deflection_text,
@@ -90,7 +91,7 @@ def deflection(
         print(deflection_text(results))
     if figure is not None and "deflection" in results:
         save_figure(plot_deflection(results), figure)
-    if results["status"] != "ok":
+    if results["status"] != OK:
         raise typer.Exit(1)
 
 

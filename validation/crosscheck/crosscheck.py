@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import CannotAssemble, failure_status, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
-from assembly.model.statuses import FAILS, OK, SIMULATION_FAILED, UNDECIDED
+from assembly.model.statuses import FAILS, OK, PASSED, SIMULATION_FAILED, UNDECIDED
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.display import html_table, short_repr
 from validation.crosscheck.clearance_metric import ClearanceMetric
@@ -128,7 +128,7 @@ class Crosscheck:
     @property
     def passed(self) -> bool:
         """Whether every check holds."""
-        return verdict(self) == "passed"
+        return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
         """Everything ``validation crosscheck`` reports, keys of the public format.
@@ -171,7 +171,7 @@ class Crosscheck:
                 for one in self.resolutions
             ],
             "verdict": outcome,
-            "passed": outcome == "passed",
+            "passed": outcome == PASSED,
         }
 
     def text(self) -> str:

@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 from assembly.kinematics.posture import POSE, Posture, place_many
 from assembly.kinematics.verdict import limits_passed
 from assembly.model.robot import Robot
-from assembly.model.statuses import BEYOND_LIMITS, NO_SIGNAL, OUT_OF_REACH
+from assembly.model.statuses import (
+    BEYOND_LIMITS,
+    NO_SIGNAL,
+    NOT_DECIDED,
+    OK,
+    OUT_OF_REACH,
+    PASSED,
+)
 from validation.crosscheck.crosscheck import Crosscheck, attempt
 
 _VERDICTS = {
-    "passed": "passed",
-    "not decided": "NOT DECIDED",
+    PASSED: "passed",
+    NOT_DECIDED: "NOT DECIDED",
     NO_SIGNAL: "NOT CHECKED, nothing stands out of the noise",
 }
 
@@ -66,7 +73,7 @@ def _row(
     if passed := limits_passed(robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed, "passed": None}
     result, failure = attempt(robot.name, lambda: check(posture))
-    return failure if result is None else {"status": "ok"} | result.table()
+    return failure if result is None else {"status": OK} | result.table()
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -87,7 +94,7 @@ def poses_text(rows: list[dict[str, Any]]) -> str:
         verdict = _VERDICTS.get(row.get("verdict", ""), "FAILED")
         if row["passed"] is None:
             verdict = "not checked"
-        status = "" if row["status"] == "ok" else f" ({row['status']})"
+        status = "" if row["status"] == OK else f" ({row['status']})"
         lines.append(f"{where}: {measured}{verdict}{status}")
     reached = poses_table(rows)["reached"]
     lines.append(

@@ -20,6 +20,7 @@ from assembly.linear.assembled import Assembly
 from assembly.linear.energy import CannotAssemble, solve_assembly
 from assembly.linear.reference.reduction import FreeMotion
 from assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, MeshLink
+from assembly.model.statuses import NO_EQUILIBRIUM
 from assembly.solvers.conic import SolverFailed
 from stiffness.screws import SCREW
 from validation.crosscheck.clearance_metric import ClearanceMetric
@@ -86,7 +87,7 @@ def resolutions(
         try:
             smallest, by = _noticed(changed, pairs, metric, load, gravity)
         except (CannotAssemble, FreeMotion, SolverFailed):
-            smallest, by = _CHANGE, "no equilibrium"
+            smallest, by = _CHANGE, NO_EQUILIBRIUM
         found.append(Resolution(name, kind, value, smallest, by))
     return found
 

@@ -15,7 +15,15 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
+from assembly.model.statuses import (
+    FAILED,
+    FAILS,
+    NO_SIGNAL,
+    NOT_DECIDED,
+    OK,
+    PASSED,
+    UNDECIDED,
+)
 from forcefit.inputs.table import BadInput
 from validation.crosscheck.pair import Pair
 
@@ -53,7 +61,7 @@ class Check:
             return NO_SIGNAL
         # a value that is not a number is not known
         known = self.value <= self.bound and self.uncertainty <= self.bound
-        return "ok" if known else UNDECIDED
+        return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
@@ -83,10 +91,10 @@ def verdict(comparison: Judged) -> str:
     """
     outcomes = {check.verdict for check in comparison.checks.values()}
     if FAILS in outcomes and len(comparison.pairs) >= _FEWEST:
-        return "failed"
+        return FAILED
     if outcomes & {FAILS, UNDECIDED}:
-        return "not decided"
-    return "passed" if "ok" in outcomes else NO_SIGNAL
+        return NOT_DECIDED
+    return PASSED if OK in outcomes else NO_SIGNAL
 
 
 def compare_scales(
@@ -112,7 +120,7 @@ def compare_scales(
     pairs = [solve(scale) for scale in factors]
     while True:
         comparison = judge(tuple(pairs), len(factors))
-        if verdict(comparison) != "not decided" or len(pairs) >= _MOST:
+        if verdict(comparison) != NOT_DECIDED or len(pairs) >= _MOST:
             return comparison
         pairs.append(solve(pairs[-1].scale / 2))
 
@@ -140,16 +148,16 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 def verdict_text(comparison: Judged) -> str:
     """The verdict in a few words, with the number of checks without a signal."""
     texts = {
-        "passed": "passed",
-        "failed": "FAILED",
-        "not decided": "NOT DECIDED: the errors are too large for these scales; ask "
+        PASSED: "passed",
+        FAILED: "FAILED",
+        NOT_DECIDED: "NOT DECIDED: the errors are too large for these scales; ask "
         "for smaller ones",
         NO_SIGNAL: "NOT CHECKED: nothing stands out of the noise; a robot without "
         "errors and load compares zero with zero",
     }
     outcome = verdict(comparison)
     silent = sum(check.verdict == NO_SIGNAL for check in comparison.checks.values())
-    if outcome == "passed" and silent:
+    if outcome == PASSED and silent:
         count = len(comparison.checks)
         return f"passed; {silent} of {count} checks had nothing to compare"
     return texts[outcome]

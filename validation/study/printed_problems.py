@@ -5,7 +5,15 @@ from typing import Any
 
 from assembly.kinematics.posture import Posture
 from assembly.linear.energy import Assembly
-from assembly.model.statuses import FAILS, NO_SIGNAL, UNDECIDED
+from assembly.model.statuses import (
+    FAILED,
+    FAILS,
+    NO_ANSWER,
+    NO_SIGNAL,
+    OK,
+    PASSED,
+    UNDECIDED,
+)
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # relative, of energies and margins
@@ -38,14 +46,14 @@ def compare_printed(
         energy, screw = energy_as_printed(posture)
         margin, free = (margin_as_printed(posture, free) for free in (False, True))
     except RuntimeError as error:
-        return {"verdict": "no answer", "passed": False, "reason": str(error)}
+        return {"verdict": NO_ANSWER, "passed": False, "reason": str(error)}
     checks = {
         "energy": _energy_check(assembly, energy),
         "margin": _margin_check(zone["margin"], margin),
         "margin_free": _margin_check(zone["margin_free"], free),
     }
     outcomes = {check.verdict for check in checks.values()}
-    bad, some = bool(outcomes & {FAILS, UNDECIDED}), "ok" in outcomes
+    bad, some = bool(outcomes & {FAILS, UNDECIDED}), OK in outcomes
     return {
         "energy": energy,
         "platform_screw": screw,
@@ -57,7 +65,7 @@ def compare_printed(
         },
         "tolerance": TOLERANCE,
         "checks": {name: check.verdict for name, check in checks.items()},
-        "verdict": "failed" if bad else "passed" if some else NO_SIGNAL,
+        "verdict": FAILED if bad else PASSED if some else NO_SIGNAL,
         "passed": some and not bad,
     }
 

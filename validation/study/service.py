@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.kinematics.posture import Posture
 from assembly.model.robot import Robot
+from assembly.model.statuses import OK
 from assembly.platform_stiffness.vibration import check_masses
 from assembly.report.results import solution_of
 from assembly.report.vibration import vibration_of
@@ -101,7 +102,7 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
         at least energy; ``frequencies``, keys of ``assembly frequencies``.
     """
     found: dict[str, Any] = {
-        "status": "ok", "load": service.load, "gravity": service.gravity
+        "status": OK, "load": service.load, "gravity": service.gravity
     }  # fmt: skip
     if service.loaded:
         solution = solution_of(posture, service.load, service.gravity)

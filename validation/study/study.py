@@ -18,6 +18,14 @@ from assembly.linear.reference.pose_error import ASSUMPTIONS
 from assembly.model.links import link_compliance
 from assembly.model.mesh_link import mesh_link_stiffness
 from assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
+from assembly.model.statuses import (
+    NO_ANSWER,
+    NO_EQUILIBRIUM,
+    NO_SIGNAL,
+    NOT_RUN,
+    OK,
+    PASSED,
+)
 from assembly.report.first_order import posture_status
 from assembly.report.platform_stiffness import stiffness_of
 from assembly.report.pose_errors import pose_error_of
@@ -96,13 +104,13 @@ class StudyResults:
         nothing to compare, ``"not run"`` where there is no assembly to check.
         """
         independent = ("reference", "crosscheck")
-        verdicts = {n: "not run" for n in independent if n in self.study.checks}
+        verdicts = {n: NOT_RUN for n in independent if n in self.study.checks}
         if self.reference is not None:
             verdicts["reference"] = self.reference["verdict"]
         if self.crosscheck is not None:
             verdicts["crosscheck"] = verdict(self.crosscheck)
         elif self.crosscheck_failure:
-            verdicts["crosscheck"] = "no answer"
+            verdicts["crosscheck"] = NO_ANSWER
         return verdicts
 
     @property
@@ -111,14 +119,14 @@ class StudyResults:
         silent = "its errors need neither springs nor clearances at this pose"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
-        why = {"not run": "there is no assembly to check", "no signal": silent}
+        why = {NOT_RUN: "there is no assembly to check", NO_SIGNAL: silent}
         reasons = {k: why[v] for k, v in self.verdicts.items() if v in why}
         if self.reference is not None and "reason" in self.reference:
             reasons["reference"] = self.reference["reason"]
         if self.crosscheck_failure:
             reasons["crosscheck"] = self.crosscheck_failure
-        if self.service is not None and self.service["status"] != "ok":
-            reasons["service"] = str(self.service.get("reason", "no equilibrium"))
+        if self.service is not None and self.service["status"] != OK:
+            reasons["service"] = str(self.service.get("reason", NO_EQUILIBRIUM))
         if self.maps is not None and not points_solved(self.maps):
             reasons["maps"] = "none of the grid's points has an answer"
         return reasons
@@ -131,10 +139,10 @@ class StudyResults:
         other one ran.
         """
         verdicts, missing = self.verdicts, self.unchecked
-        ran = [v for v in verdicts.values() if v != "no signal"]
+        ran = [v for v in verdicts.values() if v != NO_SIGNAL]
         return (
-            self.solution["status"] == "ok"
-            and all(v == "passed" for v in ran)
+            self.solution["status"] == OK
+            and all(v == PASSED for v in ran)
             and (bool(ran) or not verdicts)
             and not set(missing) & set(self.study.asked)
         )
@@ -164,7 +172,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     posture = place_robot(robot, pose=study.pose)
     progress("assembly", 0, 1)
     solution = solution_of(posture) | posture_status(posture)
-    solved = solution["status"] == "ok"
+    solved = solution["status"] == OK
     assembly = solve_assembly(posture) if solved else None
     error = pose_error_of(posture, ASSUMPTIONS)["error"] if solved else None
     progress("assembly", 1, 1)
@@ -212,7 +220,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 def points_solved(maps: Any) -> int:
     """Number of a grid's points that have a solution."""
-    return int((maps["status"] == "ok").sum())
+    return int((maps["status"] == OK).sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:

@@ -4,6 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from assembly.model.statuses import (
+    AMBIGUOUS,
+    EXPLAINED,
+    NONE_NEEDED,
+    OUTSIDE_LIBRARY,
+)
 from validation.synthetic.generator import Synthetic
 from validation.synthetic.machine import Hidden
 from validation.synthetic.outside import OUTSIDE
@@ -56,8 +62,8 @@ def truth_of(
     names = [effect.name for effect in campaign.effects]
     outside = [OUTSIDE[name] for name in names if name in OUTSIDE]
     if verdict is None:
-        verdict = "outside_library" if outside else "explained"
-        verdict = verdict if names else "none_needed"
+        verdict = OUTSIDE_LIBRARY if outside else EXPLAINED
+        verdict = verdict if names else NONE_NEEDED
     accepted = [[]] if outside else [names, *(accept or [])]
     residual = (campaign.readings - campaign.exact) / campaign.sigma
     added = campaign.added / campaign.sigma
@@ -66,7 +72,7 @@ def truth_of(
         "rows": len(campaign.plan.rows),
         "configurations": int(campaign.plan.configuration.max()) + 1,
         "verdict": verdict,
-        "accept_verdicts": sorted({verdict, *(["ambiguous"] if accept else [])}),
+        "accept_verdicts": sorted({verdict, *([AMBIGUOUS] if accept else [])}),
         "effects": [_effect(campaign, effect) for effect in campaign.effects],
         "outside": "; ".join(outside) or None,
         "note": note,
