@@ -168,7 +168,7 @@ COMMANDS = [
     (2, "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc"),
     (3, "assembly tolerances bar.toml --grid tx=0.65 --plan plan.toml --fresh 20 "
         "-o new.nc --json -"),
-    (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --compliant rigid"),
+    (2, "assembly tolerances bar.toml --grid tx=0.65:0.66:0.01 --quantities margin"),
     (2, "assembly plot swept.nc --figure new.svg"),
     (1, "assembly plot draws.nc --figure new.png --kind histogram"),
     (5, "stiffness beam --length 0.4 --young 2.1e11 --poisson 0.3 --radius 0.02 "

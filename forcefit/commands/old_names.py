@@ -49,7 +49,10 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
         "--reading": ("--assumption",),
     },
     "assembly statistics": {"--stiffness": ("--state",), "--play": ("--clearance",)},
-    "assembly tolerances": {"--play": ("--clearance",)},
+    "assembly tolerances": {
+        "--play": ("--clearance",),
+        "--compliant": ("--quantities",),
+    },
     "assembly deflection": _PICTURE | {"--exact": ("--state", "exact")},
     "assembly table": {"-o": ("--csv",), "--output": ("--csv",)},
     "assembly plot": _PICTURE | {"--quantity": ("--quantities",)},
@@ -63,6 +66,8 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness beam": {"--axis": ("--along",)},
 }
 
+# new values of an old option
+VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
 
@@ -81,7 +86,9 @@ def with_new_names(words: Sequence[str]) -> list[str]:
     end = words.index("--") if "--" in words else len(words)
     reported: list[str] = []
     new_words: list[str] = []
+    values: dict[str, str] = {}  # of the word that follows
     for word in words[:end]:
+        word, values = values.get(word, word), {}
         option, equals, value = _parts(word)
         if option not in renamed:
             new_words.append(word)
@@ -90,7 +97,9 @@ def with_new_names(words: Sequence[str]) -> list[str]:
         if option not in reported and option not in _staying(words):
             print(f"forcefit: {option} is now {' '.join(new)}", file=sys.stderr)
         reported.append(option)
-        new_words += [*new[:-1], new[-1] + equals + value]
+        of_option = VALUES.get(option, {})
+        values = {} if equals else of_option
+        new_words += [*new[:-1], new[-1] + equals + of_option.get(value, value)]
     return _with_new_command(new_words) + list(words[end:])
 
 

@@ -69,6 +69,15 @@ def test_an_old_option_becomes_one_that_the_command_has(command, old, new, capsy
     assert len(new) == 1 or options[new[0]]
 
 
+@pytest.mark.parametrize(("old", "new"), [("free", "margin_free"), ("rigid", "margin")])
+def test_an_old_value_becomes_the_margin_of_that_name(old, new):
+    words = ["assembly", "tolerances", "r.toml"]
+    assert with_new_names([*words, "--compliant", old, "free"])[3:] == [
+        "--quantities", new, "free"
+    ]  # fmt: skip
+    assert with_new_names([*words, f"--compliant={old}"])[3:] == [f"--quantities={new}"]
+
+
 def test_words_after_two_dashes_and_of_other_commands_stay(capsys):
     for words in (
         ["assembly", "sweep", "--", "--tangent"],
