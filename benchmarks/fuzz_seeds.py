@@ -185,7 +185,7 @@ COMMANDS = [
         "--radius 0.02 --figure new.pdf"),
     (2, "stiffness stress solid.obj --base z=0 --tip z=7 --young 7e10 --poisson 0.3 "
         "--wrench fx=10,mz=1 --away 0.01"),
-    (1, "stiffness slenderness --young 7e10 --poisson 0.3 --radius 0.02 --ratios 5,x"),
+    (1, "stiffness compare --young 7e10 --poisson 0.3 --radius 0.02 --ratios 5,x"),
     (6, "stiffness library build spec.toml --workers 1"),
     (5, "stiffness library read links"),
     (4, "stiffness library read links --at length=0.3 --json -"),

@@ -14,6 +14,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly table": ("assembly", "plot"),
     "stiffness curve": ("stiffness", "beam"),
     "stiffness solids": ("stiffness", "fea", "--part", "list"),
+    "stiffness slenderness": ("stiffness", "compare", "--ratios", "5,10,20,40"),
     "stiffness library list": ("stiffness", "library", "read"),
     "stiffness library look-up": ("stiffness", "library", "read"),
     "stiffness library export": ("stiffness", "library", "read", "--to", "csv"),

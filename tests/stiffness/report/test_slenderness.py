@@ -136,7 +136,9 @@ def test_without_poissons_ratio_tension_has_no_ends():
 def test_slenderness_refuses_before_it_works(options, message):
     with pytest.raises(BadInput) as caught:
         CliRunner().invoke(
-            app, ["slenderness", *MATERIAL, *options], catch_exceptions=False
+            app,
+            ["compare", "--ratios", "5,10", *MATERIAL, *options],
+            catch_exceptions=False,
         )
     assert message in str(caught.value)
 
