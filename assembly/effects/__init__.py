@@ -56,7 +56,7 @@ LIBRARY: dict[str, Effect] = {
 
 
 def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Conditions:
-    """Conditions with effects added.
+    """Return the conditions with effects added.
 
     Args:
         conditions: without them.
@@ -78,7 +78,7 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
 
 
 def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
-    """Conditions with everything that a robot's file says the machine has.
+    """Return the conditions with everything that a robot's file says the machine has.
 
     Args:
         conditions: of the robot without effects, R rows.

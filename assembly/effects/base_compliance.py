@@ -35,7 +35,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """The rows with a frame before all others that does not move them."""
+    """Return the rows with a frame before all others that does not move them."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -52,7 +52,7 @@ def _standing(conditions: Conditions, robot: Robot) -> Conditions:
 
 
 def with_foundation(robot: Robot, values: Values) -> Robot:
-    """A robot on an elastic foundation: one more frame between base and ground.
+    """Return a robot on an elastic foundation: one more frame between base and ground.
 
     Args:
         robot: any.
@@ -72,7 +72,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Stiffnesses from compliances; below 0 of what is declared too soft."""
+    """Return the stiffnesses from compliances; below 0 of what is declared too soft."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

@@ -20,7 +20,7 @@ _LEAST = 1e-9  # [kg] a mass that has a centre
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:
-    """Frames whose bodies are declared to weigh something, beams among them."""
+    """Return frames whose bodies are declared to weigh something, beams among them."""
     return tuple(
         f.name
         for f in robot.frames

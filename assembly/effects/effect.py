@@ -35,7 +35,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Unknowns that are the parameters themselves."""
+    """Return the unknowns that are the parameters themselves."""
     return dict(values)
 
 

@@ -94,7 +94,7 @@ class Form:
 
 
 def column_indices(name: str) -> list[int]:
-    """The whole numbers with which a column's name begins."""
+    """Return the whole numbers with which a column's name begins."""
     return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
@@ -147,7 +147,7 @@ def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
 
 
 def roughness(count: int) -> NDArray:
-    """Integral of the squared curvature of a natural spline over n even knots.
+    """Return integral of the squared curvature of a natural spline over n even knots.
 
     Args:
         count: n of knots.
@@ -179,35 +179,35 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are a direction and, of two variables, what its size depends on."""
+    """Return inputs are a direction and, of two variables, what its size depends on."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
 
 def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are an angle, and what the waves are multiplied by."""
+    """Return the inputs are an angle, and what the waves are multiplied by."""
     return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
 
 
 def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Inputs are a direction and an angle."""
+    """Return the inputs are a direction and an angle."""
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
 def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """The input is what slips after the variable, from -1 to 1."""
+    """Return the input is what slips after the variable, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """The input is a load; its first part goes as far as the knee, either way."""
+    """Return input is a load; its first part goes as far as the knee, either way."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """(R, p) columns, each as long as the inputs."""
+    """Return the (R, p) columns, each as long as the inputs."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))
@@ -218,7 +218,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """A form that lags behind its variable."""
+    """Return a form that lags behind its variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,

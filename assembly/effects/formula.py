@@ -34,7 +34,7 @@ Unit = Mapping[str, float]  # exponents of m, N, s, K ..; rad is none
 
 
 def parse_formula(text: str) -> ast.expr:
-    """The tree of a formula.
+    """Return the tree of a formula.
 
     Args:
         text: such as ``"a*sin(3*q) + b"``.
@@ -87,7 +87,7 @@ def _check(node: ast.AST, depth: int) -> None:
 
 
 def names_in(tree: ast.expr) -> list[str]:
-    """Names of variables and parameters, in order of use."""
+    """Return the names of variables and parameters, in order of use."""
     called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
     nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
     nodes.sort(key=lambda n: n.col_offset)
@@ -96,7 +96,7 @@ def names_in(tree: ast.expr) -> list[str]:
 
 
 def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
-    """The value of a formula.
+    """Return the value of a formula.
 
     Args:
         tree: of it.
@@ -129,7 +129,7 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
 def parameter_units(
     tree: ast.expr, variables: Mapping[str, Unit], result: Unit
 ) -> dict[str, Unit]:
-    """Units of a formula's parameters, so that those of the whole fit.
+    """Return the units of a formula's parameters, so that those of the whole fit.
 
     Args:
         tree: of the formula.
@@ -158,7 +158,7 @@ class _Units:
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """The unit of a part of a formula, what clashes within refused."""
+        """Return the unit of a part of a formula, what clashes within refused."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -191,7 +191,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """A unit with what is known of parameters put in."""
+        """Return a unit with what is known of parameters put in."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -214,7 +214,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Units of parameters; what nothing says is a number."""
+        """Return the units of parameters; what nothing says is a number."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -223,7 +223,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """The value of a part without names, None if it has any."""
+    """Return the value of a part without names, None if it has any."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
@@ -232,7 +232,7 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Exponents of a product of two units, the second to a power."""
+    """Return the exponents of a product of two units, the second to a power."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 

@@ -30,13 +30,13 @@ _parsed = lru_cache(maxsize=256)(parse_formula)
 
 
 def is_loaded(function: Function) -> bool:
-    """Whether it depends on what goes through the robot."""
+    """Return whether it depends on what goes through the robot."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
 
 def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
-    """Covariates that a robot's functions depend on, each with the title of one.
+    """Return covariates that a robot's functions depend on, each with the title of one.
 
     Args:
         robot: with its functions.
@@ -64,12 +64,12 @@ def _is_covariate(name: str) -> bool:
 
 
 def components_of(where: str) -> tuple[str, ...]:
-    """Components that a function may have at a place."""
+    """Return the components that a function may have at a place."""
     return LOADS if where == "load" else AXES
 
 
 def parameters_of(function: Function, component: str) -> dict[str, float]:
-    """A function's numbers for one of its components, the prefix taken off."""
+    """Return a function's numbers for one of its components, the prefix taken off."""
     own: dict[str, float] = {}
     for name, value in function.parameters.items():
         whose, _, rest = name.partition(".")
@@ -81,7 +81,7 @@ def parameters_of(function: Function, component: str) -> dict[str, float]:
 
 
 def columns_of(function: Function, component: str) -> list[str]:
-    """Names of the numbers in which a function is linear, prefix taken off."""
+    """Return names of the numbers in which a function is linear, prefix taken off."""
     if function.form == FORMULA:
         return []
     shapes = shape_names(FORMS[function.form], len(function.variables))
@@ -153,7 +153,7 @@ def _now(conditions: Conditions, name: str) -> NDArray:
 
 
 def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
-    """A function's value.
+    """Return a function's value.
 
     Args:
         function: any.
@@ -176,7 +176,7 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
 
 
 def variable_names(variables: Sequence[str]) -> dict[str, int]:
-    """Names by which a formula may call its variables.
+    """Return the names by which a formula may call its variables.
 
     Args:
         variables: public names.
@@ -198,7 +198,7 @@ def apply_functions(
     functions: Iterable[Function],
     recorded: Conditions | None = None,
 ) -> Conditions:
-    """Conditions with functions added, each in its session.
+    """Return the conditions with functions added, each in its session.
 
     Args:
         conditions: R rows.
@@ -221,7 +221,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """(R,) bool: the rows of a session; all where it is None."""
+    """Return the (R,) bool: the rows of a session; all where it is None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -271,7 +271,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """A place that gives under what goes through it."""
+    """Return a place that gives under what goes through it."""
     slots: dict[int, int] = {}  # of the inputs, by the number of its wrench
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
@@ -306,7 +306,7 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Conditions changed in the rows of one session alone.
+    """Return the conditions changed in the rows of one session alone.
 
     Args:
         conditions: R rows.

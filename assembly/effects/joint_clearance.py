@@ -13,7 +13,7 @@ _NONE_BELOW = 1e-9  # [m, rad] a clearance below it is none
 
 
 def moving_joints(robot: Robot) -> tuple[str, ...]:
-    """Joints that move and are declared tight."""
+    """Return the joints that move and are declared tight."""
     return tuple(
         f.name for f in robot.frames if f.joint != "fixed" and _is_tight(f.clearance)
     )
@@ -42,7 +42,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """The clearances; a joint fitted tight has none."""
+    """Return the clearances; a joint fitted tight has none."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

@@ -14,12 +14,12 @@ _LEAST = 1e-6  # [m] length of a body between two places
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
-    """Actuated joints."""
+    """Return the actuated joints."""
     return tuple(f.name for f in robot.frames if f.actuated)
 
 
 def turning_drives(robot: Robot) -> tuple[str, ...]:
-    """Actuated joints that turn."""
+    """Return the actuated joints that turn."""
     return tuple(f.name for f in robot.frames if f.actuated and f.joint == "revolute")
 
 
@@ -29,7 +29,7 @@ def beams(robot: Robot) -> tuple[str, ...]:
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Frames whose body has a length: beams, and others between two places."""
+    """Return frames whose body has a length: beams, and others between two places."""
     return tuple(
         f.name
         for f in robot.frames
@@ -43,7 +43,7 @@ def growing(robot: Robot) -> tuple[str, ...]:
 
 
 def body_axis(frame: Frame) -> tuple[float, NDArray]:
-    """Length and direction of a body.
+    """Return the length and direction of a body.
 
     Args:
         frame: whose.
@@ -60,7 +60,7 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
 
 
 def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
-    """Conditions with more stress-free screws at a frame.
+    """Return the conditions with more stress-free screws at a frame.
 
     Args:
         conditions: conditions of R rows.
@@ -78,7 +78,7 @@ def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditio
 def with_frame(
     conditions: Conditions, frame: str, change: Callable[[Frame], Frame]
 ) -> Conditions:
-    """Conditions of a robot with one frame changed."""
+    """Return the conditions of a robot with one frame changed."""
     row = conditions.robot.index(frame)
     frames = list(conditions.robot.frames)
     frames[row] = change(frames[row])
@@ -86,7 +86,7 @@ def with_frame(
 
 
 def lengthening(frame: Frame) -> NDArray:
-    """(6,) screw of a body that is longer by 1 m, in the frame's axes."""
+    """Return the (6,) screw of a body that is longer by 1 m, in the frame's axes."""
     return np.concatenate([np.zeros(3), body_axis(frame)[1]])
 
 

@@ -77,14 +77,14 @@ class ClearanceProblem:
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
-    """(cones,) [J] multipliers of the cones, from the gradient of the energy."""
+    """Return (cones,) [J] multipliers of the cones, from the gradient of the energy."""
     force = -np.bincount(group, weights=gradient * u)
     at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
 
 
 def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
-    """(nu, active) normals of the boundaries of the cones marked."""
+    """Return the (nu, active) normals of the boundaries of the cones marked."""
     return np.where(group[:, None] == np.flatnonzero(active), u[:, None], 0.0)
 
 
@@ -107,7 +107,7 @@ def clearance_step(
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """The step with S made convex, first without changing the minimum."""
+    """Return the step with S made convex, first without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
@@ -140,7 +140,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Newton's method on the active boundaries; None if that fails."""
+    """Return Newton's method on the active boundaries; None if that fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):

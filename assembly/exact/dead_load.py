@@ -62,7 +62,7 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Loads as dead loads.
+    """Return the loads as dead loads.
 
     Args:
         posture: where the robot stands, of n frames.
@@ -94,7 +94,7 @@ def dead_loads(
 def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """The same under many conditions at once.
+    """Return the same under many conditions at once.
 
     Args:
         postures: R of them, in one.
@@ -153,7 +153,7 @@ def _add_weights(
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
-    """[J] all loads' work from the nominal posture."""
+    """Return the [J] all loads' work from the nominal posture."""
     work = 0.0
     if loads.load.any():
         work += float(loads.load @ place.platform_screw)
@@ -168,7 +168,7 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
 
 
 def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
-    """(N,) [J] derivative of the work by each unknown."""
+    """Return the (N,) [J] derivative of the work by each unknown."""
     gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -177,7 +177,7 @@ def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> NDArray:
-    """Second derivative of multipliers . residual + work.
+    """Return the second derivative of multipliers . residual + work.
 
     Args:
         place: where everything is.
@@ -211,7 +211,7 @@ def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def largest_wrench(place: Placement, loads: DeadLoads) -> float:
-    """[N m] largest scaled wrench of the loads at the platform's origin."""
+    """Return the [N m] largest scaled wrench of the loads at the platform's origin."""
     scale = place.model.scale
     largest = float(np.abs(loads.load / scale).max())
     if loads.beyond_platform:
@@ -221,7 +221,7 @@ def largest_wrench(place: Placement, loads: DeadLoads) -> float:
 
 
 def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Wrenches of all loads, at the platform's nominal origin, base axes.
+    """Return the wrenches of all loads, at the platform's nominal origin, base axes.
 
     Args:
         place: where everything is.

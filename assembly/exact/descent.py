@@ -135,7 +135,7 @@ class Step:
 
 
 def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
-    """Closures to first and the Lagrangian to second order.
+    """Return the closures to first and the Lagrangian to second order.
 
     Args:
         at: a placement.
@@ -190,7 +190,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Rows (m, nu) combined into independent ones (p, nu), and how (m, p)."""
+    """Return rows (m, nu) combined into independent ones (p, nu), and how (m, p)."""
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -199,13 +199,13 @@ def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def energy_of(at: Placement) -> float:
-    """[J] elastic energy."""
+    """Return the [J] elastic energy."""
     y = at.x[at.model.springs]
     return float(y @ y) / 2
 
 
 def potential(at: Placement, loads: DeadLoads) -> float:
-    """[J] elastic energy minus the loads' work."""
+    """Return the [J] elastic energy minus the loads' work."""
     return energy_of(at) - work_of(at, loads)
 
 
@@ -213,7 +213,7 @@ def advance(
     local: Expansion, penalty: float, damping: float, near: bool,
     method: Method = "compiled",
 ) -> Step:  # fmt: skip
-    """A step that lowers energy plus penalty.
+    """Return a step that lowers energy plus penalty.
 
     Args:
         local: the expanded problem.
@@ -265,7 +265,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """The expansion's minimum; None where it has none."""
+    """Return the expansion's minimum; None where it has none."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -305,7 +305,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """The placement after a step and its restoration onto the closures."""
+    """Return the placement after a step and its restoration onto the closures."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

@@ -16,7 +16,7 @@ _ANGLE_ROUNDING = 1e-5  # of a small residual: rounding of an angle
 
 
 def imbalance(local: Expansion) -> float:
-    """How far a placement is from equilibrium.
+    """Return how far a placement is from equilibrium.
 
     Args:
         local: the expansion there.
@@ -45,7 +45,7 @@ def imbalance(local: Expansion) -> float:
 
 
 def least_curvature(local: Expansion) -> float:
-    """Whether an equilibrium is stable.
+    """Return whether an equilibrium is stable.
 
     Args:
         local: the expansion there.
@@ -65,7 +65,7 @@ def least_curvature(local: Expansion) -> float:
 def tangent_space(
     local: Expansion, hold_touching: bool = False
 ) -> tuple[NDArray, NDArray]:
-    """Motions near an equilibrium that keep closures and active clearances.
+    """Return the motions near an equilibrium that keep closures and active clearances.
 
     Args:
         local: the expansion there.
@@ -90,7 +90,7 @@ def tangent_space(
 
 
 def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, NDArray]:
-    """Motions along which second derivatives do not mix.
+    """Return the motions along which second derivatives do not mix.
 
     Args:
         D: (N, k) basis of motions.
@@ -108,7 +108,7 @@ def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, ND
 
 
 def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
-    """Clearances that carry a force at an equilibrium.
+    """Return the clearances that carry a force at an equilibrium.
 
     Args:
         local: the expansion there.

@@ -142,13 +142,13 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Frames, closures and platform; see :mod:`assembly.model.tables`."""
+        """Return frames, closures and platform; see :mod:`assembly.model.tables`."""
         from assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each frame, columns (variable, component)."""
+        """Return a row for each frame, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
@@ -380,7 +380,7 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Number of unknowns."""
+    """Return the number of unknowns."""
     return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
 
 
@@ -427,7 +427,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """[J] size of the energies of the problem."""
+    """Return the [J] size of the energies of the problem."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

@@ -185,5 +185,5 @@ def along_own(robot: Robot, coordinates: NDArray) -> NDArray:
 
 
 def nominally_carried(posture: Posture) -> NDArray:
-    """(..., n, 4, 4) nominal frames after their joint's coordinate."""
+    """Return the (..., n, 4, 4) nominal frames after their joint's coordinate."""
     return posture.transforms @ along_own(posture.robot, posture.coordinates)

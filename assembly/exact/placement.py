@@ -187,7 +187,7 @@ class Placement:
         return np.concatenate([turn, W[3:]])
 
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
-        """Second derivative of multipliers . residual + load . platform screw.
+        """Return second derivative of multipliers . residual + load . platform screw.
 
         Exact where the closures hold; elsewhere off by the order of the residual.
 
@@ -212,7 +212,7 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Part of the curvature that comes from each exponential by itself.
+        """Return the part of the curvature that comes from each exponential by itself.
 
         Args:
             through: (N, 6) wrench on what each unknown moves, at the platform's nominal
@@ -254,7 +254,7 @@ class Placement:
 
 
 def place(model: FiniteRobot, x: NDArray) -> Placement:
-    """The robot moved by finite screws.
+    """Return the robot moved by finite screws.
 
     Args:
         model: the robot.

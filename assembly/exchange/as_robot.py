@@ -84,7 +84,7 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
 
 
 def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
-    """The robot that a mechanism is.
+    """Return the robot that a mechanism is.
 
     Args:
         mechanism: at home, all its loops holding six directions.
@@ -147,7 +147,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
 
 
 def _without_base(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with another name for a joint called as what stands still."""
+    """Return mechanism with another name for a joint called as what stands still."""
     names = {joint.name for joint in mechanism.joints}
     if BASE not in names:
         return mechanism
@@ -160,7 +160,7 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
 
 
 def guess_platform(mechanism: Mechanism) -> str:
-    """The body at the end of the longest chain that no loop takes further.
+    """Return the body at the end of the longest chain that no loop takes further.
 
     Args:
         mechanism: any.
@@ -188,7 +188,7 @@ def guess_platform(mechanism: Mechanism) -> str:
 
 
 def _closes(joint: Joint, mechanism: Mechanism) -> bool:
-    """Whether a joint is a part of one that closes a loop."""
+    """Return whether a joint is a part of one that closes a loop."""
     return any(
         loop.first == f"{loop.name}.tip"
         and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
@@ -262,14 +262,14 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, lengthened until it is unique."""
+    """Return the name, lengthened until it is unique."""
     while name in taken:
         name += "_"
     return name
 
 
 def _lumped(name: str, frames: list[Frame]) -> Body:
-    """The rigid body of all that stands on one joint: masses, and beams as rods."""
+    """Return rigid body of all that stands on one joint: masses, and beams as rods."""
     masses, centres, spans = [], [], []
     for frame in frames:
         T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]

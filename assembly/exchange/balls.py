@@ -33,7 +33,7 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 
 
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
-    """Whether three joints are the turns of a passive ball joint of a file."""
+    """Return whether three joints are the turns of a passive ball joint of a file."""
     name = turns[0].name.removesuffix(".rx")
     made = {f"{name}.after_rx", f"{name}.rx.after"}  # by chain(), and of MJCF
     return (

@@ -16,7 +16,7 @@ CONSTANT = ("encoder_offset", "link_length")
 
 
 def with_calibration(home: Posture) -> Robot:
-    """The robot whose nominal geometry is the calibrated one.
+    """Return the robot whose nominal geometry is the calibrated one.
 
     Args:
         home: of the declared robot, its geometric errors and effects with it.

@@ -58,7 +58,7 @@ class Comparison:
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         keys = ("reader", "file", "why_not", "bodies", "masses", "loops", "difference",
                 "where")  # fmt: skip
         return {key: getattr(self, key) for key in keys}

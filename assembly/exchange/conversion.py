@@ -41,7 +41,7 @@ class Conversion:
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         return {
             "robot": self.robot.name,
             "platform": self.robot.platform,
@@ -60,7 +60,7 @@ class Conversion:
         }
 
     def text(self) -> str:
-        """A few lines for people."""
+        """Return a few lines for people."""
         robot = self.robot
         count = len(robot.closures)
         lines = [

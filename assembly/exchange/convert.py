@@ -188,7 +188,7 @@ def _written(
 
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
-    """The rigid mechanism of a robot, its calibration built in, its loops closed."""
+    """Return rigid mechanism of a robot, its calibration built in, its loops closed."""
     posture = home_posture(conversion.robot)
     robot = with_calibration(posture)
     home = posture.coordinates
@@ -216,7 +216,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
 
 
 def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
-    """Text of each file to be written."""
+    """Return the text of each file to be written."""
     if target.suffix.lower() == ".xml":
         return {target: mjcf_text(mechanism)}
     beside: LoopsFile = loops_of(mechanism)
@@ -225,7 +225,7 @@ def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
 
 
 def _read_back(path: Path) -> Mechanism:
-    """The mechanism of files just written."""
+    """Return the mechanism of files just written."""
     if path.suffix.lower() == ".xml":
         return read_mjcf(path)
     return read_urdf(path, read_loops(path.with_suffix(".yaml")))

@@ -25,7 +25,7 @@ class Coupling:
     leader_rest: float = 0.0
 
     def at(self, leader: float) -> tuple[float, float]:
-        """The follower's coordinate at the leader's, and its derivative."""
+        """Return the follower's coordinate at the leader's, and its derivative."""
         x = leader - self.leader_rest
         value = slope = 0.0
         for c in reversed(self.coefficients):
@@ -34,7 +34,7 @@ class Coupling:
         return self.rest + value, slope
 
     def text(self) -> str:
-        """The rule in words, with the names of both joints."""
+        """Return the rule in words, with the names of both joints."""
         c = [*self.coefficients, 0.0, 0.0]
         if self.leader is None:
             return f"{self.follower} = {self.rest + c[0]:g}"
@@ -48,7 +48,7 @@ class Coupling:
 
 
 def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
-    """Couplings sorted so that a leader's own comes first.
+    """Return the couplings sorted so that a leader's own comes first.
 
     Args:
         couplings: in any order.

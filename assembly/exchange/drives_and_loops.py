@@ -20,7 +20,7 @@ def with_loops(
     mechanism: Mechanism, loops: LoopsFile | None, parts: Mapping[str, Sequence[str]],
     driven: set[str],
 ) -> Mechanism:  # fmt: skip
-    """The mechanism with loops, drives, platform and home of a loops file.
+    """Return the mechanism with loops, drives, platform and home of a loops file.
 
     Args:
         mechanism: as its own file has it.
@@ -96,7 +96,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Joints that follow others, at home where their leaders take them."""
+    """Return the joints that follow others, at home where their leaders take them."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower
@@ -129,7 +129,7 @@ def _couplings_said(
 def _retyped(
     mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
 ) -> tuple[Mechanism, dict[str, list[str]]]:
-    """Joints that a CAD export wrote as one turn, as what they really are."""
+    """Return joints that a CAD export wrote as one turn, as what they really are."""
     bodies, joints = dict(mechanism.bodies), list[Joint]()
     now = {name: list(several) for name, several in parts.items()}
     for joint in mechanism.joints:

@@ -42,7 +42,7 @@ def robot_of_file(
     points: Sequence[str] | None = None,
     ask: bool = True,
 ) -> tuple[Conversion, RobotAndMechanism]:
-    """The robot of a file of another program.
+    """Return the robot of a file of another program.
 
     Args:
         source: a URDF, MJCF or SDF file.
@@ -103,7 +103,7 @@ def robot_of_file(
 def _closed(
     mechanism: Mechanism, source: Path, beside: LoopsFile | None
 ) -> tuple[Mechanism, NDArray, bool, tuple[str, ...]]:
-    """The mechanism with a home in which its loops close.
+    """Return the mechanism with a home in which its loops close.
 
     Args:
         mechanism: as it was read.
@@ -141,7 +141,7 @@ def _closed(
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """The platform that an overlay names, None if it names none."""
+    """Return the platform that an overlay names, None if it names none."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -152,7 +152,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """The robot with an overlay; a body that it names as platform is its frame."""
+    """Return robot with an overlay; a body that it names as platform is its frame."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -178,7 +178,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Masses of meshes as the other program has them, or said to be left out."""
+    """Return masses of meshes as the other program has them, or said to be left out."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre) in known.items():

@@ -27,13 +27,13 @@ _STALLED = 0.999  # the sum of squares after ten steps over what it was before
 
 
 def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
-    """[rad, m] largest component that any loop leaves open."""
+    """Return the [rad, m] largest component that any loop leaves open."""
     residual = _Loops(mechanism, 1.0).equations(coordinates)[0]
     return float(np.abs(residual).max(initial=0.0))
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Coordinates near the file's own at which all loops close.
+    """Return the coordinates near the file's own at which all loops close.
 
     The drives are held first; where that does not close they move too; then random
     starts (always the same) follow, each farther away.
@@ -76,7 +76,7 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Coordinates near the file's own that leave the loops least open.
+    """Return the coordinates near the file's own that leave the loops least open.
 
     Args:
         mechanism: of n joints.
@@ -112,7 +112,7 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
 
 
 def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
-    """Levenberg-Marquardt from one start: the coordinates where it ends."""
+    """Return Levenberg-Marquardt from one start: the coordinates where it ends."""
     followers = [follower for follower, *_ in loops.coupled]
     driven = loops.actuated.copy()
     driven[followers] = False  # they go where their leaders take them
@@ -147,7 +147,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """[m] longest distance between neighbouring joints, 1 if all are points."""
+    """Return [m] longest distance between neighbouring joints, 1 if all are points."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 

@@ -108,7 +108,7 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """The same loops, some of which meet only in a point, whatever their type says.
+    """Return same loops, some of which meet only in a point, whatever their type says.
 
     Args:
         loops: of a file.
@@ -136,7 +136,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
 
 
 def loops_text(loops: LoopsFile) -> str:
-    """A loops file's text, every number with all its digits."""
+    """Return a loops file's text, every number with all its digits."""
     rows = [f"[{_word(a)}, {_word(b)}]" for a, b in loops.pairs]
     kinds = ["3d" if point else "6d" for point in loops.points]
     lines = [
@@ -154,7 +154,7 @@ def loops_text(loops: LoopsFile) -> str:
 
 
 def _yaml(path: Path | str) -> dict[str, Any]:
-    """Root mapping of a YAML file."""
+    """Return the root mapping of a YAML file."""
     with naming_packages(f"{path}: YAML"):
         import yaml
 
@@ -175,7 +175,7 @@ def _yaml(path: Path | str) -> dict[str, Any]:
 
 
 def _list(table: Table, key: str) -> list[Any]:
-    """A list, which may be empty."""
+    """Return a list, which may be empty."""
     value = table.get(key)
     if value is None:
         return []
@@ -185,7 +185,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """A list of names."""
+    """Return a list of names."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -194,7 +194,7 @@ def _names(table: Table, key: str) -> tuple[str, ...]:
 
 
 def _turns(table: Table) -> dict[str, str]:
-    """``joint_name`` and ``joint_type``, one type for each name."""
+    """Return ``joint_name`` and ``joint_type``, one type for each name."""
     names, kinds = _names(table, "joint_name"), _names(table, "joint_type")
     if len(names) != len(kinds):
         message = f"found {len(kinds)}, expected one for each of {len(names)} joints"
@@ -207,7 +207,7 @@ def _turns(table: Table) -> dict[str, str]:
 
 
 def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
-    """Two names that differ."""
+    """Return two names that differ."""
     names = pair if isinstance(pair, list) else []
     names = [name for name in names if isinstance(name, str)]
     if len(names) != 2 or pair != names or names[0] == names[1]:
@@ -217,7 +217,7 @@ def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
 
 
 def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str:
-    """The message for a name that the robot does not have."""
+    """Return the message for a name that the robot does not have."""
     return (
         f"{loops.file}: {key}: found {quoted(name)}, expected a joint or link of the "
         f"robot{nearest(name, valid)}"
@@ -225,14 +225,14 @@ def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str
 
 
 def _word(text: str) -> str:
-    """A text between double quotes, as YAML and JSON both read it."""
+    """Return a text between double quotes, as YAML and JSON both read it."""
     import json
 
     return json.dumps(text)
 
 
 def _number(value: float) -> str:
-    """A number that YAML reads as one: an exponent needs a point before it."""
+    """Return a number that YAML reads as one: an exponent needs a point before it."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     if e and "." not in mantissa:

@@ -128,7 +128,7 @@ class Mechanism:
 def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str) -> (
     tuple[str, tuple[Joint, ...]]
 ):  # fmt: skip
-    """The root of a tree, and its joints sorted so that parents come first.
+    """Return the root of a tree, and its joints sorted so that parents come first.
 
     Args:
         joints: in any order.
@@ -207,7 +207,7 @@ def chain(
     name: str, parent: str, child: str, placement: NDArray, after: NDArray,
     freedoms: Sequence[tuple[str, str, NDArray]],
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """A joint of several freedoms as joints of one, through bodies without mass.
+    """Return a joint of several freedoms as joints of one, through bodies without mass.
 
     Args:
         name: of the whole; each part adds its own to it.
@@ -235,10 +235,10 @@ def chain(
 
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
-    """Freedoms of a ball joint as three turns, singular only far from home."""
+    """Return freedoms of a ball joint as three turns, singular only far from home."""
     return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Freedoms of a shift in space as three slides."""
+    """Return the freedoms of a shift in space as three slides."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

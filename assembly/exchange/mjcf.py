@@ -71,7 +71,7 @@ class _Reading:
 
 
 def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of an MJCF file.
+    """Return the mechanism of an MJCF file.
 
     Args:
         path: the file; others that it includes or attaches are read too.
@@ -124,7 +124,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _platform(root: Node, reading: _Reading) -> str | None:
-    """The body that ``<custom><text name="platform">`` names."""
+    """Return the body that ``<custom><text name="platform">`` names."""
     for group in root.children("custom"):
         for text in group.children("text"):
             if text.text("name") == "platform" and text.text("data") in reading.bodies:
@@ -133,7 +133,7 @@ def _platform(root: Node, reading: _Reading) -> str | None:
 
 
 def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
-    """Attributes by class and element, each class with what its parents say."""
+    """Return attributes by class and element, each class with what its parents say."""
     classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
 
     def gather(node: Node, inherited: dict[str, dict[str, str]], name: str) -> None:
@@ -156,7 +156,7 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
 
 
 def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
-    """An element with the defaults of its class filled in."""
+    """Return an element with the defaults of its class filled in."""
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
@@ -228,7 +228,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
 
 
 def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
-    """A body with its mass, of what is written and of its shapes."""
+    """Return a body with its mass, of what is written and of its shapes."""
     written, shapes = None, []
     for inner, at in _elements(node, place):
         if inner.tag == "inertial":
@@ -285,7 +285,7 @@ def _pose(node: Node, angles: Angles) -> NDArray:
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Joints at the positions of the key named home."""
+    """Return the joints at the positions of the key named home."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

@@ -36,7 +36,7 @@ UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
 def expanded(root: Node, depth: int = 0) -> Node:
-    """An MJCF file as one in which every body is written out.
+    """Return an MJCF file as one in which every body is written out.
 
     Args:
         root: of the file, changed in place.
@@ -128,7 +128,7 @@ def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
 
 
 def _words(values: Any) -> str:
-    """Numbers with all their digits."""
+    """Return the numbers with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -171,7 +171,7 @@ def _other(model: Node, root: Node, depth: int) -> tuple[str, str, Any]:
 
 
 def _attached(node: Node, root: Node, other: Node) -> Any:
-    """A frame with a part of a model; its constraints are added to the root."""
+    """Return a frame with a part of a model; its constraints are added to the root."""
     prefix, angles = node.optional("prefix"), Angles.of(other)
     for element in other.element.iter():
         for key in _NAMES:

@@ -15,7 +15,7 @@ _ZERO = np.zeros(3)
 
 
 def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list[Joint]:
-    """A ball joint, or the six freedoms of a body that nothing holds.
+    """Return a ball joint, or the six freedoms of a body that nothing holds.
 
     Args:
         given: the element, defaults filled in.
@@ -47,7 +47,7 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
 def one_freedom(
     given: Node, name: str, kind: str, offset: NDArray, angles: Angles
 ) -> Joint:
-    """A hinge or a slide, with its spring.
+    """Return a hinge or a slide, with its spring.
 
     Args:
         given: the element, defaults filled in.

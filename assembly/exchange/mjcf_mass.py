@@ -58,7 +58,7 @@ class MassRules:
         return rules
 
     def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
-        """Bodies of a file, each at least as heavy as it says, all scaled."""
+        """Return bodies of a file, each at least as heavy as it says, all scaled."""
         least = self.least if self.least > _REGULAR else 0.0
         bounded = {
             name: replace(body, mass=max(body.mass, least)) if name != WORLD else body
@@ -127,7 +127,7 @@ def shape_mass(
 
 
 def _sizes(geom: Node, kind: str) -> list[float]:
-    """[m] sizes of a shape, lengths and edges whole."""
+    """Return the [m] sizes of a shape, lengths and edges whole."""
     given = geom.optional("size").split()
     count = _SIZES[kind]
     if geom.has("fromto"):
@@ -151,7 +151,7 @@ def _first(geom: Node, count: int) -> float:
 
 
 def _thomsen(half_axes: list[float]) -> float:
-    """[m^2] area of an ellipsoid, to 1 %."""
+    """Return the [m^2] area of an ellipsoid, to 1 %."""
     a, b, c = (x**1.6075 for x in half_axes)
     return 4 * math.pi * ((a * b + b * c + c * a) / 3) ** (1 / 1.6075)
 
@@ -160,7 +160,7 @@ def body_of(
     name: str, written: tuple[float, NDArray] | None,
     shapes: list[tuple[float, NDArray]], rules: MassRules,
 ) -> Body:  # fmt: skip
-    """A body of what is written of its mass and of its shapes.
+    """Return a body of what is written of its mass and of its shapes.
 
     Args:
         name: of the body.

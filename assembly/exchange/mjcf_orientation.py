@@ -43,7 +43,7 @@ class Angles:
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:
-    """(3, 3) orientation of an element; none if it says nothing of it.
+    """Return the (3, 3) orientation of an element; none if it says nothing of it.
 
     Args:
         node: with one of quat, axisangle, euler, xyaxes, zaxis.

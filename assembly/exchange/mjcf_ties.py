@@ -152,7 +152,7 @@ class Ties:
                 yield Coupling(first, leader, tuple(rules), rest, other)
 
     def driven(self) -> set[str]:
-        """Joints with an actuator; other actuators are left out."""
+        """Return the joints with an actuator; other actuators are left out."""
         names = set()
         for group in self.root.children("actuator"):
             for node in group.children():
@@ -183,7 +183,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Five coefficients; those that are not written are the format's default."""
+    """Return five coefficients; those that are not written are the format's default."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:

@@ -13,7 +13,7 @@ _KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 
 def mjcf_text(mechanism: Mechanism) -> str:
-    """An MJCF file's text.
+    """Return an MJCF file's text.
 
     Args:
         mechanism: whose children stand in their joints' own frames.

@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
-    """The compiled model, and whether its meshes were there."""
+    """Return the compiled model, and whether its meshes were there."""
     if path.suffix.lower() == ".urdf":
         return _settled(mujoco, mujoco.MjSpec.from_string(_bare_urdf(path))), True
     try:
@@ -79,7 +79,7 @@ def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
 
 
 def _settled(mujoco: Any, spec: Any) -> Any:
-    """A model in which bodies keep their frames and may have no mass."""
+    """Return a model in which bodies keep their frames and may have no mass."""
     compiler = spec.compiler
     compiler.fusestatic = compiler.alignfree = 0
     for joint in spec.joints:
@@ -93,7 +93,7 @@ def _settled(mujoco: Any, spec: Any) -> Any:
 
 
 def _bare_urdf(path: Path) -> str:
-    """A URDF without shapes, whose meshes may be elsewhere."""
+    """Return a URDF without shapes, whose meshes may be elsewhere."""
     from xml.etree.ElementTree import Element, tostring
 
     root = read_xml(path, "robot").element
@@ -117,7 +117,7 @@ def _bare_urdf(path: Path) -> str:
 def _compared(
     mujoco: Any, model: Any, mechanism: Mechanism, start: Comparison, whole: bool
 ) -> Comparison:
-    """The comparison in random postures."""
+    """Return the comparison in random postures."""
     bodies = _body_names(model)
     strange = [name for name in bodies[1:] if name not in mechanism.bodies]
     unread = {} if not strange else {f"body {strange[0]}, which was not read,": np.inf}
@@ -175,7 +175,7 @@ def _body_names(model: Any) -> list[str]:
 def _mass_gaps(
     model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
 ) -> dict[str, float]:
-    """Relative differences of masses, and of centres [m]."""
+    """Return the relative differences of masses, and of centres [m]."""
     gaps: dict[str, float] = {}
     for i, name in bodies:
         body, mass = mechanism.bodies[name], float(model.body_mass[i])
@@ -198,7 +198,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Rows of one equality constraint."""
+    """Return the rows of one equality constraint."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 

@@ -17,7 +17,7 @@ _WHOLE = ("name", "description", "platform", "effect", "frame")
 
 
 def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
-    """A robot's table with an overlay's keys added or replaced.
+    """Return a robot's table with an overlay's keys added or replaced.
 
     Args:
         robot: as :func:`assembly.files.robot_file.robot_table` gives it, its paths

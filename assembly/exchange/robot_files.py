@@ -20,7 +20,7 @@ _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 def load_robot(
     name: str | Path, close: Closing | None = None, *, links: bool = True
 ) -> Robot:
-    """A built-in robot by its name, or the robot of a file of any kind.
+    """Return a built-in robot by its name, or the robot of a file of any kind.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file, a URDF (with its loops
@@ -47,7 +47,7 @@ def load_robot(
 
 
 def _load_declared(name: str | Path, close: Closing | None) -> Robot:
-    """The robot of a name or of a file, its links as they are declared."""
+    """Return the robot of a name or of a file, its links as they are declared."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":

@@ -39,7 +39,7 @@ _HELD_OF_AXIS = ("xyz", "use_parent_model_frame", "mimic")
 
 
 def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of an SDF file with one model, others perhaps inside it.
+    """Return the mechanism of an SDF file with one model, others perhaps inside it.
 
     Args:
         path: the file.
@@ -88,7 +88,7 @@ def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
     first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
-    """Joints that reach every body from the root, and loops of the others."""
+    """Return joints that reach every body from the root, and loops of the others."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
     tree, loops, waiting = held, list[Loop](), list(ends)
     parts: dict[str, list[str]] = {}

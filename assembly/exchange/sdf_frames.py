@@ -57,11 +57,11 @@ class Frames:
     poses: dict[str, NDArray] = field(default_factory=dict)
 
     def of(self, tag: str) -> Iterator[tuple[str, Named]]:
-        """Names and elements of one kind, as they are written."""
+        """Return the names and elements of one kind, as they are written."""
         return ((k, v) for k, v in self.named.items() if v.node.tag == tag)
 
     def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
-        """The name from outside of a name in a model, or an error of an element."""
+        """Return name from outside of a name in a model, or an error of an element."""
         if name == WORLD or (name, scope) == (MODEL, _AROUND):
             return WORLD
         own = f"{self.model.optional('name')}::"
@@ -75,7 +75,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """(4, 4) seen from the world, by the name from outside."""
+        """Return the (4, 4) seen from the world, by the name from outside."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:
@@ -119,7 +119,7 @@ class Frames:
         return self.link(self.name(to, scope, node), (*asked, name))
 
     def _canonical(self, scope: str, model: Node) -> str:
-        """The link that a model's own frame is attached to."""
+        """Return the link that a model's own frame is attached to."""
         given = model.optional("canonical_link")
         if given:
             return self.link(self.name(given, scope, model, "canonical_link"))
@@ -162,7 +162,7 @@ def frames_of(root: Node) -> Frames:
 
 
 def _is_static(model: Node) -> bool:
-    """Whether a model stands still."""
+    """Return whether a model stands still."""
     static = model.child("static")
     return static is not None and static.content.lower() in {"true", "1"}
 
@@ -198,7 +198,7 @@ def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
 
 
 def _is_old(root: Node) -> bool:
-    """Whether a file is of a version in which axes are seen from the model."""
+    """Return whether a file is of a version in which axes are seen from the model."""
     try:
         return float(root.optional("version")) <= _OLD
     except ValueError:
@@ -206,7 +206,7 @@ def _is_old(root: Node) -> bool:
 
 
 def included(node: Node) -> tuple[Node, bool]:
-    """The model of a file that another includes, and whether that is an old one.
+    """Return the model of a file that another includes, and whether that is an old one.
 
     Args:
         node: ``<include>``, whose address is a file or folder beside its own file's
@@ -248,7 +248,7 @@ def included(node: Node) -> tuple[Node, bool]:
 
 
 def word(node: Node, tag: str) -> str:
-    """Text of an element inside that names a link.
+    """Return the text of an element inside that names a link.
 
     Args:
         node: a joint.

@@ -104,7 +104,7 @@ def joint_parts(
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
-    """The joint of one freedom with the range and the spring of its axis."""
+    """Return the joint of one freedom with the range and the spring of its axis."""
     axis = node.child(tag)
     if axis is None:
         return joint
@@ -123,7 +123,7 @@ def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
-    """(3,) direction in the joint's axes."""
+    """Return the (3,) direction in the joint's axes."""
     axis = named.node.child(tag)
     if axis is None:
         return np.array(_Z)
@@ -182,7 +182,7 @@ def joint_couplings(
 
 
 def _part(mimic: Node, parts: list[str], tag: str) -> str:
-    """The joint of one freedom that is an axis of a joint."""
+    """Return the joint of one freedom that is an axis of a joint."""
     if len(parts) == 1 and tag == "axis":
         return parts[0]
     ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")
@@ -193,6 +193,6 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """A number of an element inside."""
+    """Return a number of an element inside."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

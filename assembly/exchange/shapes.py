@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 def volume(shape: str, sizes: Sequence[float]) -> float:
-    """Volume of a body.
+    """Return the volume of a body.
 
     Args:
         shape: ``box`` (three edges), ``sphere`` (radius), ``ellipsoid`` (three
@@ -31,7 +31,7 @@ def volume(shape: str, sizes: Sequence[float]) -> float:
 
 
 def area(shape: str, sizes: Sequence[float]) -> float:
-    """Surface of a body.
+    """Return the surface of a body.
 
     Args:
         shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``, see :func:`volume`.
@@ -53,7 +53,7 @@ def area(shape: str, sizes: Sequence[float]) -> float:
 def together(masses: Sequence[float], centres: Sequence[NDArray]) -> (
     tuple[float, NDArray]
 ):  # fmt: skip
-    """Mass and centre of bodies that are one.
+    """Return the mass and centre of bodies that are one.
 
     Args:
         masses: [kg] of each.

@@ -11,7 +11,7 @@ _OWN = {"revolute": 2, "prismatic": 5}  # place of a joint's own freedom among s
 
 
 def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
-    """Joint stiffnesses of passive joints whose springs carry nothing at home.
+    """Return joint stiffnesses of passive joints whose springs carry nothing at home.
 
     Args:
         mechanism: at home.
@@ -49,10 +49,10 @@ def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def _is_spring(joint: Joint) -> bool:
-    """Whether a joint has a spring in its freedom."""
+    """Return whether a joint has a spring in its freedom."""
     return joint.stiffness > 0 and joint.kind in _OWN
 
 
 def _at_rest(joint: Joint) -> bool:
-    """Whether the joint's spring carries nothing at home."""
+    """Return whether the joint's spring carries nothing at home."""
     return abs(joint.position - joint.rest) < _AT_REST

@@ -32,12 +32,12 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
 
 def _is_harmless(node: Node) -> bool:
-    """Whether an element is of a kind that refers to bodies and holds none."""
+    """Return whether an element is of a kind that refers to bodies and holds none."""
     return any(part in node.tag.lower() for part in _HARMLESS)
 
 
 def may_tie(node: Node, names: Container[str]) -> str:
-    """Words for an element left out that may tie joints or bodies, else none.
+    """Return words for an element left out that may tie joints or bodies, else none.
 
     Args:
         node: an element that is not converted.

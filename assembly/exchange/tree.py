@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 def place_frames(
     parents: NDArray, kinds: NDArray, fixed: NDArray, q: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Transforms of all frames, before and after the motion of their own joint.
+    """Return transforms of all frames, before and after the motion of their own joint.
 
     Args:
         parents: (n,) rows, each before its children, -1 for the base.

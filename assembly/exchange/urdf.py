@@ -35,7 +35,7 @@ _HELD = {"origin", "parent", "child", "axis", "mimic"}
 
 
 def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
-    """Mechanism of a URDF.
+    """Return the mechanism of a URDF.
 
     Args:
         path: the file.
@@ -94,7 +94,7 @@ def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
 
 
 def _body(node: Node) -> Body:
-    """A link and its mass."""
+    """Return a link and its mass."""
     name, inertial = node.text("name"), node.child("inertial")
     mass = None if inertial is None else inertial.child("mass")
     if inertial is None or mass is None:
@@ -108,7 +108,7 @@ def _body(node: Node) -> Body:
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
-    """A joint as joints of one freedom, and the bodies between them."""
+    """Return a joint as joints of one freedom, and the bodies between them."""
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)

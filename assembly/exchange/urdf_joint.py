@@ -70,6 +70,6 @@ def pose_of(origin: Node) -> NDArray:
 
 
 def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
-    """(3,) unit direction of an element inside a joint."""
+    """Return the (3,) unit direction of an element inside a joint."""
     axis = node.child(tag)
     return default if axis is None else axis.unit_vector("xyz", default)

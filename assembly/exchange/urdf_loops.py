@@ -34,7 +34,7 @@ Closing = tuple[str, list[Joint], list[Body], Loop]
 def with_closing_joints(
     mechanism: Mechanism, root: Node, parts: dict[str, list[str]]
 ) -> Mechanism:
-    """The mechanism with the loops of its own file.
+    """Return the mechanism with the loops of its own file.
 
     Args:
         mechanism: of the file's links and joints.
@@ -79,7 +79,7 @@ def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]
 
 
 def _loop_joint(mechanism: Mechanism, node: Node) -> Closing:
-    """A joint between two places; a ball joint is a point that both share."""
+    """Return a joint between two places; a ball joint is a point that both share."""
     name = node.text("name")
     (first, A), (second, B) = (_place(mechanism, node, tag) for tag in _ENDS)
     if first == second:
@@ -101,7 +101,7 @@ _ENDS = ("link1", "link2")
 
 
 def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
-    """A link, and (4, 4) the place in it."""
+    """Return a link, and (4, 4) the place in it."""
     end = node.child(tag)
     if end is None:
         raise node.bad(tag, "missing; expected a link and a place in it")

@@ -12,7 +12,7 @@ XML_MARK = "<!-- Written by forcefit. -->"
 
 
 def urdf_text(mechanism: Mechanism) -> str:
-    """A URDF's text.
+    """Return a URDF's text.
 
     Args:
         mechanism: whose children stand in their joints' own frames (``after`` is no
@@ -42,12 +42,12 @@ def loops_of(mechanism: Mechanism) -> LoopsFile:
 
 
 def numbers(values: NDArray | tuple[float, ...]) -> str:
-    """Numbers between blanks, all their digits kept."""
+    """Return the numbers between blanks, all their digits kept."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _link(body: Body) -> list[str]:
-    """``<link>`` with its inertial, if it has a mass."""
+    """Return ``<link>`` with its inertial, if it has a mass."""
     name = quoteattr(body.name)
     if not body.mass:
         return [f"  <link name={name}/>"]
@@ -67,7 +67,7 @@ def _link(body: Body) -> list[str]:
 
 
 def _joint(joint: Joint) -> list[str]:
-    """``<joint>``; one that turns without limits is continuous."""
+    """Return ``<joint>``; one that turns without limits is continuous."""
     kind = joint.kind
     if kind == "revolute" and joint.limits is None:
         kind = "continuous"

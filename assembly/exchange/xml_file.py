@@ -47,7 +47,7 @@ class Node:
         return self.tag if name is None else f"{self.tag} {quoted(name)}"
 
     def bad(self, key: str, message: str) -> BadInput:
-        """The error for an attribute of this element, to be raised by the caller."""
+        """Return error for an attribute of this element, to be raised by the caller."""
         place = f"{self.place}.{key}" if key else self.place
         return BadInput(f"{self.file}: {place}: {message}")
 
@@ -76,11 +76,11 @@ class Node:
         return list(found)
 
     def child(self, tag: str) -> "Node | None":
-        """The first element inside of this name, None without one."""
+        """Return the first element inside of this name, None without one."""
         return next(self.children(tag), None)
 
     def has(self, key: str) -> bool:
-        """Whether an attribute is there."""
+        """Return whether an attribute is there."""
         return self.element.get(key) is not None
 
     def optional(self, key: str) -> str:
@@ -88,7 +88,7 @@ class Node:
         return str(self.element.get(key, "")).strip()
 
     def text(self, key: str, default: str | None = None) -> str:
-        """An attribute's text.
+        """Return an attribute's text.
 
         Args:
             key: its name.
@@ -106,7 +106,7 @@ class Node:
         return str(value).strip()
 
     def choice(self, key: str, valid: tuple[str, ...], default: str) -> str:
-        """An attribute that is one of a few words."""
+        """Return an attribute that is one of a few words."""
         value = self.text(key, default)
         if value not in valid:
             names = " | ".join(valid)
@@ -118,7 +118,7 @@ class Node:
     def numbers(
         self, key: str, count: int, unit: str, default: NDArray | None = None
     ) -> NDArray:
-        """Finite numbers of an attribute, between blanks.
+        """Return the finite numbers of an attribute, between blanks.
 
         Args:
             key: its name; empty for the element's own text.
@@ -154,7 +154,7 @@ class Node:
     def limits(
         self, lower: str | None, upper: str | None, unit: float = 1.0
     ) -> tuple[float, float] | None:
-        """Least and largest coordinate of a joint from two texts.
+        """Return the least and largest coordinate of a joint from two texts.
 
         Args:
             lower: a number, infinite or of any size; None where it is absent.
@@ -181,7 +181,7 @@ class Node:
         return (ends[0], ends[1]) if binds and ends[0] < ends[1] else None
 
     def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
-        """(3,) direction of an attribute, of length 1."""
+        """Return the (3,) direction of an attribute, of length 1."""
         vector = self.numbers(key, 3, "-", default)
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
@@ -191,7 +191,7 @@ class Node:
 
 
 def read_xml(path: Path | str, *roots: str) -> Node:
-    """Root element of an XML file, as tolerant readers of robots take it.
+    """Return the root element of an XML file, as tolerant readers of robots take it.
 
     Args:
         path: the file.
@@ -220,7 +220,7 @@ def read_xml(path: Path | str, *roots: str) -> Node:
 
 
 def _parsed(text: str, path: Path | str) -> Any:
-    """Root element of a text without entities and document types."""
+    """Return the root element of a text without entities and document types."""
     from xml.etree.ElementTree import TreeBuilder
     from xml.parsers.expat import ExpatError, ParserCreate
 
@@ -256,7 +256,7 @@ def _blank_lines(match: re.Match[str]) -> str:
 
 
 def placed(translation: NDArray, rotation: NDArray) -> NDArray:
-    """(4, 4) read-only transform."""
+    """Return the (4, 4) read-only transform."""
     T = transform(translation, rotation)
     T.setflags(write=False)
     return T

@@ -13,7 +13,7 @@ from forcefit.inputs.table import Table, nearest, quoted
 
 
 def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
-    """A robot with the effects of its file.
+    """Return a robot with the effects of its file.
 
     Args:
         robot: of the same file, without them.
@@ -50,7 +50,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
 
 
 def _parameters(table: Table, robot: Robot, effect: str) -> Values:
-    """The parameters of one effect of the library."""
+    """Return the parameters of one effect of the library."""
     allowed = parameter_names(robot, effect)
     inner = table.table("parameters") if table.has("parameters") else None
     table.finish()
@@ -99,7 +99,7 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Public names of all parameters that an effect may have on a robot.
+    """Return the public names of all parameters that an effect may have on a robot.
 
     Args:
         robot: any.

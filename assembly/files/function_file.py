@@ -89,7 +89,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
 
 def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
-    """Different names, at least one."""
+    """Return different names, at least one."""
     value = table.require(key, f"1 to {most} names")
     if isinstance(value, list) and all(isinstance(v, str) for v in value):
         if 1 <= len(value) <= most and len(set(value)) == len(value):
@@ -100,7 +100,7 @@ def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
 def _numbers(
     table: Table, key: str, least: float = -math.inf
 ) -> Mapping[str, float]:  # fmt: skip
-    """Numbers by name; none if the key is absent."""
+    """Return the numbers by name; none if the key is absent."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -217,7 +217,7 @@ def _check_formula(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _example(form: Any) -> str:
-    """How a form's parameters are called."""
+    """Return how a form's parameters are called."""
     word = form.words[0]
     name = word if form.indices is None else f"1.{word}" if word else "1"
     shapes = [quoted(shape) for shape in form.shapes]

@@ -13,7 +13,7 @@ _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad"}
 
 
 def read_clearance(table: Table) -> Clearance | None:
-    """The ``clearance`` table, None if absent.
+    """Return the ``clearance`` table, None if absent.
 
     Args:
         table: of a ``[[frame]]``.
@@ -42,7 +42,7 @@ def read_clearance(table: Table) -> Clearance | None:
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
-    """K_B as a full matrix; infinities only on its diagonal.
+    """Return K_B as a full matrix; infinities only on its diagonal.
 
     Args:
         table: of a ``[[frame]]``.
@@ -95,12 +95,12 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
 
 
 def _has_rows(value: list) -> bool:
-    """Whether a list holds lists."""
+    """Return whether a list holds lists."""
     return any(isinstance(row, list) for row in value)
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:
-    """A stiffness matrix, refused unless it is symmetric positive definite.
+    """Return a stiffness matrix, refused unless it is symmetric positive definite.
 
     Args:
         table: where it was read.

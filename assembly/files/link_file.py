@@ -37,7 +37,7 @@ _SECTIONS: dict[str, dict[str, str]] = {  # keys of each kind, and their units
 
 
 def read_link(frame: Table) -> Link | None:
-    """The link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
+    """Return link of a ``[[frame]]``: exactly one of beam, stiffness, mesh, library.
 
     Args:
         frame: the frame's table; its keys ``link`` and ``up`` are read.
@@ -73,7 +73,7 @@ def read_link(frame: Table) -> Link | None:
 
 
 def _beam_link(link: Table) -> BeamLink:
-    """``beam = { ... }`` and its material."""
+    """Return ``beam = { ... }`` and its material."""
     beam = link.table("beam")
     theory = beam.choice("theory", ("timoshenko", "euler"), "timoshenko")
     length = _size(beam, "length", "m") if beam.has("length") else None
@@ -99,7 +99,7 @@ def _pieces(link: Table) -> int:
 
 
 def _section(beam: Table) -> dict[str, float]:
-    """Numbers of the section, one of the three kinds."""
+    """Return the numbers of the section, one of the three kinds."""
     keys_of_kind = {
         kind: [key for key in keys if beam.has(key)] for kind, keys in _SECTIONS.items()
     }
@@ -123,7 +123,7 @@ def _section(beam: Table) -> dict[str, float]:
 
 
 def _mesh_link(link: Table, frame: Table) -> MeshLink:
-    """``mesh = { surface, base, tip, ... }`` and its material."""
+    """Return ``mesh = { surface, base, tip, ... }`` and its material."""
     from stiffness.fem.part_text import read_parts
 
     mesh = link.table("mesh")
@@ -177,7 +177,7 @@ def _check_interface_table(table: Table) -> None:
 
 
 def _library_link(link: Table) -> LibraryLink:
-    """``library = "path/to/library#key"``."""
+    """Return ``library = "path/to/library#key"``."""
     value = link.text("library")
     path, _, key = value.rpartition("#")
     if not (path and key):
@@ -187,7 +187,7 @@ def _library_link(link: Table) -> LibraryLink:
 
 
 def _material(link: Table) -> dict[str, Any]:
-    """Young's modulus, Poisson's ratio and, if given, density."""
+    """Return Young's modulus, Poisson's ratio and, if given, density."""
     return {
         "young": _size(link, "young", "Pa"),
         "poisson": link.number("poisson", "-", above=-1.0, below=0.5),
@@ -196,7 +196,7 @@ def _material(link: Table) -> dict[str, Any]:
 
 
 def _size(table: Table, key: str, unit: str) -> float:
-    """A positive number whose powers do not leave the range of floats."""
+    """Return a positive number whose powers do not leave the range of floats."""
     length = unit == "m"
     largest = LARGEST_LENGTH if length else LARGEST
     smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
@@ -208,7 +208,7 @@ def _size(table: Table, key: str, unit: str) -> float:
 
 
 def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
-    """A direction, None if absent."""
+    """Return a direction, None if absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -219,14 +219,14 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """A path relative to the file that names it."""
+    """Return a path relative to the file that names it."""
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected a file")
     return Path(table.file).parent / path
 
 
 def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
-    """The keys of a frame's table for its link.
+    """Return the keys of a frame's table for its link.
 
     Args:
         link: of a robot.
@@ -261,7 +261,7 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _from(folder: Path | None, path: Path) -> str:
-    """A path relative to the new file's folder."""
+    """Return a path relative to the new file's folder."""
     if folder is None or path.is_absolute():
         return str(path)
     return path_from(folder.resolve(), path.resolve())

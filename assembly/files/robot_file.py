@@ -44,7 +44,7 @@ MOST_FRAMES = 2000  # of a robot; its closures would take minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
-    """Robot of a robot file.
+    """Return the robot of a robot file.
 
     Args:
         path: a ``.toml`` file in the public format.
@@ -61,7 +61,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
 
 def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
-    """Robot of a robot file's root table.
+    """Return the robot of a robot file's root table.
 
     Args:
         root: the table; paths in it are relative to the folder of ``root.file``.
@@ -83,7 +83,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
 
 
 def declared_robot(root: Table, name: str) -> Robot:
-    """Robot of a root table as it is written; its closures are not checked.
+    """Return the robot of a root table as it is written; its closures are not checked.
 
     Args:
         root: of a robot file.
@@ -230,13 +230,13 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Lengths or angles, zero where absent."""
+    """Return the lengths or angles, zero where absent."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
 
 def _limits(table: Table) -> tuple[float, float] | None:
-    """Least and largest coordinate that may be commanded, None if not given."""
+    """Return least and largest coordinate that may be commanded, None if not given."""
     if not table.has("limits"):
         return None
     least, most = table.array("limits", (2,), "rad or m", largest=LARGEST_LENGTH)
@@ -247,7 +247,7 @@ def _limits(table: Table) -> tuple[float, float] | None:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Standard deviations of the geometric error, None where none are given."""
+    """Return standard deviations of the geometric error, None where none are given."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -258,7 +258,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Translation and rotation vector, given as such or by ``dh``."""
+    """Return the translation and rotation vector, given as such or by ``dh``."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -351,7 +351,7 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
 
 def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
-    """The content of a robot file.
+    """Return the content of a robot file.
 
     Args:
         robot: any.
@@ -382,7 +382,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """The content of ``[[frame]]``, defaults left out.
+    """Return the content of ``[[frame]]``, defaults left out.
 
     Args:
         frame: of a robot.
@@ -442,5 +442,5 @@ def _key(name: str) -> str:
 
 
 def _escaped(c: str) -> str:
-    """A character as it stands between double quotes."""
+    """Return a character as it stands between double quotes."""
     return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

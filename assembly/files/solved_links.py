@@ -65,7 +65,7 @@ def _note(done: int, total: int) -> None:
 
 
 def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
-    """The link of one frame, with what its mesh or its library gives.
+    """Return the link of one frame, with what its mesh or its library gives.
 
     Args:
         frame: one with a mesh or a library link.
@@ -95,7 +95,7 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
 
 def _from_library(link: LibraryLink) -> LibraryLink:
-    """The link with its entry's compliance."""
+    """Return the link with its entry's compliance."""
     from stiffness.report.library import read_compliance
 
     C = read_compliance(link.library, link.key)
@@ -104,7 +104,7 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
-    """The finite elements of a mesh link; those of this process are kept."""
+    """Return the finite elements of a mesh link; those of this process are kept."""
     from stiffness.fem.fea import FemOptions
     from stiffness.surface.surface_files import named_solid
 
@@ -151,7 +151,7 @@ def _as_stored(solved: "MeshedLink") -> "MeshedLink":
 
 
 def _digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return SHA-256 of a file."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -176,5 +176,5 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
 
 
 def _point(p: NDArray) -> str:
-    """Coordinates for a message."""
+    """Return the coordinates for a message."""
     return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

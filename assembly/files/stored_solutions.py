@@ -59,12 +59,12 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
 
 @cache
 def _program() -> str:
-    """SHA-256 of what reads surfaces and solves links."""
+    """Return SHA-256 of what reads surfaces and solves links."""
     return sources_hash((forcefit.inputs, stiffness, assembly.files), _LIBRARIES)
 
 
 def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution:
-    """The solution of a key: from the disk, or solved and stored.
+    """Return the solution of a key: from the disk, or solved and stored.
 
     Args:
         key: of :func:`solution_key`.
@@ -102,7 +102,7 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """A stored solution; None if there is none, or a file of something else."""
+    """Return a stored solution; None if there is none, or a file of something else."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
@@ -139,7 +139,7 @@ def _remove_unused(folder: Path) -> None:
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:
-    """A value in terms of JSON; arrays are appended to a list and numbered."""
+    """Return a value in terms of JSON; arrays are appended to a list and numbered."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": str(len(arrays) - 1)}
@@ -160,7 +160,7 @@ def _encoded(value: Any, arrays: list[NDArray]) -> Any:
 
 
 def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
-    """The value of :func:`_encoded`."""
+    """Return the value of :func:`_encoded`."""
     if isinstance(value, list):
         return [_decoded(v, arrays) for v in value]
     if not isinstance(value, dict):
@@ -177,7 +177,7 @@ def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
 
 @cache
 def _kinds() -> dict[str, Any]:
-    """Classes that a solution is made of."""
+    """Return the classes that a solution is made of."""
     from stiffness.fem.adaptive_step import Level
     from stiffness.fem.condensation import Condensed
     from stiffness.fem.elements import Elements

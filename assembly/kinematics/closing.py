@@ -60,7 +60,7 @@ def closing_of(
 
 
 def rest_in(robot: Robot, name: str) -> Robot:
-    """The robot with what its closure leaves open as a geometric error of a frame.
+    """Return robot with what its closure leaves open as a geometric error of a frame.
 
     Args:
         robot: whose passive joints are moved as near to closing as they come, its
@@ -95,7 +95,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
 
 
 def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
-    """The robot whose frame ends at X of where it did, and errs by the inverse."""
+    """Return robot whose frame ends at X of where it did, and errs by the inverse."""
     frame = robot.frames[row]
     body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
     error = frame.geometric_error
@@ -120,7 +120,7 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """The robot at drive coordinates that do not fit, its elastic drives preloaded.
+    """Return robot at drive coordinates that do not fit, its elastic drives preloaded.
 
     Args:
         robot: with redundant drives that are elastic.
@@ -174,7 +174,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
 
 
 def _positioned(robot: Robot, q: NDArray) -> Robot:
-    """The robot with other coordinates at home."""
+    """Return the robot with other coordinates at home."""
     moves = mobile(robot)
     frames = tuple(
         replace(frame, position=float(value)) if moving else frame
@@ -184,7 +184,7 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """(n,) bool: drives that together hold the robot, the first in its file."""
+    """Return (n,) bool: drives that together hold the robot, the first in its file."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
@@ -199,5 +199,5 @@ def _independent(robot: Robot, T: NDArray) -> NDArray:
 
 
 def _rank(A: NDArray) -> int:
-    """Number of singular values that are not rounding."""
+    """Return the number of singular values that are not rounding."""
     return int(np.linalg.matrix_rank(A, tol=1e-6)) if A.size else 0

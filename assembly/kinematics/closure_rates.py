@@ -55,7 +55,7 @@ def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArra
 
 
 def locked_closures(robot: Robot, T: NDArray) -> NDArray:
-    """Velocities of closures for unit rates of the joints that no drive holds.
+    """Return velocities of closures for unit rates of the joints that no drive holds.
 
     Args:
         robot: of n frames, p of them passive joints, with c closures.
@@ -69,13 +69,13 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
 
 
 def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
-    """(k,) ranks of :func:`locked_closures`."""
+    """Return the (k,) ranks of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
 
 
 def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
-    """How many drives a robot has beyond those that hold it.
+    """Return how many drives a robot has beyond those that hold it.
 
     Args:
         robot: of n frames.

@@ -13,7 +13,7 @@ from assembly.kinematics.track import Track
 
 
 def tree_of(fields: dict[str, Any]) -> Any:
-    """A robot's tree for C++.
+    """Return a robot's tree for C++.
 
     Args:
         fields: arrays and numbers of ``Tree`` in ``assembly/kernels/records.h``.

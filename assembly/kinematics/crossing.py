@@ -55,13 +55,13 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=16)
 def home_rank(robot: Robot) -> int:
-    """Rank of the locked closures at home or near by."""
+    """Return the rank of the locked closures at home or near by."""
     home = home_posture(robot)
     return rank_near(robot, home.coordinates, home.transforms)
 
 
 def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Signs of B (k, m, p) between the bases of A, and how alike both bases are.
+    """Return signs of B (k, m, p) between the bases of A, and how alike both bases are.
 
     Returns:
         (k,) signs of the determinants; (k,) 1 where both bases span the same, 0 where
@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The same with bases carried along the paths from home; the least alike."""
+    """Return the same with bases carried along the paths from home; the least alike."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):
@@ -99,7 +99,7 @@ def _along(
 
 
 def _part(home: Posture, target: Target, part: float) -> Target:
-    """The target at a part of the straight line from home to it."""
+    """Return the target at a part of the straight line from home to it."""
 
     def between(start: NDArray, end: NDArray | None) -> NDArray | None:
         return None if end is None else start + part * (end - start)

@@ -29,7 +29,7 @@ class Mobility:
 
 
 def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
-    """Mobility and overconstraint at a posture.
+    """Return the mobility and overconstraint at a posture.
 
     Args:
         posture: where the robot stands.

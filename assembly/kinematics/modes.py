@@ -50,7 +50,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """The target, and components of the pose that it does not give as they are."""
+    """Return target, and components of the pose that it does not give as they are."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)

@@ -52,7 +52,7 @@ def size_of(robot: Robot) -> float:
 
 
 def mobile(robot: Robot) -> NDArray:
-    """(n,) bool: joints that are not fixed."""
+    """Return the (n,) bool: joints that are not fixed."""
     return np.array([f.joint != "fixed" for f in robot.frames])
 
 
@@ -75,7 +75,7 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def _tree(robot: Robot) -> dict[str, Any]:
-    """Fields of a compiled tree, once for each robot."""
+    """Return the fields of a compiled tree, once for each robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     # a joint's motion comes after its own frame
     carries = robot.on_path - np.eye(len(robot.frames))
@@ -96,7 +96,7 @@ def _tree(robot: Robot) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _tree_side_by_side(robot: Robot) -> Any:
-    """The same for C++."""
+    """Return the same for C++."""
     return tree_of(_tree(robot))
 
 

@@ -33,7 +33,7 @@ class CutRobot:
     back: NDArray
 
     def cut(self, posture: Posture) -> Posture:
-        """The same posture with a frame for each piece; many in one likewise.
+        """Return the same posture with a frame for each piece; many in one likewise.
 
         Args:
             posture: of the robot that was cut, arrays (..., n) and (..., n, 4, 4).
@@ -58,7 +58,7 @@ class CutRobot:
 
 
 def cut_beams(robot: Robot) -> CutRobot:
-    """A robot with a frame for every piece of its beams.
+    """Return a robot with a frame for every piece of its beams.
 
     Args:
         robot: of n frames.
@@ -80,7 +80,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Frames of one body from its base out, and how far each is from its tip."""
+    """Return frames of one body from its base out, and how far each is from its tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

@@ -60,7 +60,7 @@ class Posture:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Pose of the platform and coordinates of the drives."""
+        """Return the pose of the platform and coordinates of the drives."""
         if self.transforms.ndim > 3:
             return {"postures": str(self.transforms.shape[:-3])}
         frames = self.robot.frames
@@ -106,12 +106,12 @@ class Posture:
         return distinct, which
 
     def pose(self) -> dict[str, float]:
-        """Nominal platform pose by component, rotation vector in base axes."""
+        """Return nominal platform pose by component, rotation vector in base axes."""
         return dict(zip(POSE, pose_components(self.platform).tolist(), strict=True))
 
 
 def together(postures: Sequence[Posture]) -> Posture:
-    """Many postures of one robot in one.
+    """Return many postures of one robot in one.
 
     Args:
         postures: k of them, k > 0.
@@ -147,7 +147,7 @@ def _maps_to(transforms: NDArray, platform: int) -> NDArray:
 
 @lru_cache(maxsize=2)
 def _paths(transforms: Unchanged, platform: int) -> NDArray:
-    """The same of many postures, once for all robots that stand there."""
+    """Return the same of many postures, once for all robots that stand there."""
     paths = _maps_to(transforms.numbers, platform)
     paths.flags.writeable = False
     return paths
@@ -157,7 +157,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Rows with distinct coordinates of both, and which of them each row has."""
+    """Return rows with distinct coordinates of both, and which of them each row has."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -181,7 +181,7 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """The key of what is computed of postures and arrays, whatever else a robot has.
+    """Return key of what is computed of postures and arrays, whatever else a robot has.
 
     Args:
         postures: one, or many in one; of them the transforms and the frames' parents.
@@ -205,7 +205,7 @@ def pose_components(T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def home_posture(robot: Robot) -> Posture:
-    """The home pose: actuated joints at ``position``, passive ones solved from it.
+    """Return home pose: actuated joints at ``position``, passive ones solved from it.
 
     Args:
         robot: any.
@@ -246,7 +246,7 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """The mismatch in the unit in which it is too large, and what is expected."""
+    """Return mismatch in the unit in which it is too large, and what is expected."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
@@ -266,7 +266,7 @@ def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
 
 @lru_cache(maxsize=64)
 def home_is_singular(robot: Robot) -> bool:
-    """Whether operation modes meet at home; see :func:`is_singular`."""
+    """Return whether operation modes meet at home; see :func:`is_singular`."""
     home = home_posture(robot)
     return is_singular(robot, home.coordinates, home.transforms)
 
@@ -276,7 +276,7 @@ def place_robot(
     pose: Mapping[str, float] | None = None,
     joints: Mapping[str, float] | None = None,
 ) -> Posture:
-    """The posture of a nominal platform pose, or of actuated coordinates.
+    """Return the posture of a nominal platform pose, or of actuated coordinates.
 
     The closures are followed from the home pose along a straight line, so the assembly
     mode is the home pose's.  What the input leaves undetermined stays near home.  At a
@@ -312,7 +312,7 @@ def place_robot(
 
 
 def pose_target(pose: Mapping[str, float]) -> Target:
-    """A single platform pose as a target; see :func:`place_robot`."""
+    """Return a single platform pose as a target; see :func:`place_robot`."""
     goal = np.full((1, 6), np.nan)
     for name, value in pose.items():
         if name not in POSE:
@@ -323,7 +323,7 @@ def pose_target(pose: Mapping[str, float]) -> Target:
 
 
 def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
-    """Actuated coordinates as a target; see :func:`place_robot`."""
+    """Return the actuated coordinates as a target; see :func:`place_robot`."""
     actuated = [f.name for f in robot.frames if f.actuated]
     goal = np.where([f.actuated for f in robot.frames], robot.positions, np.nan)
     for name, value in joints.items():
@@ -335,7 +335,7 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
 
 
 def _finite(whose: str, value: float, largest: float) -> float:
-    """The value, refused if it is not a finite number, or beyond any machine."""
+    """Return the value, refused if it is not a finite number, or beyond any machine."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
     if abs(value) > largest:
@@ -347,7 +347,7 @@ def _finite(whose: str, value: float, largest: float) -> float:
 def place_many(
     robot: Robot, poses: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Postures of many nominal platform poses at once.
+    """Return the postures of many nominal platform poses at once.
 
     Args:
         robot: any.
@@ -366,7 +366,7 @@ def place_many(
 def place_many_joints(
     robot: Robot, coordinates: ArrayLike
 ) -> tuple[list[Posture | None], list[str]]:
-    """Postures of many sets of actuated coordinates at once.
+    """Return the postures of many sets of actuated coordinates at once.
 
     Args:
         robot: of n frames.
@@ -398,7 +398,7 @@ def _follow_many(
 
 
 def _follow(robot: Robot, target: Target) -> Track:
-    """Targets followed from home, in a mode where modes meet there."""
+    """Return the targets followed from home, in a mode where modes meet there."""
     home = home_posture(robot)
     pose = pose_components(home.platform)
     singular = home_is_singular(robot)
@@ -440,7 +440,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
 
 
 def _posture(robot: Robot, track: Track, i: int) -> Posture:
-    """Row i of a track, its arrays locked."""
+    """Return the row i of a track, its arrays locked."""
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)

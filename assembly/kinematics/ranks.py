@@ -16,7 +16,7 @@ UNBOUNDED = 1e-8  # [rad, m] of the platform for a unit of a motion nothing resi
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
-    """Relative size below which a singular value of closures counts as zero.
+    """Return the relative size below which a singular value of closures counts as zero.
 
     Args:
         mismatch: [rad, m] nominal closure error left.
@@ -29,7 +29,7 @@ def rank_tolerance(mismatch: float, least: float = RANK) -> float:
 
 
 def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
-    """How many singular values do not count as zero.
+    """Return how many singular values do not count as zero.
 
     Args:
         values: (k,) the largest first.

@@ -33,7 +33,7 @@ _ROUNDING = 1e-16  # [-] below which the series of the second derivative ends
 
 
 def exponential(screw: ArrayLike) -> NDArray:
-    """Finite motion of a constant screw acting for unit time.
+    """Return the finite motion of a constant screw acting for unit time.
 
     Args:
         screw: (..., 6) ``[RX RY RZ TX TY TZ]`` [rad, m].
@@ -51,7 +51,7 @@ def exponential(screw: ArrayLike) -> NDArray:
 
 
 def logarithm(T: ArrayLike) -> NDArray:
-    """Constant screw that makes a finite motion in unit time.
+    """Return the constant screw that makes a finite motion in unit time.
 
     Args:
         T: (..., 4, 4) of rotations by less than pi.
@@ -80,7 +80,7 @@ def turn_jacobian(turn: ArrayLike) -> NDArray:
 
 
 def left_jacobian(screw: ArrayLike) -> NDArray:
-    """Small motion, in the axes before the motion, per change of a screw.
+    """Return small motion, in the axes before the motion, per change of a screw.
 
     Args:
         screw: (..., 6) [rad, m].
@@ -105,7 +105,7 @@ def left_jacobian(screw: ArrayLike) -> NDArray:
 
 
 def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
-    """Work of a wrench on the second-order part of a change of a screw.
+    """Return the work of a wrench on the second-order part of a change of a screw.
 
     To second order ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``; this is the matrix
     of ``w.D(h, h)``, from the series of J in brackets, to rounding.
@@ -147,7 +147,7 @@ def _orders(screws: NDArray) -> int:
 
 
 def bracket(screw: ArrayLike) -> NDArray:
-    """(..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
+    """Return (..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
     s = np.asarray(screw, dtype=float)
     A = np.zeros((*s.shape[:-1], 6, 6))
     A[..., :3, :3] = A[..., 3:, 3:] = skew(s[..., :3])
@@ -165,7 +165,7 @@ def bracket_form(wrench: ArrayLike) -> NDArray:
 
 
 def stumpff(turn: NDArray) -> list[NDArray]:
-    """Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
+    """Return Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
 
     Args:
         turn: (..., 3) [rad] rotation vectors.

@@ -30,7 +30,7 @@ _NOISE = 1e3  # singular values that this times what is left open may make
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
-    """Whether the robot with locked drives keeps more freedoms than near by.
+    """Return whether the robot with locked drives keeps more freedoms than near by.
 
     Args:
         robot: of n frames.
@@ -47,7 +47,7 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
 
 
 def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
-    """The largest rank of the locked closures at a posture and at those near by.
+    """Return the largest rank of the locked closures at a posture and at those near by.
 
     Args:
         robot: of n frames.
@@ -71,7 +71,7 @@ def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
 
 
 def _steps_aside(robot: Robot, T: NDArray) -> NDArray:
-    """(some, n) [rad or m] joint steps that keep the closures at first order."""
+    """Return (some, n) [rad or m] joint steps that keep the closures at first order."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

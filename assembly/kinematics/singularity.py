@@ -109,7 +109,7 @@ class Singularities:
 
 
 def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
-    """Distances to singularities at many postures.
+    """Return the distances to singularities at many postures.
 
     Args:
         robot: of n frames; only its geometry matters.
@@ -133,7 +133,7 @@ class _Ranks:
 
 @lru_cache(maxsize=16)
 def _generic_ranks(robot: Robot) -> _Ranks:
-    """The largest ranks at home and at perturbed drives."""
+    """Return the largest ranks at home and at perturbed drives."""
     home = home_posture(robot)
     driven = np.array([f.actuated for f in robot.frames])
     unit = np.array([
@@ -153,7 +153,7 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 
 def _rank(A: NDArray, least: float = _RANK) -> int:
-    """How many singular values are above rounding, or above another size."""
+    """Return how many singular values are above rounding, or above another size."""
     return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
@@ -168,7 +168,7 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """The distances, with the ranks that they would have away from singularities."""
+    """Return distances, with the ranks that they would have away from singularities."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
@@ -202,7 +202,7 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Ranks where closures leave more motions than they generally do."""
+    """Return the ranks where closures leave more motions than they generally do."""
     motions = _rank(moved, SINGULAR)
     # motions that move drives alone everywhere are no serial singularity here either
     always = generic.motions - generic.platform

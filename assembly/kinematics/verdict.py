@@ -24,7 +24,7 @@ _ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be passed
 def verdicts(
     robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray | None = None
 ) -> list[tuple[str, str]]:
-    """Status and reason of postures that were reached.
+    """Return the status and reason of postures that were reached.
 
     Args:
         robot: of n frames.
@@ -65,7 +65,7 @@ def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
 
 
 def limits_passed(robot: Robot, q: NDArray) -> str:
-    """Joints beyond their limits, by how much and what the limits are.
+    """Return the joints beyond their limits, by how much and what the limits are.
 
     Args:
         robot: of n frames.

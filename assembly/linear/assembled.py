@@ -96,7 +96,7 @@ class Assembly(Solution[N]):
         return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each frame, or each point, columns (variable, component)."""
+        """Return a row for each frame, or each point, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
@@ -253,7 +253,7 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Whether these, as of :func:`solve_assembly`, are its loads."""
+        """Return whether these, as of :func:`solve_assembly`, are its loads."""
         other = all_loads(self.posture, load, bodies, gravity)
         return np.array_equal(other.body, self.frame_loads.body) and np.array_equal(
             other.joint, self.frame_loads.joint
@@ -343,12 +343,12 @@ def _by_frames(screws: NDArray) -> NDArray:
 
 
 def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
-    """Matrices (..., a, b) times vectors (..., b)."""
+    """Return the matrices (..., a, b) times vectors (..., b)."""
     return (matrices @ vectors[..., None])[..., 0]
 
 
 def without_rounding(wrenches: NDArray) -> NDArray:
-    """Wrenches without components that are rounding of the others.
+    """Return the wrenches without components that are rounding of the others.
 
     Args:
         wrenches: (..., n, 6) [N m, N] of the n bodies of a robot.
@@ -368,7 +368,7 @@ def all_loads(
     bodies: ArrayLike | None,
     gravity: ArrayLike | None,
 ) -> FrameLoads:
-    """Loads on all small screws, from the arguments of ``solve_assembly``.
+    """Return the loads on all small screws, from the arguments of ``solve_assembly``.
 
     Args:
         posture: where the robot stands.

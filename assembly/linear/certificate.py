@@ -122,7 +122,7 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """(2,) [rad, m] largest error accepted of the platform screw."""
+    """Return the (2,) [rad, m] largest error accepted of the platform screw."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 
@@ -152,7 +152,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
     residual = float(np.linalg.norm(open_closures)) + assembly.rounding
 
     def unloaded(joints: VirtualJoints) -> MovingCones:
-        """Clearances on which the energy does not depend."""
+        """Return the clearances on which the energy does not depend."""
         columns, start, group, room = _room(assembly, joints, gap)
         free = room >= 1.0
         columns = columns[:, free]
@@ -198,7 +198,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 def _room(
     assembly: Assembly, joints: VirtualJoints, gap: float
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Room that least energy leaves to the clearances.
+    """Return the room that least energy leaves to the clearances.
 
     Returns:
         Clearances' columns, where they start, their cones, and the room (nu,) left: 1

@@ -71,7 +71,7 @@ def virtual_joints(
     robot: Robot, compliant: Compliant = "elastic",
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Columns of all that may move.
+    """Return the columns of all that may move.
 
     Args:
         robot: of n frames.
@@ -115,7 +115,7 @@ def _parts(robot: Robot) -> tuple:
 def _virtual_joints(
     key: _JointsKey, compliant: Compliant, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
-    """The columns, once for all robots of the same parts."""
+    """Return the columns, once for all robots of the same parts."""
     robot = key.robot
     bounds = clearance_bounds(robot, compliant)
     scaled = scales_with_margin(robot)
@@ -145,7 +145,7 @@ def _virtual_joints(
 
 
 def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDArray]:
-    """Columns of links and springs, and which of them are links'."""
+    """Return the columns of links and springs, and which of them are links'."""
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
         for i, C in enumerate(compliances):
@@ -158,7 +158,7 @@ def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDAr
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Columns of the bounded clearances, their group and whether they scale."""
+    """Return columns of the bounded clearances, their group and whether they scale."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -178,7 +178,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray) -> NDArray:
-    """Unit columns of the motions without bound."""
+    """Return the unit columns of the motions without bound."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
@@ -186,7 +186,7 @@ def _free(bounds: NDArray) -> NDArray:
 
 
 def in_reference_lengths(size: float) -> NDArray:
-    """Factors that make lengths of screws comparable with angles.
+    """Return the factors that make lengths of screws comparable with angles.
 
     Args:
         size: [m] reference length.
@@ -237,7 +237,7 @@ class Linearisation:
 
 
 def linearise(posture: Posture) -> Linearisation:
-    """The assembly constraints (19)-(20) at a posture.
+    """Return the assembly constraints (19)-(20) at a posture.
 
     Args:
         posture: where the robot stands.

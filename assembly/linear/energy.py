@@ -130,7 +130,7 @@ def solve_assembly(
 
 
 def with_free_own_axes(assembly: Assembly) -> Assembly:
-    """The least energy when compliant joints turn freely about their own axis.
+    """Return the least energy when compliant joints turn freely about their own axis.
 
     Args:
         assembly: of many points.
@@ -144,7 +144,7 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
 
 
 def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
-    """Points that were solved each by itself, in one.
+    """Return the points that were solved each by itself, in one.
 
     Args:
         posture: k postures, of a robot that may differ from the points' in its springs
@@ -167,7 +167,7 @@ def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Ass
 
 
 def failure_status(error: Exception) -> str:
-    """The status of a posture without a solution.
+    """Return the status of a posture without a solution.
 
     Args:
         error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
@@ -252,7 +252,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """(k,) bool, points that a bound which was left out may hold."""
+    """Return the (k,) bool, points that a bound which was left out may hold."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -316,7 +316,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Rows of k points, by the compiled method, or left to the reference."""
+    """Return the rows of k points, by the compiled method, or left to the reference."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -335,7 +335,7 @@ def _compiled(
 
 
 def _empty(joints: VirtualJoints, count: int) -> _Rows:
-    """Rows of k points to fill, in the kernel's order."""
+    """Return the rows of k points to fill, in the kernel's order."""
     return {
         "outcome": np.zeros(count, dtype=np.int64),
         "energy": np.zeros(count),
@@ -392,7 +392,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Many assemblies; they see what is written into the rows later."""
+    """Return many assemblies; they see what is written into the rows later."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}

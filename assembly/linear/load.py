@@ -64,7 +64,7 @@ class FrameLoads:
         return full.reshape(*full.shape[:-1], -1, 6)
 
     def rows(self) -> NDArray:
-        """The loads as compiled functions read them.
+        """Return the loads as compiled functions read them.
 
         Returns:
             (k, 2, n, 6) [N m, N] on bodies and on joints; one row where it serves all.
@@ -94,7 +94,7 @@ def loads_on_frames(
     bodies: ArrayLike | None = None,
     carried: ArrayLike | None = None,
 ) -> FrameLoads:
-    """Loads on all small screws of a robot.
+    """Return the loads on all small screws of a robot.
 
     Args:
         posture: where it stands, of n frames; or many postures.  Leading dimensions, of
@@ -167,7 +167,7 @@ def _beyond(robot: Robot) -> NDArray:
 
 
 def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
-    """(..., n, 6) wrenches that act at arms (..., n, 3), read at the origin."""
+    """Return (..., n, 6) wrenches that act at arms (..., n, 3), read at the origin."""
     read = wrenches.copy()
     x, y, z = (arms[..., a] for a in range(3))
     fx, fy, fz = (wrenches[..., a] for a in range(3, 6))
@@ -297,7 +297,7 @@ def _masses(robot: Robot) -> NDArray:
 
 
 def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
-    """Loads of a platform load and of weight, at one posture or at many.
+    """Return the loads of a platform load and of weight, at one posture or at many.
 
     Args:
         postures: one, or R of them in one.
@@ -330,7 +330,7 @@ def _loads_with_weight(content: Content) -> FrameLoads:
 def with_distributed(
     loads: FrameLoads, posture: Posture, gravity: ArrayLike
 ) -> FrameLoads:
-    """Loads that know which part of them is the links' own weight.
+    """Return the loads that know which part of them is the links' own weight.
 
     Args:
         loads: with :func:`weights` among them.

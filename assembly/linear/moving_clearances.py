@@ -46,7 +46,7 @@ class Asked:
 
 
 def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], NDArray]:
-    """Bounds of k points by the compiled search.
+    """Return the bounds of k points by the compiled search.
 
     Args:
         assembly: of k points.
@@ -128,7 +128,7 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
-    """Places of one assumption, once for each robot."""
+    """Return the places of one assumption, once for each robot."""
     rigid: Compliant = "free" if assumption == "free" else "rigid"
     moving, all_of = structure_of(robot, rigid)[1], structure_of(robot)[1]
     loaded = structure_of(robot, "hinged")[1] if assumption == "free" else all_of
@@ -148,7 +148,7 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Frame and axis of every column."""
+    """Return the frame and axis of every column."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 

@@ -47,7 +47,7 @@ def nearest_pose(
     offset: ArrayLike = (0.0, 0.0, 0.0),
     method: Method = "compiled",
 ) -> tuple[Assembly, bool]:
-    """The assembly of the same energy whose pose deviates least.
+    """Return the assembly of the same energy whose pose deviates least.
 
     Args:
         assembly: of least energy.
@@ -133,7 +133,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """The assembly with other unloaded clearances, free motions following suit."""
+    """Return assembly with other unloaded clearances, free motions following suit."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v
@@ -144,7 +144,7 @@ def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> A
 
 
 def _moves(free: _FreeClearances, method: Method) -> bool:
-    """Whether the closures leave the platform free to move."""
+    """Return whether the closures leave the platform free to move."""
     projected = free.map - free.map @ free.rows.T @ free.rows
     U, S, _ = np.linalg.svd(projected, full_matrices=False)
     directions = U.T[S > _STILL]

@@ -183,7 +183,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Compiled bounds; one by one what that leaves of what has a solution."""
+    """Return compiled bounds; one by one what that leaves of what has a solution."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == "ok"
@@ -203,7 +203,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
-    """The bounds of a set that is set up in numpy."""
+    """Return the bounds of a set that is set up in numpy."""
     reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(

@@ -96,7 +96,7 @@ class _Tree:
 
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, compliant: Compliant) -> Structure:
-    """The arrays, once for all robots that differ in their errors alone."""
+    """Return the arrays, once for all robots that differ in their errors alone."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)

@@ -133,7 +133,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(taken, known)
 
     def in_columns(self, joints: VirtualJoints) -> Self:
-        """Many with the columns of other virtual joints.
+        """Return many with the columns of other virtual joints.
 
         Args:
             joints: those of some of the points apart.
@@ -162,7 +162,7 @@ class Solution(PointResults, Generic[N]):
     def with_held(
         self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
     ) -> Self:
-        """Many of which bounds of passive joints' own motion hold some.
+        """Return many of which bounds of passive joints' own motion hold some.
 
         Args:
             rows: of those, in order.

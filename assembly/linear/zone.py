@@ -65,7 +65,7 @@ class Zone(PointResults, Generic[N]):
     }
 
     def _figures(self) -> Figures:
-        """The margin, or the largest there is."""
+        """Return the margin, or the largest there is."""
         if not self.of_many:
             margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
             return {"margin": margin, "bound": bound, "method": self.method}
@@ -126,7 +126,7 @@ def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
     errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Zone:  # fmt: skip
-    """Factor on all clearances at which a rigid manipulator just assembles.
+    """Return the factor on all clearances at which a rigid manipulator just assembles.
 
     Args:
         posture: where the robot stands; or many postures of one robot.

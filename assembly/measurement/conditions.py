@@ -211,7 +211,7 @@ def as_declared(
     covariates: Mapping[str, ArrayLike] | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
-    """Conditions of a robot as its file declares it.
+    """Return the conditions of a robot as its file declares it.
 
     Args:
         postures: one, or many with arrays of R rows.

@@ -18,7 +18,7 @@ CONVERGED = 1e-11  # relative change of a contact's deflection
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """The posture with linear springs of the laws' secant compliance in series."""
+    """Return posture with linear springs of the laws' secant compliance in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -44,17 +44,17 @@ def secants(
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
-    """[rad or m] under a load >= 0."""
+    """Return the [rad or m] under a load >= 0."""
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 
 def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
-    """(n, 6) [N m, N] through every joint, in the frames' axes."""
+    """Return the (n, 6) [N m, N] through every joint, in the frames' axes."""
     return assembly.joint_wrenches
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """(6n, s) unit screws of the joints with a contact law."""
+    """Return the (6n, s) unit screws of the joints with a contact law."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)
@@ -65,7 +65,7 @@ def contact_columns(conditions: Conditions) -> NDArray:
 def contact_deflections(
     laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Deflections d of contacts, c |d|^n sign(d) = w + A d.
+    """Return the deflections d of contacts, c |d|^n sign(d) = w + A d.
 
     They minimise a strictly convex function (A is negative semidefinite): Newton's
     method, each step halved until the gradient decreases.

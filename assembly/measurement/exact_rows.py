@@ -40,7 +40,7 @@ _BATCH = 100  # rows, so that memory stays small
 def solve_rows(
     conditions: Conditions, linear_deflections: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Platform screws of finite motions under every row's loads.
+    """Return the platform screws of finite motions under every row's loads.
 
     Args:
         conditions: R rows of a robot without clearances, solved as if ``exact``.
@@ -72,7 +72,7 @@ def solve_rows(
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """(R, 6) platform screws, and (R,) whether they converged."""
+    """Return the (R, 6) platform screws, and (R,) whether they converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
@@ -115,7 +115,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
 
 
 def _lever_arms(rows: Rows) -> NDArray:
-    """(q,) [1 or m] factors from forces along free motions to moments."""
+    """Return the (q,) [1 or m] factors from forces along free motions to moments."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 
@@ -149,7 +149,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """The same conditions with a frame for every piece of a beam."""
+    """Return the same conditions with a frame for every piece of a beam."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

@@ -77,7 +77,7 @@ class History:
         return stands
 
     def lagged(self, name: str, time_constant: float, *, held: bool = False) -> NDArray:
-        """A variable behind a first-order lag that starts from zero at time 0.
+        """Return a variable behind a first-order lag that starts from zero at time 0.
 
         Args:
             name: of the variable.
@@ -108,7 +108,7 @@ class History:
         return response
 
     def fading(self, time_constant: float) -> NDArray:
-        """(H,) exp(-time / time constant): what is left of a state at time 0."""
+        """Return (H,) exp(-time / time constant): what is left of a state at time 0."""
         return np.exp(-self.values["time"] / time_constant)
 
     @cached_property
@@ -121,7 +121,7 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Rows of a table in the order measured.
+    """Return the rows of a table in the order measured.
 
     Args:
         values: (H,) each, by the public name of a variable, ``time`` among them; rows

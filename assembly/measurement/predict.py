@@ -70,7 +70,7 @@ class Prediction:
 
 
 def predict(conditions: Conditions) -> Prediction:
-    """The platform's deviation from its nominal pose at the reference point.
+    """Return the platform's deviation from its nominal pose at the reference point.
 
     Args:
         conditions: R rows.
@@ -104,7 +104,7 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Platform screws, some rows one by one.
+    """Return the platform screws, some rows one by one.
 
     Returns:
         (R, 6) screws, (R,) why there is none, (R,) whether clearances leave the screw
@@ -160,7 +160,7 @@ def _nearest_assembly(
 
 
 def with_second_order(conditions: Conditions) -> Conditions:
-    """Conditions with the second-order part of the declared errors added.
+    """Return the conditions with the second-order part of the declared errors added.
 
     Near a singularity a robot's own geometric errors move it so far that the linear
     model is wrong by more than a device's noise, whatever the load.  The difference of
@@ -186,7 +186,7 @@ def with_second_order(conditions: Conditions) -> Conditions:
 
 
 def with_finite_motions(conditions: Conditions) -> Conditions:
-    """Conditions with all added that finite motions change in the linear model.
+    """Return conditions with all added that finite motions change in the linear model.
 
     As :func:`with_second_order`, but row by row and under each row's loads: the
     declared model is then exact, and effects are added to first order.
@@ -201,7 +201,7 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """(R, 6) exact minus linear platform screws; zero where one has no solution.
+    """Return (R, 6) exact minus linear platform screws; zero where one has no solution.
 
     Places that give by laws of their own are left to the linear model.
 
@@ -217,7 +217,7 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 
 
 def with_rest_positions(conditions: Conditions) -> Conditions:
-    """Conditions with the rest positions of the clearances, by the least energy.
+    """Return conditions with the rest positions of the clearances, by the least energy.
 
     Effects may then be tried at the cost of a robot without clearances, correct to
     first order as long as the points of contact stay the same.
@@ -239,7 +239,7 @@ def with_rest_positions(conditions: Conditions) -> Conditions:
 
 
 def read(conditions: Conditions, screws: NDArray) -> NDArray:
-    """The device's readings of platform screws.
+    """Return the device's readings of platform screws.
 
     Args:
         conditions: R rows.
@@ -266,7 +266,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """(R, 3) vectors turned by one matrix, or each by its own."""
+    """Return the (R, 3) vectors turned by one matrix, or each by its own."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
@@ -354,7 +354,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Robots without clearances and yields.
+    """Return the robots without clearances and yields.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)

@@ -132,7 +132,7 @@ class Rows:
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
-        """(R, m) solution of the linear model for right sides (R, m)."""
+        """Return the (R, m) solution of the linear model for right sides (R, m)."""
         if not self.conditions.laws:
             return self.times(self.flexible.inverse, right_side)
         return np.einsum("rij,rj->ri", self._with_contacts, right_side)
@@ -287,7 +287,7 @@ class RowState:
         return parts.reshape(w.shape)
 
     def imbalance(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Residuals of the constitutive laws and of the equilibrium.
+        """Return the residuals of the constitutive laws and of the equilibrium.
 
         Returns:
             (2, R, n, 6) screws that compliances give less those of the iterate, (R, q)

@@ -26,7 +26,7 @@ _UNLOADED = 1e-9  # of the largest wrench of its kind: less is no load
 
 
 def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
-    """Conditions with clearances replaced by their screws under the load.
+    """Return the conditions with clearances replaced by their screws under the load.
 
     Args:
         conditions: R rows of a robot with clearances.
@@ -62,7 +62,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
 
 def with_clearances_at_rest(conditions: Conditions) -> Conditions:
-    """Conditions with clearances replaced by their screws at the rest positions.
+    """Return conditions with clearances replaced by their screws at the rest positions.
 
     Args:
         conditions: R rows of a robot with clearances, ``rest`` given.
@@ -89,7 +89,7 @@ def _component_bounds(robot: Robot) -> NDArray:
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Clearance screws in units of their bounds.
+    """Return the clearance screws in units of their bounds.
 
     Args:
         robot: of n frames.
@@ -106,7 +106,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """The robot with tight joints; bounds of passive joints' own motion stay.
+    """Return the robot with tight joints; bounds of passive joints' own motion stay.
 
     Args:
         robot: any.

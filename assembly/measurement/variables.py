@@ -18,7 +18,7 @@ LOADS = tuple(name.lower() for name in WRENCH)
 
 
 def variable(conditions: Conditions, name: str) -> NDArray:
-    """A variable in every row.
+    """Return a variable in every row.
 
     Args:
         conditions: R rows.
@@ -44,7 +44,7 @@ def variable(conditions: Conditions, name: str) -> NDArray:
 
 
 def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray]:
-    """The rows that conditions come after.
+    """Return the rows that conditions come after.
 
     Args:
         conditions: R rows.
@@ -64,7 +64,7 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
 
 def with_history(conditions: Conditions) -> Conditions:
-    """Conditions whose rows were measured one after the other, as a campaign's.
+    """Return conditions whose rows were measured one after the other, as a campaign's.
 
     Args:
         conditions: R rows, as declared.

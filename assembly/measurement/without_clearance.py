@@ -138,7 +138,7 @@ class Flexibility:
         return -(met.mT @ (inner @ through))
 
     def platform_of(self, columns: NDArray) -> NDArray:
-        """Platform screw that stress-free screws at the frames cause.
+        """Return the platform screw that stress-free screws at the frames cause.
 
         Args:
             columns: (6n, s) screws at the frames.
@@ -196,7 +196,7 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """(R, 6n) screws of bodies and joints under loads alone, nothing closed."""
+    """Return (R, 6n) screws of bodies and joints under loads alone, nothing closed."""
     # the same for all conditions that differ in errors alone
     if not loads:
         return None
@@ -221,7 +221,7 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """The same, once for the same rows."""
+    """Return the same, once for the same rows."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
@@ -264,7 +264,7 @@ def flexibility(postures: Posture) -> Flexibility:
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
-    """The system of every posture, and its inverse."""
+    """Return the system of every posture, and its inverse."""
     postures, (C_body, C_joint, _) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
@@ -300,7 +300,7 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """(c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
+    """Return (c, m, m) inverses on the range, and (c,) where the rank is ambiguous."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
@@ -313,7 +313,7 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _limits(postures: Posture, free: NDArray) -> NDArray:
-    """(q,) bounds of the free motions."""
+    """Return the (q,) bounds of the free motions."""
     bounds = component_bounds(clearance_bounds(postures.robot)).ravel()
     return bounds[np.abs(free).argmax(axis=0)]
 

@@ -71,7 +71,7 @@ class Yields:
         return np.column_stack(columns)
 
     def slope(self, through: NDArray) -> NDArray:
-        """(R, m, t) derivative of the deflections, by central differences."""
+        """Return (R, m, t) derivative of the deflections, by central differences."""
         slopes = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
         for k in range(through.shape[1]):
             step = _STEP * max(float(np.abs(through[:, k]).max(initial=0.0)), 1e-9)
@@ -130,7 +130,7 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Answers in which every yield gives by its law under what goes through it.
+    """Return answers in which every yield gives by its law under what goes through it.
 
     Args:
         conditions: R rows.

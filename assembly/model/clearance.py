@@ -25,7 +25,7 @@ _KEYS = ("tilt", "spin", "radial", "axial")
 
 
 def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
-    """Bounds of every joint's clearance.
+    """Return the bounds of every joint's clearance.
 
     Args:
         robot: of n frames.
@@ -73,7 +73,7 @@ def scales_with_margin(robot: Robot) -> NDArray:
 
 
 def has_bounded_motion(robot: Robot) -> bool:
-    """Whether some passive joint's own motion has a bound."""
+    """Return whether some passive joint's own motion has a bound."""
     own = ~scales_with_margin(robot)
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 

@@ -94,11 +94,11 @@ class ErrorSources:
         return np.where(self.kind == 0, uniform_values, normal_values)
 
     def values(self, standard: NDArray) -> NDArray:
-        """(..., m) [rad or m] errors that go with values s."""
+        """Return the (..., m) [rad or m] errors that go with values s."""
         return self.centre + self.scale * standard
 
     def uniforms(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """(count, m) numbers in [0, 1) of the draws ``first`` ..
+        """Return the (count, m) numbers in [0, 1) of the draws ``first`` ..
 
         Args:
             first: number of the first draw.
@@ -120,7 +120,7 @@ class ErrorSources:
         return self.values(self.standard(self.uniforms(first, count, seed, stream)))
 
     def errors(self, values: NDArray) -> NDArray:
-        """(..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
+        """Return (..., n, 6) [rad, m] delta l of every frame from values (..., m)."""
         full = np.zeros((*values.shape[:-1], len(self.robot.frames), 6))
         full[..., self.frame, self.component] = values
         return full if self.fixed is None else full + self.fixed
@@ -143,12 +143,12 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
-        """The same sources with other scales (m,) [rad or m]."""
+        """Return the same sources with other scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
 
 def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
-    """Generator of the random numbers of one draw.
+    """Return the generator of the random numbers of one draw.
 
     Args:
         seed: of all draws, below 2^64.
@@ -169,7 +169,7 @@ def tolerance_sources(
     robot: Robot, tolerances: NDArray, frames: tuple[str, ...] | None = None,
     distribution: str = "uniform", deviations: float = 3.0,
 ) -> ErrorSources:  # fmt: skip
-    """Sources within symmetric tolerances.
+    """Return the sources within symmetric tolerances.
 
     Args:
         robot: of n frames.
@@ -211,7 +211,7 @@ def tolerance_sources(
 def read_sources(
     path: Path | str, robot: Robot, fixed: NDArray | None = None
 ) -> ErrorSources:
-    """Error sources of a file; see ``docs/statistics.md``.
+    """Return the error sources of a file; see ``docs/statistics.md``.
 
     Args:
         path: TOML file with ``[[errors]]`` tables.
@@ -245,7 +245,7 @@ def read_sources(
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """The sources of one ``[[errors]]`` table: a row each, and the table."""
+    """Return the sources of one ``[[errors]]`` table: a row each, and the table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")

@@ -149,7 +149,7 @@ _SHAPES = {
 
 
 def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
-    """A read-only copy of an array.
+    """Return a read-only copy of an array.
 
     Args:
         value: anything that makes an array.
@@ -177,7 +177,7 @@ def between_origins(frame: Frame) -> NDArray:
 
 
 def beam_axis(frame: Frame) -> tuple[float, NDArray]:
-    """Length and direction of a frame's beam.
+    """Return the length and direction of a frame's beam.
 
     Args:
         frame: one with a :class:`BeamLink`.

@@ -14,7 +14,7 @@ _SAME_POINT = 1e-9  # [m] two origins nearer than this are one
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
-    """The robot with every link's length known and sound.
+    """Return the robot with every link's length known and sound.
 
     A beam runs between the two origins at home.  Below a prismatic joint that is not
     at zero there, the frame's translation is not that span: it is written out.
@@ -43,7 +43,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
 
 
 def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
-    """A beam of known length, its ``up`` checked."""
+    """Return a beam of known length, its ``up`` checked."""
     if link.length is None or link.axis is None:
         axis = _span(frame, shift)
         length = float(np.linalg.norm(axis))

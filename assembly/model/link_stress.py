@@ -47,7 +47,7 @@ class LinkStress:
 
 @lru_cache(maxsize=16)
 def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
-    """Links whose stress can be computed, in the robot's order of frames.
+    """Return the links whose stress can be computed, in the robot's order of frames.
 
     Args:
         robot: any.
@@ -67,7 +67,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Frames of :func:`stressed_links`, without solving any."""
+    """Return the frames of :func:`stressed_links`, without solving any."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -78,7 +78,7 @@ def stressed_names(robot: Robot) -> tuple[str, ...]:
 def peak_stresses(
     robot: Robot, wrenches: ArrayLike, at_tips: ArrayLike = 0.0
 ) -> NDArray:
-    """Largest von Mises stress in every link of known stress.
+    """Return the largest von Mises stress in every link of known stress.
 
     Args:
         robot: of n frames.
@@ -110,7 +110,7 @@ def peak_stresses(
 
 
 def _of_beam(frame: Frame) -> Callable[..., NDArray]:
-    """Peak stress of a beam."""
+    """Return the peak stress of a beam."""
     assert isinstance(frame.link, BeamLink)
     length, axis = beam_axis(frame)
     section, R = frame.link.section, section_axes(axis, frame.link.up)
@@ -125,7 +125,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
 
 
 def _of_mesh(frame: Frame, row: int) -> LinkStress:
-    """Peak stress of a link given by its surface."""
+    """Return the peak stress of a link given by its surface."""
     from stiffness.fem.stress import stress_influence, von_mises
 
     solved = mesh_solution(frame).solved

@@ -20,7 +20,7 @@ from stiffness.beam.sections import declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:
-    """Compliance of every body, K_E^-1 of eq. (6).
+    """Return the compliance of every body, K_E^-1 of eq. (6).
 
     Args:
         robot: of n frames.
@@ -66,7 +66,7 @@ def _compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Compliance of every joint, K_B^-1; zero where rigid, free or not given.
+    """Return compliance of every joint, K_B^-1; zero where rigid, free or not given.
 
     Args:
         robot: of n frames.
@@ -102,12 +102,12 @@ def compliance_factor(C: NDArray) -> NDArray:
 
 
 def own_screw(frame: Frame) -> NDArray:
-    """(6,) unit screw of a joint's own motion."""
+    """Return the (6,) unit screw of a joint's own motion."""
     return np.eye(6)[frame.own_axis]
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """K_B with a spring put in series in one direction of its own axes.
+    """Return K_B with a spring put in series in one direction of its own axes.
 
     Args:
         stiffness: (6, 6) declared, None if rigid.

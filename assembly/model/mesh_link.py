@@ -18,7 +18,7 @@ from stiffness.screws import rotation_matrix
 
 
 def mesh_solution(frame: Frame) -> MeshSolution:
-    """The finite elements of a frame's mesh link, as they were solved at loading.
+    """Return finite elements of a frame's mesh link, as they were solved at loading.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
@@ -51,7 +51,7 @@ def modulus_factor(frame: Frame) -> float:
 
 
 def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
-    """Stiffness of a frame's mesh link by finite elements, in the frame's axes.
+    """Return stiffness of a frame's mesh link by finite elements, in the frame's axes.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
@@ -72,7 +72,7 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
 
 
 def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
-    """Consistent mass of a frame's mesh link, by the finite elements of its K_E.
+    """Return consistent mass of a frame's mesh link, by the finite elements of its K_E.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink` that has a density.
@@ -92,7 +92,7 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def mesh_turn(frame: Frame, mesh_span: NDArray) -> NDArray:
-    """Rotation from a frame's mesh's axes to the frame's.
+    """Return the rotation from a frame's mesh's axes to the frame's.
 
     Args:
         frame: one with a :class:`assembly.model.robot.MeshLink`.
@@ -113,7 +113,7 @@ def mesh_rotation(
     up: tuple[float, float, float] | None = None,
     frame_up: tuple[float, float, float] | None = None,
 ) -> NDArray:
-    """Rotation from mesh axes to frame axes that lays one span along the other.
+    """Return rotation from mesh axes to frame axes that lays one span along the other.
 
     Args:
         mesh_span: (3,) [m] base to tip in the mesh's axes.
@@ -139,14 +139,14 @@ def mesh_rotation(
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Right-handed axes: first along, third as near to up as possible."""
+    """Return the right-handed axes: first along, third as near to up as possible."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])
 
 
 def _mesh(frame: Frame) -> MeshLink:
-    """The mesh link of a frame that has one."""
+    """Return the mesh link of a frame that has one."""
     if not isinstance(frame.link, MeshLink):
         raise ValueError(f"frame '{frame.name}' has no mesh link")
     return frame.link

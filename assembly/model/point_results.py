@@ -67,14 +67,14 @@ class PointResults:
         return points_dataset(arrays)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row for each point, columns (variable, component)."""
+        """Return a row for each point, columns (variable, component)."""
         from assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 
 
 def plain(values: Any) -> Any:
-    """Arrays as they are; of one point the number itself."""
+    """Return the arrays as they are; of one point the number itself."""
     if isinstance(values, np.ndarray):
         return values if values.ndim else values.item()
     return values.item() if isinstance(values, np.generic) else values

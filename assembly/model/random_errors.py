@@ -33,7 +33,7 @@ class ErrorDraw:
 
 
 def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
-    """Errors of one draw.
+    """Return the errors of one draw.
 
     Sizes are uniform between ``least`` and ``most``, frame by frame; the signs come
     from the same generator afterwards, so both conventions share their sizes.
@@ -62,7 +62,7 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Frames by full name, or by the part after a leg's dot in every leg.
+    """Return the frames by full name, or by the part after a leg's dot in every leg.
 
     Args:
         robot: any.

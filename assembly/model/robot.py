@@ -82,7 +82,7 @@ class Robot:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """The summary that is printed."""
+        """Return the summary that is printed."""
         kinds = ("actuated", "passive")
         count = [f"{sum(getattr(f, k) for f in self.frames)} {k}" for k in kinds]
         titles = [function.title for function in self.functions]
@@ -103,7 +103,7 @@ class Robot:
             self.index(name)
 
     def index(self, name: str) -> int:
-        """Row of a frame.
+        """Return the row of a frame.
 
         Args:
             name: the frame's name.
@@ -121,7 +121,7 @@ class Robot:
             raise BadInput(f"{self.name}: no frame {quoted(name)}{hint}") from None
 
     def frame(self, name: str) -> Frame:
-        """The frame of a name; see :meth:`index` for the error."""
+        """Return the frame of a name; see :meth:`index` for the error."""
         return self.frames[self.index(name)]
 
     @cached_property
@@ -172,13 +172,13 @@ class Robot:
         return tuple(dict.fromkeys([*self.session_effects, *named]))
 
     def without_effects(self) -> "Robot":
-        """The same robot with nothing but what its frames and closures declare."""
+        """Return same robot with nothing but what its frames and closures declare."""
         if not self.has_effects:
             return self
         return replace(self, effects={}, session_effects={}, functions=())
 
     def with_errors(self, errors: ArrayLike) -> "Robot":
-        """The same robot with other geometric errors.
+        """Return the same robot with other geometric errors.
 
         Args:
             errors: (n, 6) [rad, m] delta l of every frame.
@@ -193,7 +193,7 @@ class Robot:
         )
 
     def with_links(self, links: dict[str, Link]) -> "Robot":
-        """The same robot with other links at the frames named."""
+        """Return the same robot with other links at the frames named."""
         for name in links:
             self.index(name)
         frames = (replace(f, link=links.get(f.name, f.link)) for f in self.frames)
@@ -201,7 +201,7 @@ class Robot:
 
 
 def _has_clearance(frame: Frame) -> bool:
-    """Whether a clearance was given."""
+    """Return whether a clearance was given."""
     return frame.clearance is not None
 
 
@@ -255,7 +255,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """The given order if parents already come first, else by depth."""
+    """Return the given order if parents already come first, else by depth."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

@@ -98,7 +98,7 @@ class ForcedAssembly(Protocol):
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """An assembly over its frames and closures, with the platform's error.
+    """Return an assembly over its frames and closures, with the platform's error.
 
     Args:
         assembly: by the linear model or with finite motions.
@@ -135,7 +135,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Results of many points over ``point``.
+    """Return the results of many points over ``point``.
 
     Args:
         values: (k, ...) by the names of a sweep's variables.
@@ -148,7 +148,7 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """The variables over some dimensions as a table, a column for each component.
+    """Return variables over some dimensions as a table, a column for each component.
 
     Args:
         data: any, such as of this module; variables that lack one of the dimensions
@@ -194,7 +194,7 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
 
 def component_unit(unit: str, component: str) -> str:
-    """Unit of one component of a variable that mixes angles and lengths.
+    """Return the unit of one component of a variable that mixes angles and lengths.
 
     Args:
         unit: of the variable, such as ``"rad, m"``.

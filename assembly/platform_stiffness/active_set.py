@@ -61,13 +61,13 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def bound_forces(assembly: Assembly) -> NDArray:
-    """(cones,) [J] force on each clearance times its bound."""
+    """Return the (cones,) [J] force on each clearance times its bound."""
     forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
     return cone_sizes(forces, assembly.joints.group)
 
 
 def settle(assembly: Assembly) -> Assembly:
-    """The same equilibrium of (22) to rounding, pressed clearances at their bounds.
+    """Return same equilibrium of (22) to rounding, pressed clearances at their bounds.
 
     Args:
         assembly: the manipulator at least energy, as a cone solver found it.
@@ -93,7 +93,7 @@ def settle(assembly: Assembly) -> Assembly:
 
 
 def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
-    """The equilibrium with these clearances at their bounds."""
+    """Return the equilibrium with these clearances at their bounds."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)
@@ -119,7 +119,7 @@ def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
 
 
 def unknowns(assembly: Assembly) -> NDArray:
-    """(N,) springs, clearances and free motions."""
+    """Return the (N,) springs, clearances and free motions."""
     parts = (assembly.elastic, assembly.clearances, assembly.motions)
     return np.concatenate(parts)
 
@@ -131,7 +131,7 @@ def bounded_unknowns(joints: VirtualJoints) -> slice:
 
 
 def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
-    """(6 closures, N) closures in all unknowns."""
+    """Return the (6 closures, N) closures in all unknowns."""
     return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
 
 
@@ -150,19 +150,19 @@ def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
 
 
 def _normals(joints: VirtualJoints, u: NDArray, pressed: NDArray) -> NDArray:
-    """(N, pressed) normals of the pressed bounds in all unknowns."""
+    """Return the (N, pressed) normals of the pressed bounds in all unknowns."""
     normals = np.zeros((_count(joints), int(pressed.sum())))
     normals[bounded_unknowns(joints)] = boundary_normals(u, pressed, joints.group)
     return normals
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Number of unknowns."""
+    """Return the number of unknowns."""
     return bounded_unknowns(joints).stop + joints.free.shape[1]
 
 
 def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
-    """(6 closures + pressed, N) closures, then the bounds that are pressed."""
+    """Return (6 closures + pressed, N) closures, then the bounds that are pressed."""
     normals = _normals(assembly.joints, assembly.clearances, pressed)
     return np.vstack([closure_rows(assembly.linearisation, assembly.joints), normals.T])
 
@@ -170,7 +170,7 @@ def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
 def newton_step(
     H: NDArray, held: NDArray, left: NDArray, gradient: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The change that meets the conditions at the head of this module.
+    """Return the change that meets the conditions at the head of this module.
 
     Args:
         H: (N, N) [J] second derivative of the Lagrangian.

@@ -108,7 +108,7 @@ class _Path:
     idle: int = 0
 
     def expand(self, x: NDArray, load: float, model: Expansion) -> Expansion:
-        """The problem near a placement, under a load."""
+        """Return the problem near a placement, under a load."""
         wrench = self.rest.copy()
         wrench[self.component] = load
         placement = place(model.placement.model, x)
@@ -116,12 +116,12 @@ class _Path:
         return expand(placement, loads, np.zeros(len(placement.residual)))
 
     def reference_load(self, local: Expansion) -> NDArray:
-        """(N,) work of a unit load per unit of each unknown."""
+        """Return the (N,) work of a unit load per unit of each unknown."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
         return work_gradient(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
-        """(N,) product with a motion, as lengths on the path count."""
+        """Return the (N,) product with a motion, as lengths on the path count."""
         return self.weight * motion / local.placement.model.units**2
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
@@ -252,7 +252,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Motion along the modes and load that put right what is left."""
+    """Return the motion along the modes and load that put right what is left."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -267,7 +267,7 @@ def _solve(
 def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
-    """An equilibrium with its tangent, of unit length, the way the path went."""
+    """Return an equilibrium with its tangent, of unit length, the way the path went."""
     values, Z = path.modes(local)
     left = np.zeros(len(values) + 1)
     left[-1] = -1.0

@@ -199,7 +199,7 @@ def _solve(
     exact: bool, near: _Point | None, progress: Callable[[int, int], None],
     method: Method,
 ) -> _Point:  # fmt: skip
-    """The equilibrium under one load."""
+    """Return the equilibrium under one load."""
     progress(0, 1)
     if not exact:
         linear = solve_assembly(posture, wrench, gravity=gravity, method=method)
@@ -242,7 +242,7 @@ def _settled(
 
 
 def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
-    """Names such as ``"leg1.elbow radial"`` of the clearances marked.
+    """Return the names such as ``"leg1.elbow radial"`` of the clearances marked.
 
     Args:
         joints: whose clearances they are.
@@ -303,7 +303,7 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Neighbouring loads between which something changes for the first time."""
+    """Return neighbouring loads between which something changes for the first time."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
@@ -320,7 +320,7 @@ def _apart(one: _Point, other: _Point) -> float:
 
 
 def _jumps(before: _Point, after: _Point, component: int) -> bool:
-    """Whether the platform moves much farther than either tangent says."""
+    """Return whether the platform moves much farther than either tangent says."""
     scale = np.repeat([before.tangent.length, 1.0], 3)
     farthest = max(
         float(np.linalg.norm(scale * p.tangent.compliance[component]))
@@ -333,7 +333,7 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
 
 
 def _mode(point: _Point) -> str:
-    """The motion of negative stiffness, by the platform and the part that bends."""
+    """Return motion of negative stiffness, by the platform and the part that bends."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -344,7 +344,7 @@ def _mode(point: _Point) -> str:
 def mode_text(
     screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
-    """A mode in words: how the platform moves, and what bends most.
+    """Return a mode in words: how the platform moves, and what bends most.
 
     Args:
         screws: (6, k) [rad, m] of the platform in all modes, of any common size.

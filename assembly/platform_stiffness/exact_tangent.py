@@ -38,7 +38,7 @@ FLAT = 1e-12  # of the largest curvature: what less counts as none
 def exact_tangent(
     equilibrium: ExactAssembly, side: Side = "holding"
 ) -> PlatformStiffness:
-    """How stiff the platform is at an exact equilibrium.
+    """Return how stiff the platform is at an exact equilibrium.
 
     Args:
         equilibrium: the manipulator assembled with finite motions, under its loads.
@@ -80,7 +80,7 @@ def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
 
 
 def platform_moves(local: Expansion) -> NDArray:
-    """(6, N) small motion of the platform at its present origin, base axes."""
+    """Return (6, N) small motion of the platform at its present origin, base axes."""
     rows = local.placement.platform_rows.copy()
     rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]
     return rows

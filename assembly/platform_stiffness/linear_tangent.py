@@ -42,7 +42,7 @@ _NOISE = 1e-12  # of a column before a projection that removes it whole
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """The classical virtual-joint model: every clearance is held at zero.
+    """Return the classical virtual-joint model: every clearance is held at zero.
 
     Args:
         posture: where the robot stands.
@@ -70,7 +70,7 @@ def in_contact(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
 
 
 def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffness:
-    """The same of an assembly as it is, or of one a small step from equilibrium.
+    """Return the same of an assembly as it is, or of one a small step from equilibrium.
 
     Args:
         assembly: its clearances to rounding.
@@ -119,7 +119,7 @@ def _stiffness(
     lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray,
     method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """Springs and free motions to modes; see the head of this module."""
+    """Return the springs and free motions to modes; see the head of this module."""
     free = free / _sizes(free, lin.size)
     A_q, A_y = lin.rows @ free, lin.rows @ springs
     tolerance = _RANK + 30.0 * lin.posture.mismatch
@@ -147,7 +147,7 @@ def _stiffness(
 
 
 def _sizes(columns: NDArray, length: float) -> NDArray:
-    """Size of screws, rotations in rad and translations in reference lengths."""
+    """Return size of screws, rotations in rad and translations in reference lengths."""
     weights = np.tile(in_reference_lengths(length), len(columns) // 6)
     return np.linalg.norm(columns * weights[:, None], axis=0)
 

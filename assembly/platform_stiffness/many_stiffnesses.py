@@ -57,7 +57,7 @@ class Stiffnesses:
         return len(self.springs)
 
     def __getitem__(self, i: int) -> PlatformStiffness:
-        """Posture i; its modes are combinations of the springs, six at most."""
+        """Return posture i; its modes are combinations of the springs, six at most."""
         i = range(len(self))[i]
         if i in self.apart:
             return self.apart[i]
@@ -76,7 +76,7 @@ class Stiffnesses:
         )
 
     def at(self, points: NDArray) -> "Stiffnesses":
-        """The same platforms read at others of their points.
+        """Return the same platforms read at others of their points.
 
         Args:
             points: (k, 3) [m] base axes.
@@ -141,7 +141,7 @@ class Stiffnesses:
             return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
     def along(self, direction: ArrayLike) -> NDArray:
-        """(k,) [N m/rad or N/m] stiffness along a direction, the others free.
+        """Return (k,) [N m/rad or N/m] stiffness along a direction, the others free.
 
         Args:
             direction: (6,) unit, of a wrench.
@@ -184,7 +184,7 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """The classical virtual-joint model, every clearance held at zero.
+    """Return the classical virtual-joint model, every clearance held at zero.
 
     Args:
         posture: k postures.
@@ -226,7 +226,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
 
 
 def many_of_each(posture: Posture, each: Sequence[PlatformStiffness]) -> Stiffnesses:
-    """Stiffnesses that are known already.
+    """Return the stiffnesses that are known already.
 
     Args:
         posture: k postures.

@@ -127,7 +127,7 @@ class PlatformStiffness:
         }
 
     def at(self, point: ArrayLike, length: float | None = None) -> "PlatformStiffness":
-        """The same platform read at another of its points.
+        """Return the same platform read at another of its points.
 
         Args:
             point: (3,) [m] base axes.
@@ -210,7 +210,7 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Stiffness along one direction, the others free or blocked.
+        """Return the stiffness along one direction, the others free or blocked.
 
         Args:
             direction: (6,) of a wrench and of a screw, such as ``[0, 0, 0, 0, 0, 1]``.
@@ -229,7 +229,7 @@ class PlatformStiffness:
         return free, blocked
 
     def _compliance_along(self, d: NDArray) -> float:
-        """D . C d, infinite along free motions."""
+        """Return D . C d, infinite along free motions."""
         if _touches(self.free, d):
             return np.inf
         screws = self.root.T @ d
@@ -239,7 +239,7 @@ class PlatformStiffness:
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
-        """D . K d."""
+        """Return D . K d."""
         way, core, _ = self._resisted
         return float(d @ way @ core @ way.T @ d)
 
@@ -303,7 +303,7 @@ class PlatformStiffness:
 
 
 def unit_screws(screws: NDArray, length: float) -> NDArray:
-    """Independent unit screws that span the same motions.
+    """Return the independent unit screws that span the same motions.
 
     Args:
         screws: (6, k) [rad, m], in units of about 1 rad or length; those much smaller
@@ -364,12 +364,12 @@ def _direction(direction: ArrayLike) -> NDArray:
 
 
 def _touches(vectors: NDArray, d: NDArray) -> bool:
-    """Whether a direction has a part along any of these."""
+    """Return whether a direction has a part along any of these."""
     return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
 
 
 def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
-    """NaN in rows and columns where any of the directions has a component."""
+    """Return NaN in rows and columns where any of the directions has a component."""
     touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
     matrix = np.where(touched[:, None] | touched, np.nan, matrix)
     matrix.setflags(write=False)

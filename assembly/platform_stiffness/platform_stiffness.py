@@ -115,7 +115,7 @@ def _of_one(
     posture: Posture, state: State, load: ArrayLike | None, gravity: ArrayLike | None,
     offset: NDArray, side: Side, method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """The same of one posture."""
+    """Return the same of one posture."""
     platform = posture.platform
     if state == "nominal":
         tangent = without_clearance(posture)

@@ -88,7 +88,7 @@ _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
 def compliance_slope(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> NDArray:
-    """Derivative of the platform's compliance by a number of its robot.
+    """Return the derivative of the platform's compliance by a number of its robot.
 
     Args:
         posture: where the robot stands.
@@ -163,7 +163,7 @@ def _linear(
 
 
 def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
-    """The virtual joints of a neighbouring robot."""
+    """Return the virtual joints of a neighbouring robot."""
     return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
 
 
@@ -218,11 +218,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Derivatives of closures and gradient by the number, unknowns kept."""
+    """Return the derivatives of closures and gradient by the number, unknowns kept."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """A tangent at a change of contact: no derivative of it exists."""
+    """Return a tangent at a change of contact: no derivative of it exists."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

@@ -75,7 +75,7 @@ def natural_modes(
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
 ) -> NaturalModes:
-    """Natural frequencies and modes of a robot, its drives held.
+    """Return the natural frequencies and modes of a robot, its drives held.
 
     Args:
         posture: where the robot stands.
@@ -173,7 +173,7 @@ def _modes(K: NDArray, M: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
-    """Shares of the elastic energy of a mode, largest first."""
+    """Return the shares of the elastic energy of a mode, largest first."""
     energies: dict[Part, float] = {}
     for part, y in zip(parts, springs, strict=True):
         energies[part] = energies.get(part, 0.0) + float(y) ** 2
@@ -185,7 +185,7 @@ def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
 
 
 def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
-    """(N, N) [kg m^2 per squared unit] mass of all bodies in the unknowns there.
+    """Return (N, N) [kg m^2 per squared unit] mass of all bodies in the unknowns there.
 
     Args:
         equilibrium: an equilibrium.
@@ -227,7 +227,7 @@ def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
 def _ends(
     equilibrium: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
 ) -> NDArray:
-    """(12, N) motion of a link's base and tip, each at its place.
+    """Return the (12, N) motion of a link's base and tip, each at its place.
 
     Args:
         equilibrium: an equilibrium.

@@ -10,7 +10,7 @@ def cone_starts(group: NDArray) -> NDArray:
 
 
 def cone_sums(values: NDArray, group: NDArray) -> NDArray:
-    """(..., cones) sums of vectors' (..., nu) components in each cone."""
+    """Return the (..., cones) sums of vectors' (..., nu) components in each cone."""
     if values.ndim == 1:
         return np.bincount(group, weights=values)
     return values @ (group[:, None] == np.arange(np.bincount(group).size))
@@ -22,5 +22,5 @@ def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Cones' vectors shortened to length 1 where they are longer."""
+    """Return the cones' vectors shortened to length 1 where they are longer."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

@@ -159,7 +159,7 @@ def minimise_energy(
 
 
 def _proved(least: ConicSolution, h: NDArray) -> bool:
-    """Whether the certified gap of a scaled problem is small enough."""
+    """Return whether the certified gap of a scaled problem is small enough."""
     allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
@@ -167,7 +167,7 @@ def _proved(least: ConicSolution, h: NDArray) -> bool:
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
-    """The interior-point method of this package; its solution must satisfy H."""
+    """Return the interior-point method of this package; its solution must satisfy H."""
     u, n = one_problem.interior_point((G, h, d, H, k), cone_starts(group), _GAP_WITHIN)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
@@ -179,7 +179,7 @@ def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """The same by Clarabel, with v = -G u - h as variables of their own."""
+    """Return the same by Clarabel, with v = -G u - h as variables of their own."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
@@ -239,7 +239,7 @@ def _checked(
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> ConicSolution:
-    """A solution with its value and the bound that its multipliers prove."""
+    """Return a solution with its value and the bound that its multipliers prove."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
@@ -254,7 +254,7 @@ def _certify(
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
-    """Certified lower bound of problem (22) from any guess of its multipliers.
+    """Return certified lower bound of problem (22) from any guess of its multipliers.
 
     For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu),
     and the least of the right side over the unit cones is known in closed form.
@@ -276,7 +276,7 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
-    """Least t such that B u = right with |u_k| <= t (or <= 1 where not scaled).
+    """Return least t such that B u = right with |u_k| <= t (or <= 1 where not scaled).
 
     Args:
         B: (m, nu) of full row rank, m >= 1.
@@ -370,7 +370,7 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Whether n shows that no u with |u_k| <= radius_k satisfies H u = k."""
+    """Return whether n shows that no u with |u_k| <= radius_k satisfies H u = k."""
     # n.H u is at most the sum of radius_k |(H^T n)_k|: n.k above it is a proof, once
     # it is above the rounding of its own terms too
     most = float(cone_sizes(H.T @ n, group) @ radius)

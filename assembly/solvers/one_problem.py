@@ -133,10 +133,10 @@ def farthest(
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Numbers as C++ reads them."""
+    """Return the numbers as C++ reads them."""
     return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
 def _integers(array: NDArray) -> NDArray:
-    """Whole numbers likewise."""
+    """Return the whole numbers likewise."""
     return np.ascontiguousarray(array, dtype=np.int64)

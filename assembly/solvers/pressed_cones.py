@@ -53,7 +53,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """The minimum after cones were added that are left, and let go that pull."""
+    """Return the minimum after cones were added that are left, and let go that pull."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
@@ -67,7 +67,7 @@ def _settled(
 def _with_pressed(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> tuple[_Point, NDArray]:
-    """Newton's method with these cones pressed, and the forces on all cones."""
+    """Return Newton's method with these cones pressed, and the forces on all cones."""
     G, h, d, H, k, group = problem
     u, y, n = start
     held = np.flatnonzero(pressed)

@@ -63,12 +63,12 @@ class Allocation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Tolerances over ``class``, as ``--output`` writes them."""
+        """Return the tolerances over ``class``, as ``--output`` writes them."""
         return tolerance_dataset(self)
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
-    """An allocation as plain values."""
+    """Return an allocation as plain values."""
     plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
@@ -147,27 +147,27 @@ def _taken(
 
 
 def _distribution(plan: Plan) -> dict[str, Any]:
-    """How errors are distributed within their tolerances."""
+    """Return how errors are distributed within their tolerances."""
     kind = KINDS[int(plan.sources.kind[0])]
     cut = float(plan.sources.limit[0]) if kind == "truncated" else None
     return {"distribution": kind, "deviations": cut}
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """[m] contact length of the contact model, None for the others."""
+    """Return the [m] contact length of the contact model, None for the others."""
     if not plan.limits_pose or plan.clearance_model != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
-    """Unit of a class of tolerances."""
+    """Return the unit of a class of tolerances."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
     return "rad" if allocation.plan.sources.component[first] < 3 else "m"
 
 
 def allocation_text(results: dict[str, Any]) -> str:
-    """An allocation for people."""
+    """Return an allocation for people."""
     lines = []
     for one in results["tolerances"]:
         scale, unit = _SHOWN[one["unit"]]
@@ -217,7 +217,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Number of looks, and the confidence of each and of all."""
+    """Return the number of looks, and the confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
@@ -228,7 +228,7 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Cost of the tolerances, and its lower bound or its reduction."""
+    """Return the cost of the tolerances, and its lower bound or its reduction."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):
@@ -241,7 +241,7 @@ def _price_text(results: dict[str, Any]) -> str:
 
 
 def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
-    """An allocation as a data set over ``class``."""
+    """Return an allocation as a data set over ``class``."""
     import xarray
 
     plan, results = allocation.plan, allocation_of(allocation)

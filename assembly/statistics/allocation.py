@@ -94,7 +94,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """The cheapest tolerances found, and the given proportions scaled uniformly."""
+    """Return cheapest tolerances found, and the given proportions scaled uniformly."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(
@@ -121,7 +121,7 @@ def _scaled_tolerances(
 
 
 def _typical_energy(requirement: Requirement) -> float:
-    """[J] median of draws at the loosest tolerances, at the first posture."""
+    """Return [J] median of draws at the loosest tolerances, at the first posture."""
     plan = requirement.plan
     values = plan.draws_of(TRAINING, 200) * plan.spread(plan.most)
     rows = requirement.experiments[0].evaluate(values, range(len(values)))

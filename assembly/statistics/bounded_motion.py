@@ -23,7 +23,7 @@ ASSUMPTION = "frozen"  # every spring as in the solution of (22)
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Draws in which a passive joint may reach the bound of its own motion.
+    """Return the draws in which a passive joint may reach the bound of its own motion.
 
     Args:
         prepared: the posture.
@@ -63,7 +63,7 @@ def _moves_platform(prepared: LinearResponse) -> NDArray:
 def bounded_position(
     draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
 ) -> tuple[NDArray, bool]:
-    """Platform screw of one draw at contact, or uniform over its set.
+    """Return the platform screw of one draw at contact, or uniform over its set.
 
     Args:
         draws: of one posture.

@@ -46,7 +46,7 @@ def position_clearances(
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Platform screws with the clearances at positions of a clearance model.
+    """Return the platform screws with the clearances at positions of a clearance model.
 
     Args:
         prepared: the posture.
@@ -125,7 +125,7 @@ def clearance_means(clearance_model: str, contact_length: float | None = None) -
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """(k, 6) wrenches on the platform: moments over the length are as forces."""
+    """Return (k, 6) wrenches on the platform: moments over the length are as forces."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -135,7 +135,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Clearances uniform over their set, and whether the walks mixed."""
+    """Return the clearances uniform over their set, and whether the walks mixed."""
     from assembly.statistics.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -216,10 +216,10 @@ def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
 
 
 def _cone_columns(prepared: LinearResponse) -> NDArray:
-    """(m, nu) closure columns of the clearances."""
+    """Return the (m, nu) closure columns of the clearances."""
     return prepared.closures @ prepared.joints.cones
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """(k, cones) size of each cone's part."""
+    """Return the (k, cones) size of each cone's part."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

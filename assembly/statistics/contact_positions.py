@@ -12,7 +12,7 @@ def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """The farthest point of the clearances' set along each direction.
+    """Return the farthest point of the clearances' set along each direction.
 
     Args:
         rows: (p, nu) orthonormal, zero where not ``free``.

@@ -33,7 +33,7 @@ _MOST_CUTS = 200
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Cheapest tolerances that meet the convex limits of a requirement.
+    """Return the cheapest tolerances that meet the convex limits of a requirement.
 
     Args:
         requirement: limits at all postures.
@@ -64,7 +64,7 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
+    """Return cheapest tolerances with ``a.t <= 1`` for all planes a, and within bounds.
 
     Args:
         plan: its costs.
@@ -131,7 +131,7 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """The plane ``a.t' <= 1`` of a linearised quantity and its limit."""
+    """Return the plane ``a.t' <= 1`` of a linearised quantity and its limit."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(f"even perfect parts exceed a limit of {limit:g}")

@@ -148,12 +148,12 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Records of the draws ``first`` .. ``first + count - 1``."""
+        """Return the records of the draws ``first`` .. ``first + count - 1``."""
         values = self.sources.draw(first, count, self.seed)
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Records of given values of the sources.
+        """Return the records of given values of the sources.
 
         Args:
             values: (k, m) [rad or m].
@@ -209,7 +209,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Precision of pose errors that suffices to check limits on them.
+    """Return the precision of pose errors that suffices to check limits on them.
 
     Args:
         limits: by quantity.

@@ -66,7 +66,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """(count, m) rows from ``first`` on."""
+        """Return the (count, m) rows from ``first`` on."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -82,7 +82,7 @@ def sobol_importance(
     count: int,
     level: float = 0.95,
 ) -> Importance:
-    """Sobol's indices of any function of independent numbers.
+    """Return Sobol's indices of any function of independent numbers.
 
     Args:
         evaluate: (k, m) numbers to (k, s) results, NaN without a solution.
@@ -102,7 +102,7 @@ def sobol_importance(
 def sobol_indices(
     design: SaltelliDesign, results: NDArray, level: float = 0.95
 ) -> Importance:
-    """Sobol's indices from the results of a design.
+    """Return Sobol's indices from the results of a design.
 
     Args:
         design: of k base draws and d groups.
@@ -153,7 +153,7 @@ def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArra
 def linear_importance(
     slopes: NDArray, sources: ErrorSources, groups: Sequence[tuple[str, NDArray]]
 ) -> NDArray:
-    """Closed-form indices of results that are linear in the errors.
+    """Return the closed-form indices of results that are linear in the errors.
 
     Args:
         slopes: (s, m) of the results with each source.
@@ -169,7 +169,7 @@ def linear_importance(
 
 
 def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
-    """Groups of sources: each by itself, by frame, or by kind of error.
+    """Return the groups of sources: each by itself, by frame, or by kind of error.
 
     Args:
         sources: of a robot.

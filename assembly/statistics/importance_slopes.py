@@ -21,7 +21,7 @@ DRAWS = 32  # whose slopes are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Gains of groups of errors: the platform's motion for a unit of error.
+    """Return the gains of groups of errors: the platform's motion for a unit of error.
 
     Args:
         experiment: distributions and posture.
@@ -51,7 +51,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
 
 def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Slopes of the platform's screw with every geometric error.
+    """Return the slopes of the platform's screw with every geometric error.
 
     Args:
         prepared: the posture.
@@ -69,6 +69,6 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def error_units(sources: ErrorSources, design: SaltelliDesign) -> list[str]:
-    """Units of the errors of each group."""
+    """Return the units of the errors of each group."""
     angles = [sources.component[columns] < 3 for _, columns in design.groups]
     return ["rad" if a.all() else "rad, m" if a.any() else "m" for a in angles]

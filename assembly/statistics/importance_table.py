@@ -66,7 +66,7 @@ class ImportanceOptions:
 def importance_design(
     experiment: Experiment, asked: ImportanceOptions
 ) -> SaltelliDesign:
-    """The design for the importance of an experiment's errors.
+    """Return the design for the importance of an experiment's errors.
 
     Args:
         experiment: distributions and quantities.
@@ -83,7 +83,7 @@ def importance_design(
 def importance_rows(
     experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Records of some rows of a design.
+    """Return the records of some rows of a design.
 
     Random clearance positions would add variance that is not due to the errors: they
     are then those of the solution of (22).
@@ -108,14 +108,14 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Clearance model of the importance of an experiment's errors."""
+    """Return the clearance model of the importance of an experiment's errors."""
     return "worst" if experiment.clearance_model == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Importance of the sources for the results of an experiment.
+    """Return the importance of the sources for the results of an experiment.
 
     Args:
         experiment: distributions and quantities.
@@ -165,7 +165,7 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """(2, d) parts from the variance (6, d) of the screw due to groups."""
+    """Return the (2, d) parts from the variance (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
     # a component that does not vary has no index, and adds nothing to the part
     variances = np.maximum(np.nan_to_num(variances), 0.0)
@@ -175,7 +175,7 @@ def _parts(variances: NDArray) -> NDArray:
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """The data of :func:`importance_dataset` as plain values.
+    """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
         data: with it, or merged with the draws.
@@ -221,7 +221,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """The same as a table for people, the largest shares first."""
+    """Return the same as a table for people, the largest shares first."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
@@ -262,7 +262,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Part and exact slope of a group, in the table's columns."""
+    """Return the part and exact slope of a group, in the table's columns."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -274,6 +274,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """A share with its interval."""
+    """Return a share with its interval."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

@@ -37,7 +37,7 @@ def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Tolerances that cost no more than given proportions scaled uniformly.
+    """Return the tolerances that cost no more than given proportions scaled uniformly.
 
     Args:
         requirement: limits at all postures.
@@ -81,7 +81,7 @@ def least_cost(
 
 
 def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
-    """Reduction of the cost, relative to the cost of all tolerances."""
+    """Return the reduction of the cost, relative to the cost of all tolerances."""
     size = plan.price(before) if plan.cost == "reciprocal" else plan.costs.sum()
     return (plan.price(before) - plan.price(after)) / size
 

@@ -86,7 +86,7 @@ class LinearResponse:
     load_motions: NDArray
 
     def solve(self, errors: ArrayLike) -> Assembly:
-        """Least energies of k draws.
+        """Return the least energies of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
@@ -108,7 +108,7 @@ class LinearResponse:
 
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
-    """Errors of k draws.
+    """Return the errors of k draws.
 
     Args:
         errors: (k, n, 6) [rad, m] delta l.

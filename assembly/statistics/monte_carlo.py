@@ -86,7 +86,7 @@ def _run_draws(
     progress: Callable[[int, int], None], importance: ImportanceOptions | None,
     held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """The same; ``held`` keeps the journal."""
+    """Return the same; ``held`` keeps the journal."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
     # blocks of draws, then of the design: first row and number of rows of each
@@ -162,7 +162,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int | float]:
-    """Values that must be equal for two runs to give the same draws."""
+    """Return the values that must be equal for two runs to give the same draws."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
     numbers = [
@@ -190,7 +190,7 @@ def provenance(experiment: Experiment) -> dict[str, str | int | float]:
 
 
 def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
-    """The draws as a data set with units and provenance.
+    """Return the draws as a data set with units and provenance.
 
     Args:
         experiment: of the draws.

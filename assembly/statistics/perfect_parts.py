@@ -30,7 +30,7 @@ _EXCEEDED = 1e-9  # relative, above a limit
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
-    """Quantities with all errors zero.
+    """Return the quantities with all errors zero.
 
     Args:
         experiment: posture, loads and clearance model.
@@ -88,7 +88,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Kind of each cone, such as ``hinge.tilt``: of all legs together."""
+    """Return the kind of each cone, such as ``hinge.tilt``: of all legs together."""
     rows: NDArray = np.abs(prepared.joints.cones[:, prepared.starts[:-1]]).argmax(
         axis=0
     )
@@ -100,14 +100,14 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """The same as text, an attribute of a data set of draws."""
+    """Return the same as text, an attribute of a data set of draws."""
     return json.dumps(perfect_parts(experiment))
 
 
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Limits that perfect parts break.
+    """Return the limits that perfect parts break.
 
     Args:
         parts: of :func:`perfect_parts`.
@@ -149,7 +149,7 @@ def _size_text(one: Mapping[str, Any]) -> str:
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """The two largest parts of clearances, in brackets."""
+    """Return the two largest parts of clearances, in brackets."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

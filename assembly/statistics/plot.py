@@ -34,7 +34,7 @@ NAMES = {
 def figure_of_draws(
     data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
 ) -> "Figure | None":
-    """The figure of a data set of draws or tolerances.
+    """Return the figure of a data set of draws or tolerances.
 
     Args:
         data: as saved by ``statistics`` or ``tolerances``, or any other.
@@ -64,7 +64,7 @@ def figure_of_draws(
 def histogram_figure(
     data: "xarray.Dataset", quantities: Sequence[str] = ()
 ) -> "Figure":
-    """Histograms with medians, 95 % quantiles and most probable values.
+    """Return the histograms with medians, 95 % quantiles and most probable values.
 
     Args:
         data: of :func:`assembly.statistics.monte_carlo.run_draws`.
@@ -136,7 +136,7 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Tornado plot of the importance, the largest on top, with intervals.
+    """Return the tornado plot of the importance, the largest on top, with intervals.
 
     Args:
         data: with ``first_index`` and ``total_index``.

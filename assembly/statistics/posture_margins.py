@@ -43,7 +43,7 @@ class PostureMargins:
     compliant: Compliant
 
     def solve(self, errors: ArrayLike) -> Zone:
-        """Margins of k draws.
+        """Return the margins of k draws.
 
         Args:
             errors: (k, n, 6) [rad, m] delta l.
@@ -68,7 +68,7 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """How margins grow with each error.
+        """Return how margins grow with each error.
 
         Args:
             zone: of k draws, by :meth:`solve`.

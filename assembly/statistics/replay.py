@@ -38,7 +38,7 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """The next result.
+        """Return the next result.
 
         Args:
             compute: computes it.

@@ -32,7 +32,7 @@ def draws_page(
     summary: Mapping[str, Any], data: "xarray.Dataset", provenance: Provenance,
     robot: str = "",
 ) -> str:  # fmt: skip
-    """The page of an experiment.
+    """Return the page of an experiment.
 
     Args:
         summary: of :func:`assembly.statistics.summary.summarise`, with ``robot``.
@@ -70,14 +70,14 @@ def draws_page(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """The yield: all limits kept, or going together where there are none."""
+    """Return the yield: all limits kept, or going together where there are none."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """A probability in per cent, with its interval."""
+    """Return a probability in per cent, with its interval."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 
@@ -102,7 +102,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Table of all probabilities."""
+    """Return the table of all probabilities."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")
@@ -144,7 +144,7 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
-    """Table of means and quantiles."""
+    """Return the table of means and quantiles."""
     rows: list[list[Cell]] = []
     for key, one in summary["quantities"].items():
         if "mean" not in one:
@@ -175,7 +175,7 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Counts of a quantity in bins of one width."""
+    """Return the counts of a quantity in bins of one width."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,

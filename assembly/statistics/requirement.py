@@ -76,17 +76,17 @@ class Plan:
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """(G,) sums over the sources of each class."""
+        """Return the (G,) sums over the sources of each class."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
-        """Cost of tolerances."""
+        """Return the cost of tolerances."""
         if self.cost == "reciprocal":
             return float((self.costs / tolerances).sum())
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """(count, m) errors within tolerances of 1."""
+        """Return the (count, m) errors within tolerances of 1."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
@@ -151,7 +151,7 @@ class Requirement:
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Utilisation of the limits: every limited quantity over its limit.
+        """Return the utilisation of the limits: every limited quantity over its limit.
 
         Args:
             values: (k, m) [rad or m] errors.
@@ -214,12 +214,12 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """(k, m) slopes of a row of :meth:`utilisations` with each error."""
+        """Return the (k, m) slopes of a row of :meth:`utilisations` with each error."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """A limited quantity at posture i and its slopes with each error."""
+        """Return a limited quantity at posture i and its slopes with each error."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],
@@ -236,7 +236,7 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """The worst corner of tolerances (G,) found at posture i."""
+        """Return the worst corner of tolerances (G,) found at posture i."""
         spread = self.plan.spread(t)
 
         def search() -> tuple:

@@ -26,7 +26,7 @@ def respond(
     key: str = "energy", clearance_model: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """A quantity for given errors, and its slopes with each of them.
+    """Return a quantity for given errors, and its slopes with each of them.
 
     Args:
         prepared: a posture prepared for margins, or for energies and all others.
@@ -97,7 +97,7 @@ def _pose_error(
 
 
 def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
-    """The largest moment, force or stress, and its slopes with the wrenches."""
+    """Return the largest moment, force or stress, and its slopes with the wrenches."""
     wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
@@ -118,7 +118,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Lengths of vectors, and their slopes with the components."""
+    """Return the lengths of vectors, and their slopes with the components."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -126,7 +126,7 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """(k, 6) slopes of the peak stress with a link's wrench."""
+    """Return the (k, 6) slopes of the peak stress with a link's wrench."""
     # differences of the formula, not of the solution: a fibre's stress is the root of
     # a quadratic form, and central differences lose 1e-10 of its slope
     slopes = np.zeros_like(wrenches)

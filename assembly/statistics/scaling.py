@@ -28,7 +28,7 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Fixed draws, or corners of the tolerances for a yield of 1.
+    """Return the fixed draws, or corners of the tolerances for a yield of 1.
 
     Args:
         requirement: limits at all postures.
@@ -53,7 +53,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """The samples and the worst corners of tolerances, by limit and posture.
+    """Return the samples and the worst corners of tolerances, by limit and posture.
 
     Args:
         requirement: limits at all postures; no failure is allowed.
@@ -132,7 +132,7 @@ def _next_factor(
     low: float, high: float, factor: float, utilisation: float, power: float,
     precision: float,
 ) -> float:  # fmt: skip
-    """The factor to try next."""
+    """Return the factor to try next."""
     if 0 < utilisation < np.inf:
         guess = factor * ((1 - precision / 2) / utilisation) ** (1 / power)
         if low * (1 + precision / 4) < guess < high * (1 - precision / 4):
@@ -143,7 +143,7 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Largest number of failures that still shows a yield at 95 %, one-sided."""
+    """Return largest number of failures that still shows a yield at 95 %, one-sided."""
     # proportion() decreases with the failures: bisection
     low, high = -1, draws
     while high - low > 1:

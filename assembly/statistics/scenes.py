@@ -27,7 +27,7 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """The draw whose pose error is nearest to its 95 % quantile, assembled.
+    """Return the draw whose pose error is nearest to its 95 % quantile, assembled.
 
     Args:
         experiment: that gave the draws.
@@ -56,7 +56,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """The robot where its margin is largest, assembled with the errors it has.
+    """Return the robot where its margin is largest, assembled with the errors it has.
 
     Args:
         postures: that were judged.
@@ -86,7 +86,7 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Margins over the postures of a grid.
+    """Return the margins over the postures of a grid.
 
     Args:
         postures: that were judged.

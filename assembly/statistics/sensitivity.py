@@ -28,7 +28,7 @@ _RANK = 1e-10  # of the equations: directions left undetermined do not move
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Slopes of the least energy with every geometric error.
+    """Return the slopes of the least energy with every geometric error.
 
     Args:
         assembly: the assembly at least energy; under a load these are the slopes of

@@ -32,7 +32,7 @@ def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Stiffness along every axis, the others free, of each draw.
+    """Return the stiffness along every axis, the others free, of each draw.
 
     Args:
         posture: where the robot stands.
@@ -67,7 +67,7 @@ def draw_stiffnesses(
 def stiffness_report(
     stiffnesses: NDArray, motions: NDArray, state: str, level: float
 ) -> dict[str, Any]:
-    """Spread of the stiffness along each axis.
+    """Return the spread of the stiffness along each axis.
 
     Args:
         stiffnesses: (k, 6) of :func:`draw_stiffnesses`.
@@ -107,7 +107,7 @@ def stiffness_report(
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
-    """The spread for people, a line an axis."""
+    """Return the spread for people, a line an axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
         text = "nothing resists"

@@ -49,7 +49,7 @@ def summarise(
     strength: float | None = None,
     level: float = 0.95,
 ) -> dict[str, Any]:
-    """Summary of the draws of :func:`assembly.statistics.monte_carlo.run_draws`.
+    """Return summary of the draws of :func:`assembly.statistics.monte_carlo.run_draws`.
 
     Args:
         data: the draws.
@@ -199,7 +199,7 @@ def _described(
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:
-    """The results of :func:`summarise` for people."""
+    """Return the results of :func:`summarise` for people."""
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
         f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
@@ -246,14 +246,14 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """A name with its clearance model, if it has one."""
+    """Return a name with its clearance model, if it has one."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )
 
 
 def _share(interval: Mapping[str, float]) -> str:
-    """A probability with its interval, and the number of undecided draws."""
+    """Return a probability with its interval, and the number of undecided draws."""
     low, high = interval["lower"], interval["upper"]
     text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
     undecided = interval.get("undecided", 0)
@@ -261,12 +261,12 @@ def _share(interval: Mapping[str, float]) -> str:
 
 
 def _named(value: float, unit: str) -> str:
-    """A number with its unit."""
+    """Return a number with its unit."""
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 def _quantiles_text(quantiles: Mapping[str, Mapping[str, float]]) -> str:
-    """Median and the value that 95 % stay below."""
+    """Return the median and the value that 95 % stay below."""
     half, high = quantiles["0.5"], quantiles["0.95"]
     return (
         f"median {half['value']:.4g} ({half['lower']:.4g} to {half['upper']:.4g}), "

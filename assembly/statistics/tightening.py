@@ -14,7 +14,7 @@ _NAMED = 3  # contributors in a tile
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Total shares of a quantity's variance by error, the largest first.
+    """Return the total shares of a quantity's variance by error, the largest first.
 
     Args:
         summary: of :func:`assembly.statistics.summary.summarise`.
@@ -78,7 +78,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """The pose error of perfect parts."""
+    """Return the pose error of perfect parts."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("translation", "rotation"):
@@ -109,6 +109,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Names, of many the first ones and how many more."""
+    """Return the names, of many the first ones and how many more."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

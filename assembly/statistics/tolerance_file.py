@@ -21,7 +21,7 @@ _LOOSEST = (0.1, 0.01)  # [rad, m] largest small screws
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
-    """The plan of a tolerance file.
+    """Return the plan of a tolerance file.
 
     Args:
         path: TOML file.
@@ -87,7 +87,7 @@ class _Groups(NamedTuple):
 
 
 def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
-    """The groups of errors of a file."""
+    """Return the groups of errors of a file."""
     rows, names, costs, least, most = groups = _Groups({}, [], [], [], [])
     for number, table in enumerate(tables):
         places, unit = _places(table, robot)
@@ -120,7 +120,7 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Limits by quantity."""
+    """Return the limits by quantity."""
     valid = limit_names()
     limits = {}
     for key in list(table.content):

@@ -26,7 +26,7 @@ from stiffness.screws import SCREW
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
-    """Postures of a grid that the robot reaches and may use.
+    """Return the postures of a grid that the robot reaches and may use.
 
     Args:
         robot: any.
@@ -58,7 +58,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Postures that were not judged, in one line."""
+    """Return the postures that were not judged, in one line."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
     text = f"postures left out: {counts}"
     if SINGULAR in left_out:
@@ -67,7 +67,7 @@ def left_out_text(left_out: dict[str, int]) -> str:
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """Values that must be equal for two allocations to share stored results."""
+    """Return values that must be equal for two allocations to share stored results."""
     arrays = [p.transforms for p in postures]
     for one in (plan, plan.sources):
         arrays += [v for v in vars(one).values() if isinstance(v, np.ndarray)]
@@ -145,7 +145,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """The results of :func:`present_errors` for people: the five largest errors."""
+    """Return results of :func:`present_errors` for people: the five largest errors."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )

@@ -32,7 +32,7 @@ _GOVERNED = {
 def tolerances_page(
     results: Mapping[str, Any], provenance: Provenance, pictures: Sequence[str] = ()
 ) -> str:
-    """The page of ``assembly tolerances``.
+    """Return the page of ``assembly tolerances``.
 
     Args:
         results: with ``present``, ``allocation`` or both, number of ``postures`` and
@@ -79,7 +79,7 @@ def tolerances_page(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """The largest margin, and the error it is owed to."""
+    """Return the largest margin, and the error it is owed to."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; 1 and less goes together."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -95,7 +95,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Shares of the errors there are in the largest margin."""
+    """Return the shares of the errors there are in the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]
@@ -111,12 +111,12 @@ def _present_section(present: Mapping[str, Any]) -> str:
 
 
 def _error_unit(name: str) -> str:
-    """SI unit of an error such as ``leg1.link_a.TX``."""
+    """Return SI unit of an error such as ``leg1.link_a.TX``."""
     return "rad" if name.rpartition(".")[2].startswith("R") else "m"
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Whether the tolerances hold, by proof and by fresh draws."""
+    """Return whether the tolerances hold, by proof and by fresh draws."""
     text = f"Tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
@@ -144,7 +144,7 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
 
 
 def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
-    """The tolerances with the largest share of the price, if any is to be tight."""
+    """Return tolerances with the largest share of the price, if any is to be tight."""
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
         why = "every tolerance may be the loosest allowed."
@@ -163,7 +163,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Limits, yield, clearances, distribution, cost law and postures."""
+    """Return the limits, yield, clearances, distribution, cost law and postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -194,7 +194,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
 
 
 def _allocation_section(allocation: Mapping[str, Any]) -> str:
-    """Tolerances by class, price and worst cases."""
+    """Return the tolerances by class, price and worst cases."""
     classes = allocation["tolerances"]
     rows: list[list[Cell]] = [
         [one["name"], *(Value(one[k], one["unit"]) for k in
@@ -228,7 +228,7 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """The price, and whether nothing cheaper is proved."""
+    """Return the price, and whether nothing cheaper is proved."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(

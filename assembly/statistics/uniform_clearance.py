@@ -32,7 +32,7 @@ def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """A point uniformly distributed over the set.
+    """Return a point uniformly distributed over the set.
 
     Args:
         Z: (nu, n) orthonormal columns: the directions in which u may move.
@@ -71,7 +71,7 @@ def sample_uniform_position(
 def _ellipsoid(
     Z: NDArray, starts: NDArray, start: NDArray
 ) -> tuple[NDArray, NDArray] | None:
-    """The analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
+    """Return the analytic centre and (nu, n) the axes of Dikin's ellipsoid there.
 
     Minimum of -sum log(rho^2 - |u_k|^2) by damped Newton steps, which stay inside; rho
     begins so that the start is inside and decreases to 1.
@@ -110,7 +110,7 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Largest size over the cones; 1 on the boundary."""
+    """Return the largest size over the cones; 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 

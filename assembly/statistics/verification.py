@@ -25,7 +25,7 @@ LOOKS, CONFIDENCE = 4, 0.95  # most looks at fresh draws; confidence of all toge
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Bounds of the worst case of errors within tolerances, over all postures.
+    """Return bounds of the worst case of errors within tolerances, over all postures.
 
     Args:
         requirement: limits at all postures.
@@ -64,7 +64,7 @@ def prove_worst(
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """An upper bound of the worst case at one posture."""
+    """Return an upper bound of the worst case at one posture."""
     return (bound(*given),)
 
 
@@ -147,7 +147,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Whether the interval contradicts the yield asked for."""
+    """Return whether the interval contradicts the yield asked for."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

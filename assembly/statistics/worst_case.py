@@ -47,7 +47,7 @@ def worst_corner(
     clearance_model: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Local search from corner to corner; the worst of all searches.
+    """Return the local search from corner to corner; the worst of all searches.
 
     Args:
         prepared: a posture prepared for margins, or for energies and all others.
@@ -98,14 +98,14 @@ def _worst_without_clearance(
 
 
 def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
-    """(count, sources) signs to start from."""
+    """Return the (count, sources) signs to start from."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, sources))
 
 
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Upper bound of the largest margin over all errors within tolerances.
+    """Return the upper bound of the largest margin over all errors within tolerances.
 
     Args:
         zone: a posture prepared for margins, every clearance scaled by the margin.
@@ -129,7 +129,7 @@ def bound_margin(
 def bound_energy(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Upper bound of the largest energy over all errors within tolerances.
+    """Return the upper bound of the largest energy over all errors within tolerances.
 
     Args:
         prepared: a posture prepared for energies.
@@ -154,7 +154,7 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """(cones,) largest sizes of affine clearances in each cone."""
+    """Return the (cones,) largest sizes of affine clearances in each cone."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 

@@ -36,7 +36,7 @@ _SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slop
 def bound_worst_errors(
     draws: Assembly, precision: tuple[float, float] = PRECISION
 ) -> tuple[NDArray, NDArray]:
-    """Certified bounds of the largest pose errors over all clearance positions.
+    """Return certified bounds of the largest pose errors over all clearance positions.
 
     Args:
         draws: k of them, at one posture.
@@ -73,7 +73,7 @@ def bound_worst_errors(
 def _without_load(
     draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Bounds and screws of unloaded draws, compiled."""
+    """Return the bounds and screws of unloaded draws, compiled."""
     found = bound_pose_error(
         draws, ASSUMPTION,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
@@ -87,7 +87,7 @@ def _without_load(
 def _under_load(
     draws: Assembly, i: int, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Bounds and screws of one loaded draw; NaN if the solver failed."""
+    """Return the bounds and screws of one loaded draw; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
             draws[i], ASSUMPTION,

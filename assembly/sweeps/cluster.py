@@ -96,7 +96,7 @@ def _without_interrupts() -> Generator[None, None, None]:
 
 
 def _connected(address: str) -> "distributed.Client":
-    """A client of a running scheduler."""
+    """Return a client of a running scheduler."""
     from distributed import Client
 
     try:
@@ -235,7 +235,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """The question, unpickled once on each worker: robots are cached by identity."""
+    """Return question, unpickled once on each worker: robots are cached by identity."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

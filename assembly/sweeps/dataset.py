@@ -45,7 +45,7 @@ _TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
-    """The data set of a whole sweep in memory.
+    """Return the data set of a whole sweep in memory.
 
     Args:
         sweep: of the results.
@@ -167,7 +167,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Blocks one after the other."""
+    """Return the blocks one after the other."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -190,12 +190,12 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
 
 
 def _attributes(variable: Any) -> dict[str, str]:
-    """Unit and meaning of a variable."""
+    """Return the unit and meaning of a variable."""
     return {"units": variable.unit, "long_name": variable.meaning}
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Axes, values and attributes of every coordinate, by name."""
+    """Return the axes, values and attributes of every coordinate, by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -251,7 +251,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Whether the attributes of a file are those of a kind of ours."""
+    """Return whether the attributes of a file are those of a kind of ours."""
     import h5py
 
     try:
@@ -264,7 +264,7 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """A data set from its file.
+    """Return a data set from its file.
 
     Args:
         path: of a NetCDF file.
@@ -291,7 +291,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """A data set of an older release under the present names."""
+    """Return a data set of an older release under the present names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

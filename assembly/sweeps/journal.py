@@ -84,7 +84,7 @@ class Journal:
         held.push(remove)
 
     def read(self, block: int) -> tuple[NDArray, dict[str, dict[int, str]]]:
-        """Rows and texts of a finished block.
+        """Return the rows and texts of a finished block.
 
         Args:
             block: its number.
@@ -182,7 +182,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Places of all sound records, and where the last one ends."""
+    """Return the places of all sound records, and where the last one ends."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -208,7 +208,7 @@ def _check(owner: int, block: int, content: bytes) -> int:
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """How a journal differs from the one expected."""
+    """Return how a journal differs from the one expected."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):

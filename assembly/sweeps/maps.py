@@ -24,7 +24,7 @@ def figure_of(
     at: Mapping[str, float | str] | None = None,
     quantities: Sequence[str] = (),
 ) -> "Figure":
-    """Maps of a sweep over two axes, or lines along one.
+    """Return the maps of a sweep over two axes, or lines along one.
 
     Args:
         data: of a sweep, as saved.
@@ -74,7 +74,7 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """A part of a sweep: values on some axes fixed, draws by their median.
+    """Return a part of a sweep: values on some axes fixed, draws by their median.
 
     Args:
         data: of a sweep.
@@ -110,7 +110,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """A number asked for on an axis."""
+    """Return a number asked for on an axis."""
     try:
         return float(value)
     except ValueError:
@@ -120,7 +120,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Median over the draws; the first status other than ok, if there is one."""
+    """Return median over the draws; the first status other than ok, if there is one."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -145,7 +145,7 @@ def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
 def map_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Maps over a two-dimensional grid: margins, energy and platform error.
+    """Return the maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
         data: of a sweep over two axes with more than one value each.
@@ -186,7 +186,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """A figure with so many panels and at most one more, side by side."""
+    """Return a figure with so many panels and at most one more, side by side."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -198,7 +198,7 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """The same quantities along one axis, or from posture to posture of a list.
+    """Return the same quantities along one axis, or from posture to posture of a list.
 
     Args:
         data: of a sweep over one axis.
@@ -235,7 +235,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """The same with increasing numbers on each axis: labels become 1, 2, .."""
+    """Return the same with increasing numbers on each axis: labels become 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -244,7 +244,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Bool: where a singularity is near."""
+    """Return Bool: where a singularity is near."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -286,13 +286,13 @@ def _axis_name(data: "xarray.Dataset", name: str) -> str:
 
 
 def _counts(data: "xarray.Dataset") -> str:
-    """How many points have each status."""
+    """Return how many points have each status."""
     names, counts = np.unique(data["status"].values.astype(str), return_counts=True)
     return ", ".join(f"{n}: {c}" for n, c in zip(names, counts, strict=True))
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Robot, statuses, and the singularities that the crosses mark."""
+    """Return the robot, statuses, and the singularities that the crosses mark."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))

@@ -69,7 +69,7 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """A data set just written, for its summary.
+    """Return a data set just written, for its summary.
 
     Args:
         path: of a NetCDF file of ours.
@@ -163,7 +163,7 @@ class _Target:
         return self.file.readinto(content) or 0
 
     def read(self, size: int = -1) -> bytes:
-        """The same as bytes."""
+        """Return the same as bytes."""
         return self.file.read(size) or b""
 
     def seek(self, offset: int, whence: int = SEEK_SET) -> int:
@@ -171,7 +171,7 @@ class _Target:
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The position in the file."""
+        """Return the position in the file."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:

@@ -66,7 +66,7 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The panels of a sweep's figure for which no quantity is named.
+    """Return the panels of a sweep's figure for which no quantity is named.
 
     Args:
         data: of a sweep.
@@ -88,7 +88,7 @@ def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def _is_stored(data: "xarray.Dataset", key: str) -> bool:
-    """Whether a quantity follows from what is stored."""
+    """Return whether a quantity follows from what is stored."""
     try:
         quantity(data, key)
     except KeyError:
@@ -97,7 +97,7 @@ def _is_stored(data: "xarray.Dataset", key: str) -> bool:
 
 
 def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """The same where everything is stored."""
+    """Return the same where everything is stored."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
@@ -143,7 +143,7 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
 
 
 def quantity(data: "xarray.Dataset", key: str) -> Any:
-    """A quantity over the points.
+    """Return a quantity over the points.
 
     Args:
         data: of a sweep or of draws.
@@ -172,7 +172,7 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
 
 def _quantities(data: "xarray.Dataset") -> dict[str, str]:
-    """Unit of every numeric quantity over the points, by name."""
+    """Return the unit of every numeric quantity over the points, by name."""
     units: dict[str, str] = {}
     points = set(data["status"].dims)
     for name in map(str, data.data_vars):
@@ -189,5 +189,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Axes of a variable beside those of the points."""
+    """Return the axes of a variable beside those of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

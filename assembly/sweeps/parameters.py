@@ -63,7 +63,7 @@ class Design:
         return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
-        """Full paths that a path matches.
+        """Return the full paths that a path matches.
 
         Args:
             path: full, or with the frame's name without its leg.
@@ -84,7 +84,7 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """The root table with other numbers.
+        """Return the root table with other numbers.
 
         Args:
             values: by path.
@@ -103,7 +103,7 @@ class Design:
         return content
 
     def robot(self, values: Mapping[str, float]) -> Robot:
-        """The robot with other numbers.
+        """Return the robot with other numbers.
 
         Args:
             values: by path.
@@ -134,12 +134,12 @@ class Design:
 
 
 def design_of(robot: Robot) -> Design:
-    """A robot in memory as the file it could be written to."""
+    """Return a robot in memory as the file it could be written to."""
     return Design(robot_table(robot), robot.name, robot.name)
 
 
 def load_design(name: str | Path) -> Design:
-    """A built-in robot, or a robot file, as a design.
+    """Return a built-in robot, or a robot file, as a design.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file.
@@ -161,7 +161,7 @@ def load_design(name: str | Path) -> Design:
 
 
 def unit_of(path: str) -> str:
-    """Unit of the number a path leads to; ``"SI"`` where it depends on more."""
+    """Return unit of the number a path leads to; ``"SI"`` where it depends on more."""
     *_, above, key = path.split(".")
     if above == "dh":
         return _DH_UNITS[key]
@@ -201,17 +201,17 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Whether a plain value is a number; true and false are not."""
+    """Return whether a plain value is a number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _setter(place: Any, key: Any) -> Setter:
-    """The function that writes a number to its place."""
+    """Return the function that writes a number to its place."""
     return lambda number: place.__setitem__(key, number)
 
 
 def _setter_of_two(rows: list[list[float]], i: int, j: int) -> Setter:
-    """The same for both places of a symmetric matrix."""
+    """Return the same for both places of a symmetric matrix."""
 
     def write(number: float) -> None:
         rows[i][j] = rows[j][i] = number

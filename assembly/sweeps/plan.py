@@ -69,7 +69,7 @@ class Sweep:
         return -(-self.size // self.block_size)
 
     def points(self, block: int) -> Points:
-        """The points of a block."""
+        """Return the points of a block."""
         first = block * self.block_size
         numbers = np.arange(first, min(first + self.block_size, self.size))
         numbers, draws = np.divmod(numbers, max(1, self.draws))

@@ -29,7 +29,7 @@ from assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Conditions at points of one design, effects applied.
+    """Return the conditions at points of one design, effects applied.
 
     Args:
         question: of the sweep: load, gravity and covariates.
@@ -66,7 +66,7 @@ def is_loaded(conditions: Conditions) -> bool:
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Least energies of all rows under loads.
+    """Return the least energies of all rows under loads.
 
     Args:
         conditions: k rows of a robot of n frames.
@@ -91,7 +91,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """A point by itself, or why there is no solution."""
+    """Return a point by itself, or why there is no solution."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

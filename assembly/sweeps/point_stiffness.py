@@ -35,7 +35,7 @@ _FORCES = Part("", "forces")
 
 
 def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
-    """Names of what gives way, such as ``"leg1.distal link"``.
+    """Return the names of what gives way, such as ``"leg1.distal link"``.
 
     Args:
         robot: of the sweep.
@@ -48,7 +48,7 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
 
 
 def _parts(robot: Robot, state: str) -> list[Part]:
-    """The same as parts."""
+    """Return the same as parts."""
     joints = virtual_joints(robot)
     parts = list(dict.fromkeys(owners(joints)))
     if state == "contact":
@@ -65,7 +65,7 @@ def _name(part: Part) -> str:
 def nominal_stiffnesses(
     posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """The nominal K_C of k postures, without errors and loads.
+    """Return the nominal K_C of k postures, without errors and loads.
 
     Args:
         posture: k postures.
@@ -88,7 +88,7 @@ def nominal_stiffnesses(
 def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Tangents of k points under their errors, loads and effects.
+    """Return the tangents of k points under their errors, loads and effects.
 
     Args:
         conditions: of k rows.
@@ -140,7 +140,7 @@ def _quantities(tangent: PlatformStiffness, parts: list[Part]) -> dict[str, NDAr
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:
-    """The same of no tangent."""
+    """Return the same of no tangent."""
     sizes = {
         "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
         "stiffness_condition": (), "share": (parts, 6),

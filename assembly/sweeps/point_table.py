@@ -24,7 +24,7 @@ _OF_POINTS = ("status", "tolerance")
 def point_table(
     data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
 ) -> "pandas.DataFrame":
-    """A data set as a table, one row for each point, draw or tolerance.
+    """Return a data set as a table, one row for each point, draw or tolerance.
 
     Args:
         data: of a sweep, of draws or of tolerances; or the path of its file.
@@ -91,5 +91,5 @@ def write_point_table(
 
 
 def _head(name: str, unit: str) -> str:
-    """Head of a column."""
+    """Return the head of a column."""
     return f"{name} [{unit}]" if unit else name

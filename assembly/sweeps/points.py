@@ -123,7 +123,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """The robot of a design, and the same without errors."""
+    """Return the robot of a design, and the same without errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -204,14 +204,14 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, draws: NDArray) -> NDArray:
-    """(k, n, 6) [rad, m] errors of some draws."""
+    """Return the (k, n, 6) [rad, m] errors of some draws."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     return np.array([pages[d // _PAGE][d % _PAGE] for d in draws.tolist()])
 
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """(256, n, 6) [rad, m] errors of draws 256 page .."""
+    """Return the (256, n, 6) [rad, m] errors of draws 256 page .."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))

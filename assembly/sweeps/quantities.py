@@ -96,7 +96,7 @@ class Variable:
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a sweep stores, by name.
+    """Return the numeric quantities that a sweep stores, by name.
 
     Args:
         question: of a sweep.
@@ -109,7 +109,7 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that are computed, some perhaps not stored.
+    """Return the numeric quantities that are computed, some perhaps not stored.
 
     Args:
         question: of a sweep.
@@ -186,7 +186,7 @@ def computed(question: Question) -> dict[str, Variable]:
 
 
 def _moving(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints that are not fixed."""
+    """Return the names of the joints that are not fixed."""
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
@@ -222,12 +222,12 @@ def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: what is stored, and ``status`` as a code."""
+    """Return the type of a point's record: what is stored, and ``status`` as a code."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Type of a record of some quantities, and ``status`` as a code."""
+    """Return the type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

@@ -68,7 +68,7 @@ class SweepOptions:
 
 
 def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
-    """The sweep that ``forcefit assembly sweep`` would run.
+    """Return the sweep that ``forcefit assembly sweep`` would run.
 
     Args:
         robot: a robot, a robot file, or a built-in name.
@@ -168,7 +168,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
 def _sources(
     options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
 ) -> "ErrorSources | None":
-    """How the errors drawn are distributed; None if none are."""
+    """Return how the errors drawn are distributed; None if none are."""
     if (options.errors is None) != (options.draws is None):
         raise BadInput("sweep: --errors and --draws go together; found one of them")
     if options.errors is None:
@@ -185,7 +185,7 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """A covariate as on the command line."""
+    """Return a covariate as on the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
@@ -203,7 +203,7 @@ def _check_assumption(question: Question) -> None:
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
-    """The postures."""
+    """Return the postures."""
     if poses is not None:
         return read_targets(poses, robot)
     return grid_targets(parse_grid(grid or "", robot))
@@ -235,7 +235,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """The command of the same sweep, options at their default left out."""
+    """Return the command of the same sweep, options at their default left out."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -262,7 +262,7 @@ def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
 
 
 def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
-    """Summary of a sweep as plain values.
+    """Return the summary of a sweep as plain values.
 
     Args:
         data: of a sweep.
@@ -289,7 +289,7 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
 
 
 def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
-    """Least, median and largest finite value; None where no value is finite."""
+    """Return least, median and largest finite value; None where no value is finite."""
     values = variable.values[np.isfinite(variable.values)]
     if not values.size:
         return None
@@ -300,7 +300,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """The same for people: statuses, and the first reason of each that is not ok."""
+    """Return same for people: statuses, and the first reason of each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:

@@ -108,7 +108,7 @@ def sweep(
 
 
 def options_by_old_names(**options: Any) -> SweepOptions:
-    """Options of a sweep by the keywords of the last release.
+    """Return the options of a sweep by the keywords of the last release.
 
     Args:
         options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,

@@ -52,7 +52,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """The question for every quantity whose options are given or have a default."""
+    """Return question for every quantity whose options are given or have a default."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -61,7 +61,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """The question for the variables kept and no others."""
+    """Return the question for the variables kept and no others."""
     every = _with_optional(question)
     return replace(
         question,

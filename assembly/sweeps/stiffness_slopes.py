@@ -28,7 +28,7 @@ def stiffness_slopes(
     asked: TangentState | None = None,
     under: Mapping[str, float | str] | None = None,
 ) -> dict[str, NDArray]:
-    """Derivatives of the platform's compliance by design numbers.
+    """Return the derivatives of the platform's compliance by design numbers.
 
     Args:
         design: the robot as its file says it, its effects too.

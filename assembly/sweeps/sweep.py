@@ -109,13 +109,13 @@ def run_sweep(
 
 
 def journal_path(path: Path | str) -> Path:
-    """Path of the journal of a file."""
+    """Return the path of the journal of a file."""
     path = Path(path)
     return path.with_name(path.name + ".journal")
 
 
 def _length(sweep: Sweep, block: int) -> int:
-    """Number of points of a block."""
+    """Return the number of points of a block."""
     return min(sweep.block_size, sweep.size - block * sweep.block_size)
 
 
@@ -171,5 +171,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Bool over the grid: inside the assembly zone by the margin."""
+    """Return the bool over the grid: inside the assembly zone by the margin."""
     return np.asarray(data[key] <= ASSEMBLABLE)

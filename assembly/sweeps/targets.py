@@ -57,7 +57,7 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
+    """Return the poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
 
     Args:
         names: of the components, of one kind.
@@ -78,7 +78,7 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
 
 
 def of_joints(names: Sequence[str]) -> bool:
-    """Whether components are joint coordinates, not a pose."""
+    """Return whether components are joint coordinates, not a pose."""
     return any(name.startswith(_JOINT) for name in names)
 
 
@@ -88,7 +88,7 @@ def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
 
 
 def unit_of_target(name: str, robot: Robot) -> str:
-    """``"m"`` or ``"rad"``."""
+    """Return ``"m"`` or ``"rad"``."""
     if name.startswith(_JOINT):
         frame = robot.frame(name.removeprefix(_JOINT))
         return "m" if frame.joint == "prismatic" else "rad"
@@ -142,7 +142,7 @@ def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
 
 
 def parse_values(whose: str, spec: str) -> NDArray:
-    """Values written ``start:stop:step``, or as one number.
+    """Return the values written ``start:stop:step``, or as one number.
 
     Args:
         whose: place of the text, for messages.
@@ -218,7 +218,7 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
 
 
 def _cell(whose: str, text: str) -> float:
-    """The number in a cell."""
+    """Return the number in a cell."""
     try:
         value = float(text)
     except ValueError:

@@ -31,7 +31,7 @@ def beam_compliance(
     axis: ArrayLike = (1.0, 0.0, 0.0),
     up: ArrayLike | None = None,
 ) -> NDArray:
-    r"""Tip compliance of a straight cantilever of constant section.
+    r"""Return the tip compliance of a straight cantilever of constant section.
 
     The link is clamped at its base; the screw is read at its tip.  Bending, torsion,
     stretching and (Timoshenko) shear are included; warping restraint, taper and the
@@ -80,7 +80,7 @@ def beam_compliance(
 def _compliance_in_section_axes(
     length: float, section: Section, E: float, nu: float, shear: bool
 ) -> NDArray:
-    """Tip compliance in the section's own x, y, z."""
+    """Return the tip compliance in the section's own x, y, z."""
     G = E / (2 * (1 + nu))
     slope_y, slope_z = length / (E * section.I_y), length / (E * section.I_z)
     C = np.diag([
@@ -100,7 +100,7 @@ def _compliance_in_section_axes(
 
 
 def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
-    """Axes of a section, as columns x (along the beam), y, z (up).
+    """Return the axes of a section, as columns x (along the beam), y, z (up).
 
     Args:
         axis: (3,) any length, from base to tip.
@@ -127,7 +127,7 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """The direction of a vector given from outside.
+    """Return the direction of a vector given from outside.
 
     Args:
         name: for the message.

@@ -42,7 +42,7 @@ def peak_beam_stress(
     wrench: ArrayLike,
     weight: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[NDArray, NDArray]:
-    """Largest von Mises stress in a straight beam, and where it is.
+    """Return the largest von Mises stress in a straight beam, and where it is.
 
     Axial force, bending, torsion and shear act together.  Evaluated are, in the
     sections at the base and at the tip, of a beam with weight also between them,
@@ -113,7 +113,7 @@ def peak_beam_stress(
 
 
 def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
-    """(n, k) [m] distances of sections from the tip, the base's first."""
+    """Return the (n, k) [m] distances of sections from the tip, the base's first."""
     ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
     if not weight.any():
         return ends
@@ -129,7 +129,7 @@ def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
 def _on_sections(
     wrench: NDArray, weight: NDArray, s: NDArray, length: float
 ) -> NDArray:
-    """(n, k, 6) [N m, N] on sections (n, k) at distances s from the tip."""
+    """Return the (n, k, 6) [N m, N] on sections (n, k) at distances s from the tip."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
     # force at half of the distance: what the part between tip and section weighs
@@ -147,7 +147,7 @@ def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Fibres of a section and the stresses that moments and forces cause there.
+    """Return fibres of a section and the stresses that moments and forces cause there.
 
     Args:
         section: as in :func:`peak_beam_stress`.
@@ -183,7 +183,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
-    """(p, 3, 6) normal stress of axial force and bending; shear is zero."""
+    """Return the (p, 3, 6) normal stress of axial force and bending; shear is zero."""
     influence = np.zeros((len(y), 3, 6))
     influence[:, 0, 1] = z / section.I_y
     influence[:, 0, 2] = -y / section.I_z
@@ -192,7 +192,7 @@ def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
 
 
 def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArray]:
-    """The outer circle: shear stress runs along it."""
+    """Return the outer circle: shear stress runs along it."""
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     along = np.column_stack([-out[:, 1], out[:, 0]])
@@ -208,7 +208,7 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
 def _rectangle(
     section: Section, width: float, height: float
 ) -> tuple[NDArray, NDArray]:
-    """A grid over the whole section."""
+    """Return a grid over the whole section."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
     influence = _bending(section, y, z)
@@ -240,7 +240,7 @@ def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArr
 def _hollow(
     section: Section, width: float, height: float, wall: float
 ) -> tuple[NDArray, NDArray]:
-    """The outer sides, counterclockwise; shear runs along them."""
+    """Return the outer sides, counterclockwise; shear runs along them."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):

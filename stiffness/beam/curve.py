@@ -49,7 +49,7 @@ def straight_piece(
     section: Section | Callable[[float], Section],
     up: ArrayLike | None = None,
 ) -> Piece:
-    """A straight piece, tapered if its section is a function of t.
+    """Return a straight piece, tapered if its section is a function of t.
 
     Args:
         start: (3,) [m].
@@ -80,7 +80,7 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """An arc of a circle; the section's z is the axis it turns about.
+    """Return an arc of a circle; the section's z is the axis it turns about.
 
     Args:
         start: (3,) [m] where it begins.
@@ -111,7 +111,7 @@ def arc_piece(
 def _as_function(
     section: Section | Callable[[float], Section],
 ) -> Callable[[float], Section]:
-    """A section at t, whether or not it changes."""
+    """Return a section at t, whether or not it changes."""
     return (lambda t: section) if isinstance(section, Section) else section
 
 
@@ -123,7 +123,7 @@ def curve_compliance(
     theory: str = "timoshenko",
     tolerance: float = 1e-10,
 ) -> NDArray:
-    """Tip compliance of a beam along a curve.
+    """Return the tip compliance of a beam along a curve.
 
     Args:
         pieces: from base to tip, each beginning where the one before ends.
@@ -181,7 +181,7 @@ def curve_compliance(
 
 
 def curve_length(pieces: Sequence[Piece]) -> float:
-    """Length of a beam along its curve.
+    """Return the length of a beam along its curve.
 
     Args:
         pieces: straight ones and arcs, base to tip.

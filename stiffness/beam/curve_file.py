@@ -14,7 +14,7 @@ _LARGEST = 1e6  # in SI: beyond any beam
 
 
 def read_curve(path: Path | str, nu: float) -> list[Piece]:
-    """The pieces of a beam.
+    """Return the pieces of a beam.
 
     Args:
         path: TOML with tables ``[[piece]]``.  Each has a ``section``, as in a robot
@@ -52,7 +52,7 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
 
 
 def _section(part: Table, key: str) -> dict[str, float]:
-    """Lengths or constants of a section by name."""
+    """Return the lengths or constants of a section by name."""
     inner = part.table(key)
     given = {
         name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
@@ -86,7 +86,7 @@ def _piece(
 def _tapered(
     part: Table, section: Mapping[str, float], nu: float
 ) -> Section | Callable[[float], Section]:
-    """A constant section, or one whose lengths change linearly."""
+    """Return a constant section, or one whose lengths change linearly."""
     constant = declared_section(section, nu)
     if not part.has("tip_section"):
         return constant

@@ -60,7 +60,7 @@ _SECTIONS = (
 
 
 def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Section:
-    """Section of a round bar or tube.
+    """Return the section of a round bar or tube.
 
     Args:
         radius: [m] outer radius, > 0.
@@ -93,7 +93,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
 
 
 def rectangular_section(width: float, height: float, nu: float) -> Section:
-    """Section of a solid rectangular bar.
+    """Return the section of a solid rectangular bar.
 
     Args:
         width: [m] along the section's y, > 0.
@@ -125,7 +125,7 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def _rectangle_torsion(width: float, height: float) -> float:
-    """Saint-Venant's series; the terms left out sum to less than 1e-16 of it."""
+    """Return Saint-Venant's series; the terms left out sum to less than 1e-16 of it."""
     long, short = max(width, height), min(width, height)
     odd = np.arange(1.0, 2001.0, 2.0)
     # tanh is 1 for all but the first few terms; their tail decays as n^-4
@@ -134,7 +134,7 @@ def _rectangle_torsion(width: float, height: float) -> float:
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Hollow rectangle of one wall thickness.
+    """Return the hollow rectangle of one wall thickness.
 
     Args:
         width: [m] outside, along y.
@@ -169,7 +169,7 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Cowper's thin box of one wall; force along ``along``."""
+    """Return Cowper's thin box of one wall; force along ``along``."""
     m = n = across / along  # flange over web area of equal walls is the same ratio
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
@@ -181,7 +181,7 @@ def _box_shear(along: float, across: float, nu: float) -> float:
 def i_section(
     width: float, height: float, web: float, flange: float, nu: float
 ) -> Section:
-    """I-beam with equal flanges, the web along z (up).
+    """Return the i-beam with equal flanges, the web along z (up).
 
     Args:
         width: [m] of the flanges, along y.
@@ -223,7 +223,7 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """The section of a beam from the numbers that declare it.
+    """Return the section of a beam from the numbers that declare it.
 
     Args:
         given: ``radius`` and perhaps ``inner_radius``; or ``width`` and ``height`` and

@@ -86,12 +86,12 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
 
 
 def both_halves(matrix: csr_array) -> csr_array:
-    """A matrix of which one half is stored, whole."""
+    """Return a matrix of which one half is stored, whole."""
     return csr_array(matrix + matrix.T - diags_array(matrix.diagonal()))
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Numbers in fields of one width."""
+    """Return the numbers in fields of one width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -148,7 +148,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """A number of a row or node."""
+    """Return a number of a row or node."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
     return int(word)

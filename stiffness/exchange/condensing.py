@@ -27,7 +27,7 @@ _ON = 1e-6  # of the body's size: how near a node lies on its interface
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
-    """Places of nodes: lines of number, x, y, z between commas or blanks.
+    """Return the places of nodes: lines of number, x, y, z between commas or blanks.
 
     Args:
         path: the file; lines that begin with ``*`` or ``#`` are passed over. Of a deck
@@ -100,7 +100,7 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
 def interface_rows(
     matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
 ) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Rows of an interface, and how a screw of it moves them.
+    """Return the rows of an interface, and how a screw of it moves them.
 
     Args:
         matrix: with its freedoms.
@@ -156,7 +156,7 @@ def interface_rows(
 
 
 def _on(interface: Interface, places: NDArray) -> NDArray:
-    """(n,) bool: what lies on an interface."""
+    """Return the (n,) bool: what lies on an interface."""
     size = float(np.ptp(places, axis=0).max(initial=0.0)) or 1.0
     near = interface.distance(places) < _ON * size
     if interface.kind == "disc":
@@ -168,7 +168,7 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """The matrix of two interfaces, all other freedoms left to themselves.
+    """Return the matrix of two interfaces, all other freedoms left to themselves.
 
     Args:
         matrix: (n, n).

@@ -50,7 +50,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """A file's content.
+    """Return a file's content.
 
     Args:
         stiffness: (6, 6) K_E at the tip, SI, our order.
@@ -86,19 +86,19 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Row, column, value of the lower half, column by column."""
+    """Return the row, column, value of the lower half, column by column."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
 def _matrix_market(K: NDArray) -> str:
-    """Matrix Market, symmetric."""
+    """Return the matrix Market, symmetric."""
     rows = [f"{i + 1} {j + 1} {v!r}" for i, j, v in _lower(K)]
     head = "%%MatrixMarket matrix coordinate real symmetric\n% X Y Z RX RY RZ, twice"
     return "\n".join([head, f"12 12 {len(rows)}", *rows]) + "\n"
 
 
 def _user_element(K: NDArray) -> str:
-    """Abaqus ``*USER ELEMENT``, four numbers a line."""
+    """Return Abaqus ``*USER ELEMENT``, four numbers a line."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):
@@ -108,7 +108,7 @@ def _user_element(K: NDArray) -> str:
 
 
 def _five_columns(K: NDArray) -> str:
-    """Node, direction, node, direction, value."""
+    """Return the node, direction, node, direction, value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
         for i, j, v in _lower(K)
@@ -116,7 +116,7 @@ def _five_columns(K: NDArray) -> str:
 
 
 def _dmig(K: NDArray) -> str:
-    """Nastran DMIG in large fields, form 6; sixteen characters a number."""
+    """Return Nastran DMIG in large fields, form 6; sixteen characters a number."""
     lines = ["DMIG    K2GG           0       6       2       0"]
     for j in range(12):
         lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")

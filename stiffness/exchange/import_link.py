@@ -27,7 +27,7 @@ def import_link(
     unit: str = "m",
     order: str = ORDERS[0],
 ) -> LinkStiffness:
-    """A link from a matrix of 6, 12 or more freedoms.
+    """Return a link from a matrix of 6, 12 or more freedoms.
 
     Args:
         path: of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
@@ -92,7 +92,7 @@ def import_link(
 def _ends(
     matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
 ) -> list[tuple[NDArray, NDArray, NDArray | None]]:
-    """Rows, motions and point of base and tip."""
+    """Return the rows, motions and point of base and tip."""
     return [
         interface_rows(matrix, asked, option, places)
         for asked, option in ((base, "--base"), (tip, "--tip"))
@@ -100,7 +100,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """The matrix with freedoms named as its file orders them."""
+    """Return the matrix with freedoms named as its file orders them."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -108,7 +108,7 @@ def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
 
 
 def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
-    """The matrix with shifts in metres and work in joules.
+    """Return the matrix with shifts in metres and work in joules.
 
     Args:
         matrix: with forces in N, turns in rad and shifts in ``length``.

@@ -67,7 +67,7 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """A matrix of a file, its kind told by its content.
+    """Return a matrix of a file, its kind told by its content.
 
     Args:
         path: the file.
@@ -114,7 +114,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Freedoms of n rows by a mapping file."""
+    """Return the freedoms of n rows by a mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -137,7 +137,7 @@ def _checked(
     freedoms: list[Freedom] | None,
     nodes: Sequence[int] | None,
 ) -> FileMatrix:
-    """The matrix, if it is square, finite and symmetric."""
+    """Return the matrix, if it is square, finite and symmetric."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(f"{path}: found {matrix.shape} numbers, expected a square")
@@ -160,7 +160,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Freedoms of n rows without names: three or six a node."""
+    """Return the freedoms of n rows without names: three or six a node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -175,7 +175,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """``.npy``, or a sparse ``.npz``; never a pickle."""
+    """Return ``.npy``, or a sparse ``.npz``; never a pickle."""
     from scipy.sparse import load_npz
 
     try:
@@ -278,7 +278,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
 
 
 def _named_by(path: Path, n: int) -> list[Freedom]:
-    """CalculiX's ``.dof``: ``node.direction`` of each row."""
+    """Return CalculiX's ``.dof``: ``node.direction`` of each row."""
     words = read_text(path).split()
     freedoms: list[Freedom] = []
     for word in words:
@@ -297,7 +297,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """A matrix from entries of one half or both."""
+    """Return a matrix from entries of one half or both."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -308,7 +308,7 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """A matrix from entries by the names of their rows."""
+    """Return a matrix from entries by the names of their rows."""
     # a half that is not there is the other one's
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]

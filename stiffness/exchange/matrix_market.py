@@ -84,7 +84,7 @@ def _numbers(path: Path, lines: list[str]) -> NDArray:
 
 
 def _size(path: Path, sizes: NDArray) -> int:
-    """Rows of a square, from the first numbers of a file."""
+    """Return the rows of a square, from the first numbers of a file."""
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(

@@ -26,7 +26,7 @@ _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
 
 
 def bulk_fields(line: str) -> tuple[str, list[str]]:
-    """The fields of a line of bulk data.
+    """Return the fields of a line of bulk data.
 
     Args:
         line: with fields of fixed width, or between commas or blanks.
@@ -48,7 +48,7 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
 
 
 def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
-    """Entries of the stiffness or mass matrix among those of a file.
+    """Return the entries of the stiffness or mass matrix among those of a file.
 
     Args:
         path: for messages.
@@ -93,7 +93,7 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
 def _terms(
     path: Path | str, fields: list[str], packed: bool
 ) -> list[tuple[Freedom, float]]:
-    """Rows and values of a column: node, direction, real part, imaginary part.
+    """Return rows and values of a column: node, direction, real part, imaginary part.
 
     Args:
         path: for messages.
@@ -133,7 +133,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """The name of the one stiffness or mass matrix."""
+    """Return the name of the one stiffness or mass matrix."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]

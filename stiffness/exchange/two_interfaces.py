@@ -21,7 +21,7 @@ _FARTHEST = 1e6  # [m] of a base from its tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """K12 of a link.
+    """Return K12 of a link.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
@@ -42,7 +42,7 @@ def link_of_both_ends(
     base: ArrayLike | None = None,
     tip: ArrayLike | None = None,
 ) -> LinkStiffness:
-    """The link that a matrix of two interfaces is.
+    """Return the link that a matrix of two interfaces is.
 
     Args:
         K12: (12, 12) in SI, in our order.
@@ -90,7 +90,7 @@ def link_of_both_ends(
 def mass_of_both_ends(
     M12: ArrayLike, offset: ArrayLike
 ) -> tuple[float, NDArray, NDArray]:
-    """Mass, its centre and its moments from a mass matrix of two interfaces.
+    """Return the mass, its centre and its moments from a mass matrix of two interfaces.
 
     Args:
         M12: (12, 12) in SI, in our order.

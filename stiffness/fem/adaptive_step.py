@@ -89,7 +89,7 @@ def solve_level(
     interface: str,
     check: Callable[[int], None] | None = None,
 ) -> Level:
-    """Stiffness, fields and local error indicators of one mesh.
+    """Return the stiffness, fields and local error indicators of one mesh.
 
     Args:
         solid: straight tetrahedra; those that would be inverted when curved, or that
@@ -177,7 +177,7 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """The middle of the interval in which the exact stiffness lies.
+    """Return the middle of the interval in which the exact stiffness lies.
 
     Args:
         K_h: (6, 6) of a mesh, an upper bound but for the geometry.

@@ -46,7 +46,7 @@ def condense(
     centers: NDArray,
     kind: str = "rigid",
 ) -> Condensed:
-    """Stiffness of a meshed link.
+    """Return the stiffness of a meshed link.
 
     Args:
         mesh: the tetrahedra; patch 0 is the base, 1 the tip.
@@ -67,7 +67,7 @@ def condense(
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
-    """Displacements of points for unit screws at a centre.
+    """Return the displacements of points for unit screws at a centre.
 
     Args:
         points: (n, 3) [m].
@@ -81,12 +81,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """K times fields, from K's upper triangle."""
+    """Return K times fields, from K's upper triangle."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Base nodes fixed, tip nodes moved by six unit screws."""
+    """Return the base nodes fixed, tip nodes moved by six unit screws."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -155,7 +155,7 @@ def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
 
 
 def _isostatic_supports(mesh: Elements) -> NDArray:
-    """(6,) fixed unknowns of an isostatic support, at three nodes far apart."""
+    """Return (6,) fixed unknowns of an isostatic support, at three nodes far apart."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)

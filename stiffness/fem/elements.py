@@ -87,7 +87,7 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Elements whose boundary nodes lie on the exact shapes.
+    """Return the elements whose boundary nodes lie on the exact shapes.
 
     Args:
         solid: the straight tetrahedra.
@@ -163,7 +163,7 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Quadrature of stresses over boundary triangles.
+    """Return the quadrature of stresses over boundary triangles.
 
     Args:
         mesh: the tetrahedra.
@@ -195,7 +195,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """(c, q, 3, 3) derivatives of the place, reference coordinates first."""
+    """Return the (c, q, 3, 3) derivatives of the place, reference coordinates first."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -221,7 +221,7 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Quadrature over curved triangles.
+    """Return the quadrature over curved triangles.
 
     Args:
         mesh: whose nodes they have.
@@ -235,14 +235,14 @@ def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
+    """Return shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
     N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
     return N, np.cross(J[:, :, 0], J[:, :, 1]) * weights[:, None]
 
 
 def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Quadrature on a triangle that integrates products of two shape functions.
+    """Return quadrature on a triangle that integrates products of two shape functions.
 
     Args:
         order: of the polynomials.
@@ -256,7 +256,7 @@ def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:
-    """Lame's constants.
+    """Return Lame's constants.
 
     Args:
         E: [Pa] Young's modulus.
@@ -269,7 +269,7 @@ def lame(E: float, nu: float) -> tuple[float, float]:
 
 
 def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
-    """The stiffness of all elements together.
+    """Return the stiffness of all elements together.
 
     Args:
         mesh: the tetrahedra.
@@ -321,7 +321,7 @@ def _node_blocks(
 
 
 def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """(c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
+    """Return the (c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk of S (c, 3, 3, p)."""
     m = mu[:, None, None, None]
     block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
     block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
@@ -329,7 +329,7 @@ def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
-    """The upper triangle from blocks (9, k) of nodes' pairs, row by row in order."""
+    """Return upper triangle from blocks (9, k) of nodes' pairs, row by row in order."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
     # a node's own block comes first: its second row lacks one entry, its third two

@@ -52,7 +52,7 @@ def error_matrices(
     singular: NDArray,
     stiffness: NDArray,
 ) -> NDArray:
-    """Estimated error of the stiffness, element by element.
+    """Return the estimated error of the stiffness, element by element.
 
     Args:
         mesh: cubic tetrahedra.
@@ -89,7 +89,7 @@ def error_matrices(
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Energies of the fields that balance residual tractions on free faces.
+    """Return the energies of the fields that balance residual tractions on free faces.
 
     Args:
         mesh: the tetrahedra.
@@ -138,7 +138,7 @@ def geometry_errors(
     mu: NDArray,
     surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Error of the stiffness because elements deviate from the exact shapes.
+    """Return the error of the stiffness because elements deviate from the exact shapes.
 
     Args:
         mesh: the tetrahedra.
@@ -240,7 +240,7 @@ def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
-    """(c, k, k) integrals of products of energy roots, case by case."""
+    """Return the (c, k, k) integrals of products of energy roots, case by case."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

@@ -124,7 +124,7 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Stiffness of a link of one material, from a surface file.
+    """Return the stiffness of a link of one material, from a surface file.
 
     Args:
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
@@ -312,7 +312,7 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """A coarse mesh to refine from, fine enough for the part's walls.
+    """Return a coarse mesh to refine from, fine enough for the part's walls.
 
     Args:
         surface: of the link.
@@ -360,7 +360,7 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """How much slower than expected a mesh was solved; at least 1."""
+    """Return how much slower than expected a mesh was solved; at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
@@ -370,7 +370,7 @@ def _processor_seconds() -> float:
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
-    """How much slower than alone work was, by its processor time; at least 1."""
+    """Return how much slower than alone work was, by its processor time; at least 1."""
     # what takes a moment only says little; Windows does not count the mesher's time
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
@@ -407,7 +407,7 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """A finer mesh within the budget, its number of elements grown as wanted."""
+    """Return a finer mesh within the budget, its number of elements grown as wanted."""
     part = growth**0.55 - 1  # neighbours add about as many elements again
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1

@@ -25,7 +25,7 @@ class PointMass:
 def mass_properties(
     mesh: Elements, density: NDArray, point_masses: Sequence[PointMass] = ()
 ) -> tuple[float, NDArray, NDArray]:
-    """Mass, centre and inertia of elements and added points.
+    """Return the mass, centre and inertia of elements and added points.
 
     Args:
         mesh: the tetrahedra.

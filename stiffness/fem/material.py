@@ -45,7 +45,7 @@ class Material:
 def material_of_elements(
     mesh: Elements, materials: Sequence[Material], cut_region: NDArray | None = None
 ) -> NDArray:
-    """Material of each element, taken at its centre.
+    """Return the material of each element, taken at its centre.
 
     Args:
         mesh: the tetrahedra.
@@ -69,7 +69,7 @@ def material_of_elements(
 
 
 def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
-    """Material at points of a link.
+    """Return the material at points of a link.
 
     Args:
         points: (n, 3) [m].
@@ -82,7 +82,7 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
 
 
 def _constants(materials: Sequence[Material]) -> NDArray:
-    """(m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
+    """Return the (m, 3) lambda [Pa], mu [Pa] and density [kg/m^3]."""
     return np.array([(*lame(m.E, m.nu), m.density) for m in materials])
 
 

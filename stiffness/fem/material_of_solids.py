@@ -64,7 +64,7 @@ def placed_materials(
 
 
 def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
-    """Names of the solids of a material."""
+    """Return the names of the solids of a material."""
     text = material.solid
     names = (text,) if text in solids.names or not text else tuple(text.split("+"))
     for one in names if text else ():
@@ -77,7 +77,7 @@ def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, 
 def _placed(
     solids: FilledSolids, names: tuple[str, ...], material: Material
 ) -> Material:
-    """A material with the place and the faces of its solids."""
+    """Return a material with the place and the faces of its solids."""
     triangles, within = solids.around(names)
     triangles = orient_shells(triangles)[0]
     used, index = np.unique(triangles, return_inverse=True)
@@ -94,7 +94,7 @@ def _placed(
 
 
 def _enclosed(bound: Surface, points: NDArray) -> NDArray:
-    """Whether points are inside a closed surface."""
+    """Return whether points are inside a closed surface."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints

@@ -56,7 +56,7 @@ def parse_part(option: str, text: str) -> Material:
 
 
 def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
-    """Lower and upper corner of a box, infinite where an axis is not named."""
+    """Return lower and upper corner of a box, infinite where an axis is not named."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
@@ -105,7 +105,7 @@ def scaled_part(text: str, factor: float) -> str:
 
 
 def parse_mass(option: str, text: str) -> PointMass:
-    """A mass at a point, ``1.5/0,0,0.452``.
+    """Return a mass at a point, ``1.5/0,0,0.452``.
 
     Args:
         option: for the message.
@@ -136,5 +136,5 @@ def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
-    """Whether points are in a box."""
+    """Return whether points are in a box."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

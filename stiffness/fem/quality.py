@@ -14,7 +14,7 @@ _FLAT = 0.01  # quality of a tetrahedron that says little and conditions badly
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
-    """Counts, size and shape of a mesh.
+    """Return the counts, size and shape of a mesh.
 
     Args:
         solid: the straight tetrahedra.
@@ -48,7 +48,7 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
 
 
 def volume_error(solid: Solid, mesh: Elements) -> float:
-    """How far the volume of a mesh may be from that of the part.
+    """Return how far the volume of a mesh may be from that of the part.
 
     Args:
         solid: the straight tetrahedra.
@@ -65,7 +65,7 @@ def volume_error(solid: Solid, mesh: Elements) -> float:
 
 
 def dihedral_angles(solid: Solid) -> NDArray:
-    """Angles between the faces of tetrahedra.
+    """Return the angles between the faces of tetrahedra.
 
     Args:
         solid: straight tetrahedra.

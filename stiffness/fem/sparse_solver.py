@@ -43,7 +43,7 @@ def solver_name() -> str:
 
 
 def _mkl() -> str | None:
-    """MKL's library as its package lists it."""
+    """Return MKL's library as its package lists it."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -86,7 +86,7 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
 
 def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
-    """PARDISO's symmetric positive definite path."""
+    """Return PARDISO's symmetric positive definite path."""
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)

@@ -103,7 +103,7 @@ class StressInfluence:
         return words
 
     def stresses(self, wrench: ArrayLike) -> NDArray:
-        """Stresses of a tip wrench.
+        """Return the stresses of a tip wrench.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -114,7 +114,7 @@ class StressInfluence:
         return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
 
     def peak(self, wrench: ArrayLike) -> tuple[float, NDArray]:
-        """Largest von Mises stress of a tip wrench, and where.
+        """Return the largest von Mises stress of a tip wrench, and where.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -127,7 +127,7 @@ class StressInfluence:
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Estimated error of the peak of a tip wrench, that of the mesh.
+        """Return the estimated error of the peak of a tip wrench, that of the mesh.
 
         Args:
             wrench: (6,) [N m, N] at the tip, in the link's axes.
@@ -189,7 +189,7 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Largest von Mises stress of a tip wrench, with the beam formula beside it.
+    """Return largest von Mises stress of a tip wrench, with the beam formula beside it.
 
     Args:
         solved: from :func:`stiffness.fem.fea.solve_link`.
@@ -250,7 +250,7 @@ def peak_stress(
 
 
 def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
-    """Stresses of the six unit tip wrenches of a solved link.
+    """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
         solved: from :func:`stiffness.fem.fea.solve_link`; where two materials meet, a
@@ -291,7 +291,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
 
 
 def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
-    """Whether the peak lies on a surface of no recognised shape."""
+    """Return whether the peak lies on a surface of no recognised shape."""
     if field.source is None:
         return False
     worst = int(np.argmax(von_mises(field.stresses(wrench))))
@@ -307,7 +307,7 @@ def _motions(level: Level) -> NDArray:
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
-    """[m] largest distance of an interface's nodes from its centroid."""
+    """Return the [m] largest distance of an interface's nodes from its centroid."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)
     first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])

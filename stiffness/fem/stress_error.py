@@ -36,7 +36,7 @@ ZONE = 0.9  # of the peak: stresses that are nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
-    """Equivalent stress.
+    """Return the equivalent stress.
 
     Args:
         stress: (..., 6) [Pa] xx yy zz yz xz xy.
@@ -51,7 +51,7 @@ def von_mises(stress: ArrayLike) -> NDArray:
 
 
 def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArray:
-    """Stresses of elements at their nodes.
+    """Return the stresses of elements at their nodes.
 
     Args:
         level: a solved mesh.
@@ -103,7 +103,7 @@ def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
 def estimated_error(
     level: "Level", motion: NDArray, node: int, zone: NDArray, left_out: NDArray
 ) -> float:
-    """Estimated error of a peak stress.
+    """Return the estimated error of a peak stress.
 
     Args:
         level: a solved mesh of n nodes, by :func:`nodes_by_material`.
@@ -178,7 +178,7 @@ def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
 
 
 def off_shapes(level: "Level") -> NDArray:
-    """Nodes where the mesh does not follow the part's surface.
+    """Return the nodes where the mesh does not follow the part's surface.
 
     Args:
         level: a solved mesh of n nodes.
@@ -204,7 +204,7 @@ def off_shapes(level: "Level") -> NDArray:
 
 
 def on_facets(level: "Level") -> NDArray:
-    """Nodes on a surface of no recognised shape.
+    """Return the nodes on a surface of no recognised shape.
 
     Args:
         level: a solved mesh of n nodes.

@@ -53,7 +53,7 @@ class CurvedElements:
 
 
 def curved_elements(solid: Solid, order: int) -> CurvedElements:
-    """Curved elements of a solid.
+    """Return the curved elements of a solid.
 
     Args:
         solid: straight tetrahedra.
@@ -103,7 +103,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
 
 def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
-    """Patches of tetrahedra's faces.
+    """Return the patches of tetrahedra's faces.
 
     Args:
         faces: (f, 3) corners of the triangles that are on patches.
@@ -150,7 +150,7 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, moved_nodes: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """(t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
+    """Return (t, 6, 2, 3) displacements of edges' nodes, which lie at their thirds."""
     # interpolated at the Lobatto points, where a cubic's error against an arc has zero
     # mean, then evaluated at the thirds
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2

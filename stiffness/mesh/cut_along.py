@@ -39,12 +39,12 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """(f,) boundary triangles of the two patches."""
+    """Return the (f,) boundary triangles of the two patches."""
     return np.isin(solid.patch, outline.patches)
 
 
 def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """(k, 2) edges of the two patches' triangles, in order."""
+    """Return the (k, 2) edges of the two patches' triangles, in order."""
     faces = solid.faces[_members(solid, outline)]
     pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)

@@ -72,7 +72,7 @@ def whole_elements(solid: Solid) -> Parts:
 
 
 def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
-    """Edges of a solid at which stresses are singular.
+    """Return the edges of a solid at which stresses are singular.
 
     Args:
         solid: any.

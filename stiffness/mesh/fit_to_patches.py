@@ -66,7 +66,7 @@ def fit_to_patches(
 
 
 def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Points that are used, and cells turned to positive volume."""
+    """Return the points that are used, and cells turned to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -78,7 +78,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Patch of each boundary face: the nearest one of about the same normal."""
+    """Return patch of each boundary face: the nearest one of about the same normal."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

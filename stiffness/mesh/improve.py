@@ -35,7 +35,7 @@ _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)
 
 
 def fitted(solid: Solid, limit: float | None = None) -> Solid:
-    """Corners on their shapes, and tetrahedra mended that this flattened.
+    """Return the corners on their shapes, and tetrahedra mended that this flattened.
 
     Args:
         solid: whose corners may be off the shapes of their patches.

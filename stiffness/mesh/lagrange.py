@@ -27,7 +27,7 @@ FACES = np.array(list(combinations(range(4), 3)))  # the k-th lacks corner 3 - k
 
 @lru_cache(maxsize=16)
 def lattice(degree: int, corners: int = 4) -> NDArray:
-    """Barycentric coordinates of a lattice, as multiples of 1 / degree.
+    """Return the barycentric coordinates of a lattice, as multiples of 1 / degree.
 
     Args:
         degree: of the polynomials, >= 1.
@@ -58,7 +58,7 @@ def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
 
 
 def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
-    """Polynomials that are 1 at one point of the lattice and 0 at the others.
+    """Return polynomials that are 1 at one point of the lattice and 0 at the others.
 
     Args:
         degree: of the polynomials.
@@ -88,7 +88,7 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Numbers of the lattices' points, shared by the elements that share them.
+    """Return numbers of the lattices' points, shared by the elements that share them.
 
     Args:
         corners: (t, 4) numbers of the corners, rising in each row.

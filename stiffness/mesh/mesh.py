@@ -50,7 +50,7 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Tetrahedra of a surface, from the cache if they were made before.
+    """Return the tetrahedra of a surface, from the cache if they were made before.
 
     Args:
         surface: of the link.
@@ -86,7 +86,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Points and cells of a cached mesh; None if absent or damaged."""
+    """Return the points and cells of a cached mesh; None if absent or damaged."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]

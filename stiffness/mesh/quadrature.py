@@ -105,7 +105,7 @@ _TETRAHEDRON = (
 
 @lru_cache(maxsize=16)
 def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """A rule on the reference element, exact to at least a degree.
+    """Return a rule on the reference element, exact to at least a degree.
 
     Args:
         degree: of polynomials, up to 6.

@@ -102,7 +102,7 @@ def split_edges(
 
 
 def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
-    """Edges of tetrahedra.
+    """Return the edges of tetrahedra.
 
     Args:
         cells: (t, 4) corners.
@@ -131,7 +131,7 @@ def edge_code(ends: NDArray, points: int) -> NDArray:
 
 
 def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
-    """Ranks of edges by length.
+    """Return the ranks of edges by length.
 
     Args:
         points: (n, 3) [m].
@@ -147,7 +147,7 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Edges that all tetrahedra around them have chosen.
+    """Return the edges that all tetrahedra around them have chosen.
 
     Args:
         of_cell: (t, 6) of :func:`edges_of`.

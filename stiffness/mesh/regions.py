@@ -42,7 +42,7 @@ class Region:
 
 
 def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """The region of each tetrahedron.
+    """Return the region of each tetrahedron.
 
     Args:
         solid: any.
@@ -58,7 +58,7 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 def region_of_places(
     places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
 ) -> NDArray:
-    """The region of places inside tetrahedra.
+    """Return the region of places inside tetrahedra.
 
     Args:
         places: (n, 3) [m].
@@ -107,7 +107,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Whether a face between regions runs through tetrahedra.
+    """Return whether a face between regions runs through tetrahedra.
 
     Args:
         solid: any.
@@ -126,7 +126,7 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Edges of the boundary between two regions, at which stresses are singular.
+    """Return edges of the boundary between two regions, at which stresses are singular.
 
     Args:
         solid: any.
@@ -141,7 +141,7 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
 
 def edges_between(solid: Solid, region: NDArray) -> NDArray:
-    """Edges of the boundary at which two regions meet.
+    """Return the edges of the boundary at which two regions meet.
 
     Args:
         solid: any.

@@ -29,7 +29,7 @@ _SAME_VOLUME = 1e-3
 
 
 def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | None:
-    """The mesh of a slender or thin-walled straight bar.
+    """Return the mesh of a slender or thin-walled straight bar.
 
     Args:
         surface: of the link.
@@ -151,7 +151,7 @@ def _area(lengths: dict[str, float]) -> float:
 
 
 def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
-    """A bar of unit length along z, turned, scaled and moved."""
+    """Return a bar of unit length along z, turned, scaled and moved."""
 
     def moved(shape: Shape | None) -> Shape | None:
         if isinstance(shape, Plane):

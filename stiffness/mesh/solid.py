@@ -55,7 +55,7 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Shapes that corners are to lie on.
+    """Return the shapes that corners are to lie on.
 
     Args:
         solid: any.
@@ -69,7 +69,7 @@ def meeting_shapes(
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Corners of a solid that are to lie on shapes.
+    """Return the corners of a solid that are to lie on shapes.
 
     Args:
         solid: any.
@@ -88,7 +88,7 @@ def _meeting_shapes(
     walls: Mapping[tuple[int, int], Shape],
     points: NDArray,
 ) -> tuple[Shape, ...]:
-    """Shapes whose intersection points with some patches are to lie on."""
+    """Return the shapes whose intersection points with some patches are to lie on."""
     # tangent shapes do not determine their common line: the wall on it does
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
@@ -100,7 +100,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Whether two shapes have the same normal near some points."""
+    """Return whether two shapes have the same normal near some points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -108,7 +108,7 @@ def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
 
 
 def element_quality(solid: Solid) -> NDArray:
-    """How well shaped tetrahedra are.
+    """Return how well shaped tetrahedra are.
 
     Args:
         solid: straight tetrahedra.
@@ -120,7 +120,7 @@ def element_quality(solid: Solid) -> NDArray:
 
 
 def tetrahedra_quality(corners: NDArray) -> NDArray:
-    """Shape of tetrahedra: 6 sqrt(2) volume over the cube of the rms edge.
+    """Return the shape of tetrahedra: 6 sqrt(2) volume over the cube of the rms edge.
 
     Args:
         corners: (t, 4, 3) [m].
@@ -136,7 +136,7 @@ def tetrahedra_quality(corners: NDArray) -> NDArray:
 
 
 def boundary_faces(cells: NDArray) -> NDArray:
-    """Faces that belong to one tetrahedron only.
+    """Return the faces that belong to one tetrahedron only.
 
     Args:
         cells: (t, 4) of positive volume.
@@ -156,7 +156,7 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Nodes grouped by the set of patches they lie on.
+    """Return the nodes grouped by the set of patches they lie on.
 
     Args:
         nodes: how many there are.
@@ -183,7 +183,7 @@ def on_shapes(
     reach: float,
     walls: Mapping[tuple[int, int], Shape] | None = None,
 ) -> NDArray:
-    """Points moved onto the shapes of their patches.
+    """Return the points moved onto the shapes of their patches.
 
     Args:
         points: (n, 3) [m].

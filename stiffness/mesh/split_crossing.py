@@ -40,7 +40,7 @@ def split_crossing(
 
 
 def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
-    """Edges to split at once: at most one of each tetrahedron.
+    """Return the edges to split at once: at most one of each tetrahedron.
 
     Args:
         wanted: (e,) edges that are to be split.

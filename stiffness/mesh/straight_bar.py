@@ -27,7 +27,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Solid:
-    """A bar of unit length along z, its section's y and z along x and y.
+    """Return a bar of unit length along z, its section's y and z along x and y.
 
     Args:
         section: lengths of :func:`stiffness.beam.sections.declared_section`, per length
@@ -61,7 +61,7 @@ def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Sol
 
 
 def _thinnest(section: Mapping[str, float]) -> float:
-    """The smallest thickness of a section."""
+    """Return the smallest thickness of a section."""
     if "radius" in section:
         return section["radius"] - section.get("inner_radius", 0.0)
     return min(section.values())
@@ -77,7 +77,7 @@ def _heights(first: float, longest: float) -> NDArray:
 
 
 def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Triangles of a disc or a ring: points and corners."""
+    """Return the triangles of a disc or a ring: points and corners."""
     radius, inner = section["radius"], section.get("inner_radius", 0.0)
     angle = min(
         2 * np.pi / _AROUND, math.sqrt(_IN_WALL * (radius - inner) / radius),
@@ -98,7 +98,7 @@ def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Triangles of a rectangle, a box or an I: points and corners."""
+    """Return the triangles of a rectangle, a box or an I: points and corners."""
     width, height = section["width"], section["height"]
     x_cuts, y_cuts = [width / 2], [height / 2]
     if "wall" in section:
@@ -127,7 +127,7 @@ def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _divided(cuts: NDArray, longest: float) -> NDArray:
-    """The same cuts with others between, none further apart than that."""
+    """Return the same cuts with others between, none further apart than that."""
     parts = [
         np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
         for low, high in zip(cuts, cuts[1:], strict=False)

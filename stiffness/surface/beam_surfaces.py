@@ -51,7 +51,7 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
-    """Closed surface of a shape.
+    """Return the closed surface of a shape.
 
     Args:
         shape: one of ``SHAPES``.
@@ -88,7 +88,7 @@ def _prism(
     name: str,
     hole: NDArray | None = None,
 ) -> Surface:
-    """Two outlines joined, closed by fans, or by rings around a hole."""
+    """Return two outlines joined, closed by fans, or by rings around a hole."""
     count = len(base)
     inner = np.zeros((1, 2)) if hole is None else hole
     layers = [base, tip, inner, inner]
@@ -111,7 +111,7 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """The same shape as a beam along z, height along y.
+    """Return the same shape as a beam along z, height along y.
 
     Args:
         shape: one of ``SHAPES``.

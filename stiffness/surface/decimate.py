@@ -15,7 +15,7 @@ _PARTS = 0.01 * 1.4 ** np.arange(13)  # of the triangles, tried one after the ot
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """The fewest triangles within a tolerance of a surface, among a dozen tries.
+    """Return the fewest triangles within a tolerance of a surface, among a dozen tries.
 
     Args:
         surface: closed.
@@ -63,13 +63,13 @@ def _distance(mesh: object, points: NDArray) -> float:
 
 
 def _closed(triangles: NDArray) -> bool:
-    """Whether every edge has two triangles."""
+    """Return whether every edge has two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Corners less edges plus triangles: 2 - 2 genus for each closed shell.
+    """Return the corners less edges plus triangles: 2 - 2 genus for each closed shell.
 
     Args:
         triangles: (m, 3) corners.

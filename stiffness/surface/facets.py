@@ -38,7 +38,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Facets' normals averaged at corners, weighted by the angle there."""
+        """Return facets' normals averaged at corners, weighted by the angle there."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -99,7 +99,7 @@ def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
 
 
 def _barycentric(corners: NDArray, points: NDArray) -> NDArray:
-    """(p, 3) shares of the corners (p, 3, 3) in points of their planes."""
+    """Return the (p, 3) shares of the corners (p, 3, 3) in points of their planes."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.maximum(np.einsum("pi,pi->p", normal, normal), 1e-300)
     shares = [

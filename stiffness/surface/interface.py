@@ -57,7 +57,7 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Distance of points from the interface's plane or cylinder.
+        """Return the distance of points from the interface's plane or cylinder.
 
         Args:
             points: (..., 3) [m].
@@ -74,7 +74,7 @@ class Interface:
 
 
 def parse_interface(text: object, place: str = "interface") -> Interface:
-    """An interface as people write it, on the command line or in a robot file.
+    """Return an interface as people write it, on the command line or in a robot file.
 
     Args:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
@@ -100,7 +100,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 
 
 def _from_text(text: str) -> Interface:
-    """An interface of one line."""
+    """Return an interface of one line."""
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
@@ -115,7 +115,7 @@ def _from_text(text: str) -> Interface:
 
 
 def _from_table(table: Mapping) -> Interface:
-    """An interface from a table of a robot file."""
+    """Return an interface from a table of a robot file."""
     kind = "bore" if "bore" in table else "plane"
     known = {"bore"} if kind == "bore" else {"plane", "radius"}
     _refuse_unknown(table, known, "")
@@ -143,7 +143,7 @@ def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
 
 
 def _vector(table: Mapping, key: str) -> NDArray:
-    """Three finite numbers of a table."""
+    """Return three finite numbers of a table."""
     value = table.get(key)
     array = number_array(value.tolist() if isinstance(value, np.ndarray) else value)
     if array is None or array.shape != (3,) or not np.isfinite(array).all():
@@ -153,7 +153,7 @@ def _vector(table: Mapping, key: str) -> NDArray:
 
 
 def _length(table: Mapping, key: str, name: str) -> float:
-    """A positive length of a table."""
+    """Return a positive length of a table."""
     value = table.get(key)
     array = number_array([value])
     if array is None or not (np.isfinite(array[0]) and array[0] > 0):

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Pairs of triangles without a common vertex that intersect.
+    """Return the pairs of triangles without a common vertex that intersect.
 
     Args:
         points: (n, 3) [m].
@@ -49,7 +49,7 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArray:
-    """Whether an edge of the first triangle goes through the second."""
+    """Return whether an edge of the first triangle goes through the second."""
     a, b, c = np.moveaxis(points[triangles[pairs[:, 1]]], 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)

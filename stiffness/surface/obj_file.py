@@ -14,7 +14,7 @@ from forcefit.inputs.table import BadInput, describe
 
 
 def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
-    """Points and polygons of an OBJ file.
+    """Return the points and polygons of an OBJ file.
 
     Args:
         path: of an existing file.
@@ -68,6 +68,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Index of a corner: from 1, or below zero from the last point so far."""
+    """Return index of a corner: from 1, or below zero from the last point so far."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

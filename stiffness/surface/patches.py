@@ -80,7 +80,7 @@ def _outlines(
 
 
 def interface_shape(interface: Interface) -> Shape:
-    """The plane or cylinder of an interface.
+    """Return the plane or cylinder of an interface.
 
     Args:
         interface: plane, disc or bore.
@@ -121,7 +121,7 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Triangles of a surface that lie on an interface.
+    """Return the triangles of a surface that lie on an interface.
 
     Args:
         surface: the link's.

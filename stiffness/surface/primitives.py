@@ -37,7 +37,7 @@ class Plane:
     normal: NDArray
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         distances = (points - self.point) @ self.normal
         return distances, np.broadcast_to(self.normal, points.shape)
 
@@ -52,7 +52,7 @@ class Cone:
     slope: float = 0.0
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -71,7 +71,7 @@ class Sphere:
     radius: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         radius = np.linalg.norm(offset, axis=1)
         return radius - self.radius, offset / np.maximum(radius, _TINY)[:, None]
@@ -87,7 +87,7 @@ class Torus:
     tube: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -98,7 +98,7 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Points projected onto one shape, or onto the intersection of several.
+    """Return the points projected onto one shape, or onto the intersection of several.
 
     Args:
         points: (n, 3) [m] near the shapes.
@@ -123,7 +123,7 @@ def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
 
 
 def fit_plane(points: NDArray, normals: NDArray) -> Plane:
-    """The plane nearest to points.
+    """Return the plane nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -139,7 +139,7 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
 
 
 def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
-    """The sphere nearest to points.
+    """Return the sphere nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -163,7 +163,7 @@ def _circle(points: NDArray) -> tuple[NDArray, float]:
 
 
 def fit_cone(points: NDArray, normals: NDArray) -> Cone:
-    """The cone or cylinder nearest to points.
+    """Return the cone or cylinder nearest to points.
 
     Args:
         points: (n, 3) [m].
@@ -187,7 +187,7 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
-    """The torus nearest to points, if they cover part of one.
+    """Return the torus nearest to points, if they cover part of one.
 
     Args:
         points: (n, 3) [m].
@@ -222,7 +222,7 @@ def fit_torus(points: NDArray, normals: NDArray) -> Torus:
 def _refined_fit(
     shape: Callable[[NDArray], S], start: NDArray, points: NDArray, size: float
 ) -> S:
-    """Nonlinear least squares over a shape's parameters."""
+    """Return the nonlinear least squares over a shape's parameters."""
     from scipy.optimize import least_squares
 
     if len(points) < len(start):

@@ -36,7 +36,7 @@ _NO_LIFT = 0.01  # times it: straight as well
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Shapes of a smooth part.
+    """Return the shapes of a smooth part.
 
     Args:
         graph: of the surface.
@@ -76,13 +76,13 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Median lift of edges (e, 2) over the part's usual one."""
+        """Return the median lift of edges (e, 2) over the part's usual one."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """The simplest shape all corners of a part lie on, as facets of it would.
+    """Return the simplest shape all corners of a part lie on, as facets of it would.
 
     Args:
         graph: of the surface.
@@ -117,7 +117,7 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Whether points are on a shape, to the tolerance of the surface."""
+    """Return whether points are on a shape, to the tolerance of the surface."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
@@ -241,7 +241,7 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Whether a piece is a shape of its own, no facets of another curved one."""
+    """Return whether a piece is a shape of its own, no facets of another curved one."""
     # two coplanar triangles may be a facet
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
@@ -269,7 +269,7 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """A seed's flat face, grown by rings of faces that meet it smoothly.
+    """Return a seed's flat face, grown by rings of faces that meet it smoothly.
 
     Args:
         graph: of the surface.
@@ -312,7 +312,7 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """A part of no known shape: flat faces by themselves, the rest lifted."""
+    """Return a part of no known shape: flat faces by themselves, the rest lifted."""
     # facets of a curved surface have lifts of one order, since programs that make them
     # keep a tolerance; one that would be lifted by many times as much is a flat face
     # that meets a rounding

@@ -36,11 +36,11 @@ class SmoothOutline:
     side: float
 
     def outside(self, points: NDArray) -> NDArray:
-        """(n,) [m] distance of points (n, 3) from the wall, negative inside."""
+        """Return (n,) [m] distance of points (n, 3) from the wall, negative inside."""
         return self.side * self.wall.signed(points)[0]
 
     def distance(self, points: NDArray) -> NDArray:
-        """(n,) [m] distance of points (n, 3) from the nearest of the edges."""
+        """Return (n,) [m] distance of points (n, 3) from the nearest of the edges."""
         start, along = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
         square = np.maximum(np.einsum("ei,ei->e", along, along), 1e-300)
         nearest = np.full(len(points), np.inf)
@@ -55,7 +55,7 @@ class SmoothOutline:
 def smooth_outline(
     points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
 ) -> SmoothOutline:
-    """The outline of some edges, with its wall.
+    """Return the outline of some edges, with its wall.
 
     Args:
         points: (n, 3) [m].
@@ -79,7 +79,7 @@ def smooth_outline(
 
 
 def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
-    """Plane or cone through the edges and across the face, else facets."""
+    """Return the plane or cone through the edges and across the face, else facets."""
     size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
     across = size * normals[:, None]  # at both ends of an edge
     standing = np.concatenate([points[edges] + across, points[edges] - across])

@@ -131,7 +131,7 @@ def read_step(path: Path, solid: str) -> StepTriangles:
 
 
 def _solids(model: Any) -> dict[str, int]:
-    """Tags of a model's solids by name."""
+    """Return the tags of a model's solids by name."""
     solids = dict[str, int]()
     for _, tag in model.getEntities(3):
         own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
@@ -220,7 +220,7 @@ def _fragments(
 
 
 def _bodies(model: Any, volumes: list[int]) -> int:
-    """How many bodies volumes are that are joined at common faces."""
+    """Return how many bodies volumes are that are joined at common faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -20,7 +20,7 @@ _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Points and triangles of an STL file; no points are merged.
+    """Return the points and triangles of an STL file; no points are merged.
 
     Args:
         path: of an existing file.
@@ -39,7 +39,7 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _count(content: bytes) -> int:
-    """Number of triangles that a binary file states."""
+    """Return the number of triangles that a binary file states."""
     return int.from_bytes(content[_HEAD - 4 : _HEAD], "little")
 
 
@@ -53,7 +53,7 @@ def _is_text(content: bytes) -> bool:
 
 
 def _binary(path: Path, content: bytes) -> NDArray:
-    """(m, 3, 3) corners of a binary file's triangles."""
+    """Return the (m, 3, 3) corners of a binary file's triangles."""
     stated, size = _count(content), _TRIANGLE.itemsize
     body = content[_HEAD:]
     if len(content) < _HEAD:
@@ -70,7 +70,7 @@ def _binary(path: Path, content: bytes) -> NDArray:
 
 
 def _text(path: Path, content: bytes) -> NDArray:
-    """(m, 3, 3) corners of a text file's triangles."""
+    """Return the (m, 3, 3) corners of a text file's triangles."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
     found = np.array(words, dtype=object)  # as text, one long word would widen them all
     facets = np.flatnonzero(found == b"facet")

@@ -43,7 +43,7 @@ class Surface:
     __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
-        """(m, 3) [m^2] outward, as long as the triangle's area."""
+        """Return the (m, 3) [m^2] outward, as long as the triangle's area."""
         return area_vectors(self.points, self.triangles)
 
     @property
@@ -62,14 +62,14 @@ class Surface:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Digest of the geometry alone, to the last bit."""
+        """Return the digest of the geometry alone, to the last bit."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Normals of triangles, as long as their areas.
+    """Return the normals of triangles, as long as their areas.
 
     Args:
         points: (n, 3) [m].
@@ -83,7 +83,7 @@ def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Volume inside a closed surface, negative when it is inside out.
+    """Return the volume inside a closed surface, negative when it is inside out.
 
     Args:
         points: (n, 3) [m].
@@ -98,7 +98,7 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Edges of triangles, each in the direction in which its triangle runs.
+    """Return the edges of triangles, each in the direction in which its triangle runs.
 
     Args:
         triangles: (m, 3) indices.
@@ -139,7 +139,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Points and triangles of a file, in its unit, and its solids."""
+    """Return the points and triangles of a file, in its unit, and its solids."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -193,7 +193,7 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """A point for a message."""
+    """Return a point for a message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
@@ -332,7 +332,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Whether a surface encloses a point (its solid angle is 4 pi)."""
+    """Return whether a surface encloses a point (its solid angle is 4 pi)."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -26,7 +26,7 @@ _TIME_LIMIT = 300.0  # [s] of one reader; gmsh takes 1 s for 35 000 triangles
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """A surface file, and which of the solids of a STEP file is meant.
+    """Return a surface file, and which of the solids of a STEP file is meant.
 
     Args:
         path: of a file, or ``part.step#name``; ``part.step#one+other`` or
@@ -117,7 +117,7 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Arrays by a reader that may crash, hang or want all memory."""
+    """Return the arrays by a reader that may crash, hang or want all memory."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")

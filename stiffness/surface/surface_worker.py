@@ -41,7 +41,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
 
 
 def _solids(path: Path) -> dict[str, Any]:
-    """Names, volumes and boxes of a STEP file's solids."""
+    """Return the names, volumes and boxes of a STEP file's solids."""
     names, volumes, boxes = read_solids(path)
     return {
         "names": np.array(names, dtype=str),
@@ -51,7 +51,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Points and triangles, of STEP also what is known of its faces."""
+    """Return the points and triangles, of STEP also what is known of its faces."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -90,7 +90,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """An OBJ file; VTK cuts its polygons into triangles, concave ones too."""
+    """Return an OBJ file; VTK cuts its polygons into triangles, concave ones too."""
     import pyvista
 
     points, faces = read_obj(path)

@@ -32,7 +32,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Component of each member; cut where the cosine is below ``bend``."""
+        """Return component of each member; cut where the cosine is below ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -44,7 +44,7 @@ class TriangleGraph:
         return connected_components(graph, directed=False)[1]
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Indices of the triangles of each part between sharp edges."""
+        """Return the indices of the triangles of each part between sharp edges."""
         label = self.connected_parts(members, SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
@@ -64,7 +64,7 @@ class TriangleGraph:
         return self.connected_parts(inside, 1 - 1e-10)
 
     def lifted(self, part: NDArray) -> Facets:
-        """A part of no known shape."""
+        """Return a part of no known shape."""
         used, index = np.unique(self.triangles[part], return_inverse=True)
         return Facets(self.points[used], index.reshape(-1, 3))
 

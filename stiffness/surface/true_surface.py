@@ -57,7 +57,7 @@ class TrueSurface:
         return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
 
     def outside(self, points: NDArray, normals: NDArray) -> NDArray:
-        """How far places of a mesh's boundary are outside the surface.
+        """Return how far places of a mesh's boundary are outside the surface.
 
         Args:
             points: (n, 3) [m].
@@ -77,7 +77,7 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """(p,) [m^3] between the facets of each patch and its shape."""
+        """Return the (p,) [m^3] between the facets of each patch and its shape."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))

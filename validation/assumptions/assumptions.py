@@ -38,7 +38,7 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Costs of all assumptions at one posture.
+    """Return the costs of all assumptions at one posture.
 
     Closures are compared without clearances, where the pose is unique.
 

@@ -25,7 +25,7 @@ from assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Two bushes for every pin that has both radial clearance and tilt.
+    """Return two bushes for every pin that has both radial clearance and tilt.
 
     Args:
         joints: with discs and cones.

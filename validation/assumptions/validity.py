@@ -70,7 +70,7 @@ class Cost:
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """Difference of a solution from a better one.
+    """Return the difference of a solution from a better one.
 
     Args:
         model: the solution with the assumption.
@@ -216,7 +216,7 @@ def pieces_cost(
 
 
 def _in_pieces(posture: Posture, count: int) -> Posture:
-    """The same with every beam cut."""
+    """Return the same with every beam cut."""
     links = {
         frame.name: replace(frame.link, pieces=count)
         for frame in posture.robot.frames

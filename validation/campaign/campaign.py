@@ -162,7 +162,7 @@ class Campaign:
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """(R,) bool, rows of a session; of None all."""
+        """Return the (R,) bool, rows of a session; of None all."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 
@@ -193,7 +193,7 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Number rows so that equal ones share a number, from 0 by first use.
+    """Return the number rows so that equal ones share a number, from 0 by first use.
 
     Args:
         columns: (R,) or (R, k) each; NaN equals NaN.
@@ -213,13 +213,13 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Numbers of rows, or a mask, as an index; an empty list is no rows."""
+    """Return the numbers of rows, or a mask, as an index; an empty list is no rows."""
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 
 
 def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
-    """A read-only copy of the right shape."""
+    """Return a read-only copy of the right shape."""
     array = np.array(getattr(campaign, name))
     if array.shape != shape:
         whose = f"campaign '{campaign.name}': {name}"
@@ -229,7 +229,7 @@ def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
 
 
 def _column(values: ArrayLike, rows: int, name: str) -> NDArray:
-    """A read-only covariate."""
+    """Return a read-only covariate."""
     array = np.array(values, dtype=float)
     if array.shape != (rows,) or not np.isfinite(array).all():
         raise ValueError(f"covariate '{name}': expected {rows} finite numbers")

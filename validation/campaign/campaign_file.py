@@ -59,7 +59,7 @@ class _Declared:
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """The campaign of a folder.
+    """Return the campaign of a folder.
 
     Args:
         folder: with ``campaign.toml`` in it, or that file.
@@ -103,7 +103,7 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """The file ``campaign.toml`` of a folder, or the file given."""
+    """Return the file ``campaign.toml`` of a folder, or the file given."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 
@@ -127,7 +127,7 @@ def _declared(root: Table) -> _Declared:
 
 
 def _per_session(root: Table) -> tuple[str, ...]:
-    """Effects that may differ from session to session."""
+    """Return the effects that may differ from session to session."""
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
@@ -153,7 +153,7 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """The campaign of a declaration, with a robot.
+    """Return the campaign of a declaration, with a robot.
 
     Args:
         declared: what the file says.
@@ -249,7 +249,7 @@ def _labels(
 def _rows_of_points(
     every: dict[str, tuple[NDArray, NDArray]], measured: bool
 ) -> tuple[NDArray, NDArray]:
-    """Rows of the file, each once for every point that it reads.
+    """Return the rows of the file, each once for every point that it reads.
 
     Args:
         every: readings (R, 6) and their sigma, by point.
@@ -306,7 +306,7 @@ def _read_noise(root: Table) -> NDArray:
 
 
 def _read_robot(root: Table, name: str) -> Robot:
-    """The robot: built in, or a file beside the campaign's."""
+    """Return the robot: built in, or a file beside the campaign's."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
@@ -345,7 +345,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """(R, 6) poses ``[t r]``, or (R, n) joint coordinates; NaN where free."""
+    """Return (R, 6) poses ``[t r]``, or (R, n) joint coordinates; NaN where free."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)
@@ -353,7 +353,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """The posture of each of these rows, or an error that names the first missed."""
+    """Return posture of each of these rows, or an error that names the first missed."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

@@ -46,7 +46,7 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """The unit a key stands for."""
+        """Return the unit a key stands for."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
@@ -92,7 +92,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """The number a cell holds; NaN if it is none ("nan" and "1_000" are none)."""
+    """Return number a cell holds; NaN if it is none ("nan" and "1_000" are none)."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

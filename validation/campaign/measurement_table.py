@@ -59,7 +59,7 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """The error for a cell, to be raised by the caller."""
+        """Return the error for a cell, to be raised by the caller."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
@@ -76,7 +76,7 @@ class MeasurementTable:
 def read_table(
     path: Path | str, robot: Robot, dialect: Dialect, points: Iterable[str] = ()
 ) -> MeasurementTable:
-    """A table of measurements.
+    """Return a table of measurements.
 
     Args:
         path: a CSV file with a header.
@@ -119,7 +119,7 @@ def read_table(
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Tables one below the other, each a session unless it says otherwise.
+    """Return the tables one below the other, each a session unless it says otherwise.
 
     Args:
         tables: of one campaign, at least one.
@@ -161,7 +161,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Cells without the blanks around them, and the line each row ends on."""
+    """Return cells without the blanks around them, and the line each row ends on."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -192,7 +192,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """The first line, if every name in it is a column's."""
+    """Return the first line, if every name in it is a column's."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -269,7 +269,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """A column in SI; a reading not taken is NaN."""
+    """Return a column in SI; a reading not taken is NaN."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0

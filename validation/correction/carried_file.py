@@ -41,7 +41,7 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
 
 def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
-    """The covariance of the numbers that were fitted to the set-up rows.
+    """Return the covariance of the numbers that were fitted to the set-up rows.
 
     Args:
         carried: to these sessions.
@@ -70,7 +70,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """The robot whose functions say how uncertain their numbers are now."""
+    """Return the robot whose functions say how uncertain their numbers are now."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

@@ -142,7 +142,7 @@ def carry(
 
 
 def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
-    """Names of sessions; of a campaign without any the one."""
+    """Return the names of sessions; of a campaign without any the one."""
     return campaign.sessions or (None,)
 
 
@@ -157,7 +157,7 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Titles of what changed with time and is not among a session's unknowns."""
+    """Return titles of what changed with time and is not among a session's unknowns."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
@@ -200,7 +200,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """The robot in its new sessions, what was of its old one gone.
+    """Return the robot in its new sessions, what was of its old one gone.
 
     Args:
         carried: to these sessions.

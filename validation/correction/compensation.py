@@ -85,7 +85,7 @@ class Compensation:
 
 
 def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
-    """Commands at which the corrected robot stands where the nominal one should.
+    """Return commands at which the corrected robot stands where the nominal one should.
 
     Args:
         targets: commands of the robot, which is the corrected one.
@@ -150,7 +150,7 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """The commands without a row for each point read."""
+    """Return the commands without a row for each point read."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -159,12 +159,12 @@ def _each_once(targets: Campaign) -> Campaign:
 
 
 def _driven(robot: Robot) -> NDArray:
-    """(d,) rows of the frames with a drive."""
+    """Return the (d,) rows of the frames with a drive."""
     return np.flatnonzero([frame.actuated for frame in robot.frames])
 
 
 def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
-    """(d,) least and (d,) largest commands."""
+    """Return the (d,) least and (d,) largest commands."""
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
@@ -227,7 +227,7 @@ class _Standing:
     jacobian: NDArray
 
     def size(self, weights: NDArray) -> NDArray:
-        """(R,) [m] weighted length of the error."""
+        """Return the (R,) [m] weighted length of the error."""
         return np.linalg.norm(self.error * weights, axis=1)
 
 
@@ -274,7 +274,7 @@ class _Machine:
 
 
 def _commanded(last: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """The commands as a campaign, those out of reach as they were."""
+    """Return the commands as a campaign, those out of reach as they were."""
     robot = last.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)

@@ -13,7 +13,7 @@ from validation.correction.prediction import csv_text
 
 
 def command_table(compensation: Compensation) -> str:
-    """The corrected commands as a table with the columns of the targets.
+    """Return the corrected commands as a table with the columns of the targets.
 
     Args:
         compensation: of any targets.
@@ -63,7 +63,7 @@ def offset_table(compensation: Compensation) -> str:
 
 
 def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
-    """Columns under their names."""
+    """Return the columns under their names."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
@@ -77,7 +77,7 @@ def _text(compensation: Compensation, columns: dict[str, Any]) -> str:
 def summary(
     compensation: Compensation, diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
-    """The same for machines: errors to be expected, and what is in the way.
+    """Return the same for machines: errors to be expected, and what is in the way.
 
     Args:
         compensation: of any targets.
@@ -134,7 +134,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Rms length of positions and rotations; None of nothing."""
+    """Return the rms length of positions and rotations; None of nothing."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]
@@ -144,7 +144,7 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
 
 
 def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
-    """The same for people, ``table`` being :func:`summary`'s."""
+    """Return the same for people, ``table`` being :func:`summary`'s."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",

@@ -130,7 +130,7 @@ def _curve(
 
 
 def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray]:
-    """Names of a function's uncertain numbers, and their covariance (k, k)."""
+    """Return names of a function's uncertain numbers, and their covariance (k, k)."""
     known = known_covariance(robot)
     place = str(next(k for k, f in enumerate(robot.functions) if f is function))
     own = [
@@ -144,7 +144,7 @@ def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
-    """The function's values along x."""
+    """Return the function's values along x."""
     own = parameters_of(function, component)
     inputs = [x]
     if function.form in {"lag", "creep"}:
@@ -184,7 +184,7 @@ def _range(robot: Robot, function: Function, variable: str) -> tuple[float, floa
 
 
 def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
-    """The same for machines."""
+    """Return the same for machines."""
     return [
         {
             "label": c.function.title,
@@ -213,7 +213,7 @@ def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
 
 
 def text(curves: list[Curve]) -> str:
-    """The same for people: a dozen points of each curve."""
+    """Return the same for people: a dozen points of each curve."""
     lines: list[str] = []
     for c in curves:
         beside = f", {c.beside[0]} = {c.beside[1]:.4g}" if c.beside else ""

@@ -54,7 +54,7 @@ class MachineNumbers:
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
-        """The robot whose numbers have changed by L u; none to what cannot be.
+        """Return the robot whose numbers have changed by L u; none to what cannot be.
 
         Args:
             u: (r,).
@@ -72,7 +72,7 @@ class MachineNumbers:
 
 
 def machine_numbers(robot: Robot) -> MachineNumbers:
-    """The numbers of a saved robot that every session shares.
+    """Return the numbers of a saved robot that every session shares.
 
     Args:
         robot: with its covariance, or ``tolerance`` and ``std``, in its file.
@@ -96,7 +96,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
 
 
 def _is_shared(number: Number, robot: Robot) -> bool:
-    """Whether a number is the machine's in all sessions."""
+    """Return whether a number is the machine's in all sessions."""
     if number.kind == EFFECT:
         return not number.session and number.owner not in {"registration", DRIFT}
     if number.kind == FUNCTION:
@@ -106,7 +106,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """A change that leaves a number what it can be."""
+    """Return a change that leaves a number what it can be."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -116,12 +116,12 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """A robot whose numbers are taken as they are."""
+    """Return a robot whose numbers are taken as they are."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """The numbers of a robot in the one without what changed with time.
+    """Return the numbers of a robot in the one without what changed with time.
 
     Args:
         machine: a saved robot.

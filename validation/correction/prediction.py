@@ -80,7 +80,7 @@ class PredictedReadings:
 
 
 def _both(values: NDArray) -> dict[str, float]:
-    """Root mean squares of positions and of rotations."""
+    """Return the root mean squares of positions and of rotations."""
     return {"position": rms(values[:, 3:]), "rotation": rms(values[:, :3])}
 
 
@@ -128,7 +128,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Conditions with the measuring frame, and where it comes from."""
+    """Return the conditions with the measuring frame, and where it comes from."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -152,7 +152,7 @@ def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions,
 
 
 def _unplaced(robot: Robot) -> Robot:
-    """The robot without the place of any measuring frame."""
+    """Return the robot without the place of any measuring frame."""
     for session in (None, *robot.session_effects):
         effects = {name: dict(v) for name, v in effects_in(robot, session).items()}
         for name in BASE:
@@ -173,7 +173,7 @@ def _noise(commands: Campaign) -> NDArray:
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
-    """Columns of a table of readings: its name, the point, the component.
+    """Return the columns of a table of readings: its name, the point, the component.
 
     Args:
         commands: whose names are wanted; only what is measured somewhere, all if
@@ -234,7 +234,7 @@ def reading_table(predicted: PredictedReadings) -> str:
 
 
 def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -> str:
-    """A table with labels.
+    """Return a table with labels.
 
     Args:
         rows: cells by column, by label.
@@ -250,7 +250,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """A number with ten digits, a text as it is."""
+    """Return a number with ten digits, a text as it is."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

@@ -81,7 +81,7 @@ class SetUp:
         return level**2 * self.repeated
 
     def start(self) -> NDArray:
-        """(p,) values at which a fit begins."""
+        """Return the (p,) values at which a fit begins."""
         x = self.unknowns.mean.copy()
         if any(name in BASE for _, name in self.unknowns.names):
             conditions = self._still(self.campaign.robot, self.rows)
@@ -90,19 +90,19 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Conditions of some rows without what is the session's."""
+        """Return the conditions of some rows without what is the session's."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
     def read(self, robot: Robot, values: NDArray) -> NDArray:
-        """(R, 6) [rad, m] readings of all rows."""
+        """Return the (R, 6) [rad, m] readings of all rows."""
         still = self._still(robot, np.arange(len(self.campaign)))
         return predict(self.unknowns.applied(still, values)).deviation
 
     def tangent(
         self, machine: MachineNumbers, values: NDArray, u: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Readings of some rows, and their slopes.
+        """Return the readings of some rows, and their slopes.
 
         Args:
             machine: the robot's own numbers.
@@ -236,7 +236,7 @@ def _settled(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float], widened: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """(k,) most probable x, and its covariance (k, k)."""
+    """Return the (k,) most probable x, and its covariance (k, k)."""
     begin = len(x) - len(machine)
     mean = np.concatenate([
         *(s.unknowns.mean for s in sessions),
@@ -261,7 +261,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """H^-1; a direction of which nothing is known stays finite."""
+    """Return H^-1; a direction of which nothing is known stays finite."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -290,7 +290,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Squared errors of every block, and tau."""
+        """Return the squared errors of every block, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -314,7 +314,7 @@ def _matters(more: NDArray, count: int) -> bool:
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """(n,) configuration of every set-up cell, counted over all sessions."""
+    """Return the (n,) configuration of every set-up cell, counted over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

@@ -47,7 +47,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """The robot alone: without the device's place and what changed with time."""
+    """Return the robot alone: without the device's place and what changed with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -88,7 +88,7 @@ class SessionUnknowns:
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
-        """Effects of the library with values (k,)."""
+        """Return the effects of the library with values (k,)."""
         values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, x.tolist(), strict=True):
             if effect in LIBRARY:
@@ -98,7 +98,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """The functions of time with values (k,), in a session alone."""
+        """Return the functions of time with values (k,), in a session alone."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -114,7 +114,7 @@ class SessionUnknowns:
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
-        """Conditions of the session's rows with values (k,)."""
+        """Return the conditions of the session's rows with values (k,)."""
         known = apply_effects(conditions, self.effects(x))
         return apply_functions(known, self.functions_with(x, None), conditions)
 
@@ -178,7 +178,7 @@ def _owner(number: int, function: Function) -> str:
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Numbers in which a function is linear: unit, and value."""
+    """Return the numbers in which a function is linear: unit, and value."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

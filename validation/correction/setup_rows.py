@@ -32,7 +32,7 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
 
 
 def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
-    """The first rows of every session."""
+    """Return the first rows of every session."""
     chosen: set[str] = set()
     for session in campaign.sessions or (None,):
         own = zip(labels, campaign.in_session(session), strict=True)
@@ -42,7 +42,7 @@ def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
 
 
 def _range(part: str, order: list[str]) -> list[str]:
-    """Labels of a row's number, of a range of them, or of a label."""
+    """Return the labels of a row's number, of a range of them, or of a label."""
     if part in order:
         return [part]
     begin, dash, end = part.partition("-")

@@ -31,7 +31,7 @@ _STEP = 0.1  # standard deviations of a number, for its derivative
 def deviation_spread(
     robot: Robot, conditions_for: Callable[[Robot], Conditions]
 ) -> NDArray:
-    """Standard deviation of the platform's deviation at the points measured.
+    """Return the standard deviation of the platform's deviation at the points measured.
 
     Args:
         robot: with its effects.
@@ -84,7 +84,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Whether a function does not depend on what it does itself."""
+    """Return whether a function does not depend on what it does itself."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -97,7 +97,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """(R, 6) change of the deviation per number of a function."""
+    """Return the (R, 6) change of the deviation per number of a function."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step
@@ -115,7 +115,7 @@ def _of_function(
 def _answer(
     conditions: Conditions, response: Responses, function: Function, component: str
 ) -> NDArray:
-    """(R, 6) change of the deviation per unit of one component of a function."""
+    """Return (R, 6) change of the deviation per unit of one component of a function."""
     axis = READING.index(component)
     if function.where == "reading":
         return np.broadcast_to(np.eye(6)[axis], (len(conditions), 6))

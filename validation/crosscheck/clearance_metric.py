@@ -92,7 +92,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Difference of all springs' deformations in the energy norm."""
+        """Return the difference of all springs' deformations in the energy norm."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -163,7 +163,7 @@ class ClearanceMetric:
         }
 
     def header(self) -> list[str]:
-        """Names of the columns of :meth:`rows`."""
+        """Return the names of the columns of :meth:`rows`."""
         return [
             "scale of imperfections",
             "energy, simulated [J]",
@@ -188,7 +188,7 @@ class ClearanceMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Lines of text before the table of scales."""
+        """Return the lines of text before the table of scales."""
         return ["with clearances"]
 
 

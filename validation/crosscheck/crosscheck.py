@@ -175,7 +175,7 @@ class Crosscheck:
         }
 
     def text(self) -> str:
-        """A table and the verdict for people, without colours."""
+        """Return a table and the verdict for people, without colours."""
         cells = [self.metric.header(), *self.metric.rows()]
         lines = [f"{self.posture.robot.name}, {self.metric.notes()[0]}"]
         lines += self.metric.notes()[1:]
@@ -279,7 +279,7 @@ def crosscheck(
 def attempt(
     robot: str, check: Callable[[], Result]
 ) -> tuple[Result | None, dict[str, Any]]:
-    """A check's result, or why there is none, for sweeps and the command line.
+    """Return a check's result, or why there is none, for sweeps and the command line.
 
     Args:
         robot: its name.

@@ -35,7 +35,7 @@ HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Differences of springs and energy, extrapolated to no error.
+    """Return the differences of springs and energy, extrapolated to no error.
 
     Args:
         robot: whose links and joint springs are compared.
@@ -78,7 +78,7 @@ def spring_limits(
 
 
 def energy_floor(robot: Robot) -> float:
-    """[J] energies below it are noise: :data:`FLOOR` in the stiffest spring."""
+    """Return [J] energies below it are noise: :data:`FLOOR` in the stiffest spring."""
     return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
@@ -86,7 +86,7 @@ def limit_difference(
     scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float,
     bound: float = LIMIT_TOLERANCE, least_size: float = 0.0,
 ) -> Check:  # fmt: skip
-    """Largest difference as the scale goes to 0, relative to the largest value.
+    """Return largest difference as the scale goes to 0, relative to the largest value.
 
     Args:
         scales: (k,) all different, largest first.
@@ -110,7 +110,7 @@ def limit_difference(
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
-    """Largest component at scale 0, and its uncertainty.
+    """Return the largest component at scale 0, and its uncertainty.
 
     Args:
         scales: (k,) all different, largest first.
@@ -162,7 +162,7 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
 def slope_check(
     scales: ArrayLike, differences: ArrayLike, floor: float, bound: float
 ) -> Check:
-    """Difference of a slope from 2.
+    """Return the difference of a slope from 2.
 
     Args:
         scales: (k,) largest first.
@@ -192,7 +192,7 @@ def slope_check(
 def _clear(
     scales: ArrayLike, differences: ArrayLike, floor: float
 ) -> tuple[NDArray, NDArray]:
-    """Scales and (k, components) differences that are above the noise."""
+    """Return the scales and (k, components) differences that are above the noise."""
     scales = np.asarray(scales, dtype=float)
     parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
     clear = np.linalg.norm(parts, axis=1) > floor

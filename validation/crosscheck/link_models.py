@@ -15,7 +15,7 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """The model of a robot's links: stiffnesses of springs, and solids.
+    """Return the model of a robot's links: stiffnesses of springs, and solids.
 
     Args:
         robot: any.
@@ -40,7 +40,7 @@ def link_models(robot: Robot, kind: str) -> SimulationModel:
 
 
 def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
-    """K_E of the links that a simulation will model as springs.
+    """Return K_E of the links that a simulation will model as springs.
 
     Args:
         robot: any.

@@ -132,7 +132,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Rows of the frames that have a part, by name."""
+    """Return the rows of the frames that have a part, by name."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -141,7 +141,7 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """The same posture with the springs by which a simulation holds free motions.
+    """Return same posture with the springs by which a simulation holds free motions.
 
     Args:
         posture: of a robot without clearances.
@@ -164,7 +164,7 @@ def hold_free_motions(posture: Posture) -> Posture:
 
 
 def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
-    """Energy in the springs that hold free motions, where a robot has them.
+    """Return the energy in the springs that hold free motions, where a robot has them.
 
     Args:
         robot: of the virtual-joint model, perhaps with such springs.
@@ -183,7 +183,7 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
 def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """The solution with finite rotations near a linear one; None if none was found.
+    """Return solution with finite rotations near a linear one; None if none was found.
 
     Args:
         linear: to start from.
@@ -206,7 +206,7 @@ def exact_solution(
 
 
 def scaled(posture: Posture, scale: float) -> Posture:
-    """The same posture with all imperfections times a factor.
+    """Return the same posture with all imperfections times a factor.
 
     Args:
         posture: nominal.

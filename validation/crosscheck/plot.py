@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def slope_figure(check: Crosscheck) -> "Figure":
-    """Difference of simulation and linear model against the scale of the errors.
+    """Return difference of simulation and linear model against the scale of the errors.
 
     Args:
         check: of :func:`validation.crosscheck.crosscheck.crosscheck`, without

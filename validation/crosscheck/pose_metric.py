@@ -158,7 +158,7 @@ class PoseMetric:
         }
 
     def header(self) -> list[str]:
-        """Names of the columns of :meth:`rows`."""
+        """Return the names of the columns of :meth:`rows`."""
         return [
             "scale of the errors",
             "rotation difference [rad]",
@@ -182,7 +182,7 @@ class PoseMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Lines of text before the table of scales."""
+        """Return the lines of text before the table of scales."""
         lines = ["without clearances: simulation minus virtual-joint model"]
         known = {k: v for k, v in self.unexplained.items() if not math.isnan(v)}
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]

@@ -60,7 +60,7 @@ def _row(
     reason: str,
     check: Callable[[Posture], Crosscheck],
 ) -> dict[str, Any]:
-    """The result at one pose."""
+    """Return the result at one pose."""
     if posture is None:
         return {"status": OUT_OF_REACH, "reason": reason, "passed": None}
     if passed := limits_passed(robot, posture.coordinates):
@@ -77,7 +77,7 @@ def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """A line for each pose, and the verdict."""
+    """Return a line for each pose, and the verdict."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())

@@ -67,7 +67,7 @@ def resolutions(
     posture: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> list[Resolution]:  # fmt: skip
-    """The smallest changes that the limits of a cross-check notice.
+    """Return the smallest changes that the limits of a cross-check notice.
 
     Args:
         posture: of the robot compared.
@@ -137,7 +137,7 @@ def _joint_changes(
 
 
 def _with_frame(posture: Posture, frame: Frame) -> Posture:
-    """The posture with one frame in the place of the one of its name."""
+    """Return the posture with one frame in the place of the one of its name."""
     frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
@@ -146,7 +146,7 @@ def _noticed(
     changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> tuple[float, str]:  # fmt: skip
-    """The smallest relative change that a limit notices, and which limit."""
+    """Return the smallest relative change that a limit notices, and which limit."""
     first = pairs[0]
     if first.simulated.held:
         changed = hold_free_motions(changed)
@@ -169,7 +169,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """A solution at the first scale as a simulation's at another."""
+    """Return a solution at the first scale as a simulation's at another."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -208,5 +208,5 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """A share with two digits."""
+    """Return a share with two digits."""
     return f"{100 * share:.2g} %"

@@ -11,7 +11,7 @@ from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
-    """Solids of the links that a robot gives by a mesh, for a simulation.
+    """Return the solids of the links that a robot gives by a mesh, for a simulation.
 
     Args:
         robot: any.
@@ -45,7 +45,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 
 
 def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
-    """The finest mesh of a link, with its stiffness matrix times a factor."""
+    """Return the finest mesh of a link, with its stiffness matrix times a factor."""
     from stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material

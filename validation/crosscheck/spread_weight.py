@@ -76,7 +76,7 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
 def energy_between_ends(
     posture: Posture, gravity: ArrayLike, pieces: float = np.inf
 ) -> float:
-    """Energy of beams clamped at both ends under their own weight.
+    """Return the energy of beams clamped at both ends under their own weight.
 
     For the weight across, q^2 L^5 / 1440 EI in bending and q^2 L^3 / 24 GA in shear;
     q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.

@@ -72,7 +72,7 @@ Comparison = TypeVar("Comparison", bound=Judged)
 
 
 def verdict(comparison: Judged) -> str:
-    """Outcome of all checks on the scales solved.
+    """Return the outcome of all checks on the scales solved.
 
     Args:
         comparison: with its checks.
@@ -118,7 +118,7 @@ def compare_scales(
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Scales from which a slope can be read, largest first.
+    """Return the scales from which a slope can be read, largest first.
 
     Args:
         scales: factors on errors, clearances and load.
@@ -138,7 +138,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 
 
 def verdict_text(comparison: Judged) -> str:
-    """The verdict in a few words, with the number of checks without a signal."""
+    """Return the verdict in a few words, with the number of checks without a signal."""
     texts = {
         "passed": "passed",
         "failed": "FAILED",

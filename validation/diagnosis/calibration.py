@@ -74,7 +74,7 @@ def calibrate(
 
 
 def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
-    """The verdict on a simulated campaign."""
+    """Return the verdict on a simulated campaign."""
     best = selected.states[0]
     names = tuple(sorted(e.name for e in best.elements if e.name))
     freedom = max(1.0, count - selected.unknowns)

@@ -21,7 +21,7 @@ _AT_BOUND = 1e-3  # of a bound: the unknown is at the bound
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
-    """Whether the readings support an effect, one of the fitted machine's.
+    """Return whether the readings support an effect, one of the fitted machine's.
 
     Returns:
         True for the place of the measuring frame, which is always there.
@@ -59,7 +59,7 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
 
 
 def _at_bound(bound: float, value: float) -> bool:
-    """Whether a value is at a finite bound."""
+    """Return whether a value is at a finite bound."""
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 
@@ -83,7 +83,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Parameters of an effect that was found, on which some reading depends."""
+    """Return parameters of an effect that was found, on which some reading depends."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)

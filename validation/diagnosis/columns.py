@@ -169,7 +169,7 @@ class Columns:
         return successive and any(map(self._is_clock, self.functions.variables))
 
     def _is_clock(self, name: str) -> bool:
-        """Whether a variable is the time, or proportional to it."""
+        """Return whether a variable is the time, or proportional to it."""
         time = self.conditions.time
         if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
             return name == "time"

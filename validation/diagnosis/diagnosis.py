@@ -121,11 +121,11 @@ class Diagnosis:
         return self.traced.selected.noise.findings
 
     def summary(self) -> str:
-        """The text that ``forcefit validation diagnose`` prints."""
+        """Return the text that ``forcefit validation diagnose`` prints."""
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """The verdict, and what it rests on."""
+        """Return the verdict, and what it rests on."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

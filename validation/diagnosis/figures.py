@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Bars of the errors before, after and of noise on the held-out rows."""
+    """Return the bars of the errors before, after and of noise on the held-out rows."""
     charts = []
     for kind, unit in (("position", "m"), ("rotation", "rad")):
         names = ("before", "after", "noise")
@@ -111,7 +111,7 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
-    """(R, 6) [rad, m] before and after."""
+    """Return the (R, 6) [rad, m] before and after."""
     return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
 
 
@@ -136,7 +136,7 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Bars of the probability of every effect, the likeliest on top."""
+    """Return the bars of the probability of every effect, the likeliest on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
@@ -157,7 +157,7 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
-    """The held-out row at which the declared model errs most.
+    """Return the held-out row at which the declared model errs most.
 
     Returns:
         The row, and what of it is largest: ``"position"``, or ``"rotation"`` where no
@@ -184,7 +184,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """The robot as it is assembled at the worst row; empty without such a row."""
+    """Return robot as it is assembled at the worst row; empty without such a row."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

@@ -91,7 +91,7 @@ class MachineFit:
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """(k,) bool, unknowns of one effect that some reading depends on."""
+        """Return the (k,) bool, unknowns of one effect that some reading depends on."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
@@ -130,7 +130,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """(k,) most probable x, (n, k) slopes and (n,) residual there."""
+    """Return the (k,) most probable x, (n, k) slopes and (n,) residual there."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)

@@ -52,7 +52,7 @@ class CandidateShape:
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """The form with that number larger."""
+        """Return the form with that number larger."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -62,7 +62,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Sines and cosines of these orders of an angle."""
+    """Return the sines and cosines of these orders of an angle."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -70,7 +70,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """A form with each of some numbers in which it is not linear."""
+    """Return a form with each of some numbers in which it is not linear."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -80,7 +80,7 @@ _ANGLE = ("0.cosine", *_WAVE)
 
 
 def is_angle(robot: Robot, name: str) -> bool:
-    """Whether a variable is the coordinate of a joint that turns."""
+    """Return whether a variable is the coordinate of a joint that turns."""
     kind, _, rest = name.partition(".")
     return kind == "q" and robot.frame(rest).joint == "revolute"
 

@@ -91,13 +91,13 @@ class Functions:
         self._numbers = cache(self._columns)
 
     def of(self, variables: list[str]) -> "Functions":
-        """The same of some of the variables."""
+        """Return the same of some of the variables."""
         other = copy(self)
         other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """The same whose elements have columns of some rows only."""
+        """Return the same whose elements have columns of some rows only."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)

@@ -72,7 +72,7 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """The campaign whose readings in some rows (R,) bool are NaN; commands stay."""
+    """Return campaign whose readings in some rows (R,) bool are NaN; commands stay."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 

@@ -58,7 +58,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Parameters by their public names [SI], x one for each slot."""
+        """Return the parameters by their public names [SI], x one for each slot."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -220,7 +220,7 @@ def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
 
 
 def _held(slot: Slot, constant: float) -> Slot:
-    """A slot of a drift, its time constant held."""
+    """Return a slot of a drift, its time constant held."""
     if slot.names != ("time_constant",):
         return slot
     unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
@@ -248,13 +248,13 @@ def with_sessions(
 
 
 def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
-    """A hypothesis with numbers for every session."""
+    """Return a hypothesis with numbers for every session."""
     slots = (replace(slot, session=name) for name in sessions for slot in h.slots)
     return replace(h, slots=tuple(slots))
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """The sessions in which a hypothesis has numbers of its own, else None alone."""
+    """Return sessions in which a hypothesis has numbers of its own, else None alone."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 

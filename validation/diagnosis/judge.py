@@ -62,7 +62,7 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """The errors on the held-out rows, and the verdict.
+    """Return the errors on the held-out rows, and the verdict.
 
     Args:
         campaign: of R rows, as it was measured.
@@ -155,7 +155,7 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """The campaign with the noise by which residuals are judged."""
+    """Return the campaign with the noise by which residuals are judged."""
     # sigma as it is stated, unless it counts in what the points have in common
     common = traced.campaign.common
     if common is None:
@@ -167,7 +167,7 @@ def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
 def _outlying_held(
     campaign: Campaign, traced: Traced, held: HeldOut, residual: NDArray
 ) -> NDArray:
-    """(R,) bool, outliers among the rows that judge."""
+    """Return the (R,) bool, outliers among the rows that judge."""
     outliers = np.zeros(len(campaign), dtype=bool)
     judged = campaign.take(held.rows)
     whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
@@ -190,7 +190,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """The fit with the covariance that noise correlated in time leaves, if it is."""
+    """Return fit with the covariance that noise correlated in time leaves, if it is."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -223,14 +223,14 @@ def _fails(
 
 
 def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) -> bool:
-    """Whether so few rows decide nothing."""
+    """Return whether so few rows decide nothing."""
     blocks = len(np.unique(blocks_of(campaign)[0][used]))
     many = determined > _SHARE * int(campaign.cells[used].sum())
     return many or (fails and blocks <= FEWEST)
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
-    """Rows that would decide, in words."""
+    """Return the rows that would decide, in words."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
@@ -255,7 +255,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """A remark on rows with readings that no sensor gives, or none."""
+    """Return a remark on rows with readings that no sensor gives, or none."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

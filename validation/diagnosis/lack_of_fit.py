@@ -101,7 +101,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """(R,) number of the conditions: command, load, every covariate but time."""
+    """Return (R,) number of the conditions: command, load, every covariate but time."""
     # alike: no covariate differs by more than a thirtieth of its range.  An effect
     # that is not modelled must not pass for noise
     parts = [campaign.repeat]
@@ -113,7 +113,7 @@ def _alike(campaign: Campaign) -> NDArray:
 
 
 def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
-    """Rows whose residuals are outliers.
+    """Return the rows whose residuals are outliers.
 
     Args:
         campaign: of R rows, N measured cells.

@@ -84,7 +84,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """(R,) names of what leaves the learned range in each row, or empty."""
+    """Return the (R,) names of what leaves the learned range in each row, or empty."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -108,7 +108,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Whether the robot is the same after a turn of a variable."""
+    """Return whether the robot is the same after a turn of a variable."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -118,7 +118,7 @@ def _repeats(robot: Robot, name: str) -> bool:
 
 
 def _turns_over(function: Function, name: str) -> bool:
-    """Whether a function repeats after a turn of one of its variables."""
+    """Return whether a function repeats after a turn of one of its variables."""
     forms = _PERIODIC if name == function.variables[0] else _PERIODIC[:2]
     return function.form in forms and "period" not in function.parameters
 

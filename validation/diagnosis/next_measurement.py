@@ -58,7 +58,7 @@ def next_measurement(
     fit: MachineFit,
     rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
-    """The measurement that would decide between a fit and its likeliest rival.
+    """Return the measurement that would decide between a fit and its likeliest rival.
 
     Looked for over the configurations measured so far and others between any two of
     them that the robot can reach, with loads and covariates within half as much again
@@ -109,7 +109,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Conditions to choose from: within reach, loads and covariates wider."""
+    """Return conditions to choose from: within reach, loads and covariates wider."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -197,7 +197,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """The command of some conditions, by the columns of the campaign."""
+    """Return the command of some conditions, by the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])
@@ -212,6 +212,6 @@ def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str,
 
 
 def load_text(load: Sequence[float]) -> str:
-    """A load as on the command line."""
+    """Return a load as on the command line."""
     parts = [f"{name}={w:g}" for name, w in zip(LOAD, load, strict=True) if w]
     return ",".join(parts) or "none"

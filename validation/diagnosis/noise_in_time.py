@@ -53,7 +53,7 @@ class NoiseInTime:
 
 
 def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
-    """How a residual is correlated in time.
+    """Return how a residual is correlated in time.
 
     Args:
         campaign: of R rows, N measured cells.
@@ -88,7 +88,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """The covariance of unknowns that were fitted as if noise were white.
+    """Return the covariance of unknowns that were fitted as if noise were white.
 
     Args:
         covariance: (k, k) by white noise.
@@ -129,7 +129,7 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Sums over a series of v^2/S and ln S, (shares, constants)."""
+    """Return the sums over a series of v^2/S and ln S, (shares, constants)."""
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)
     mean = np.zeros((len(_SHARES), len(constants)))

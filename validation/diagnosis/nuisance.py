@@ -102,7 +102,7 @@ def nuisance(
 
 
 def _may_give(robot: Robot, name: str) -> bool:
-    """Whether a frame may have a joint stiffness."""
+    """Return whether a frame may have a joint stiffness."""
     return name != robot.platform and all(name not in pair for pair in robot.closures)
 
 

@@ -28,7 +28,7 @@ def device_frame(declared: Conditions) -> Hypothesis:
 
 
 def register(campaign: Campaign, conditions: Conditions) -> Conditions:
-    """Conditions with the measuring frame where it fits the declared model best.
+    """Return conditions with the measuring frame where it fits the declared model best.
 
     Args:
         campaign: rows from which it is found.
@@ -58,7 +58,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
-    """The measuring frame that fits the declared model best, as an effect."""
+    """Return the measuring frame that fits the declared model best, as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
@@ -67,7 +67,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """A first guess: Kabsch's rotation of points, or the mean of rotations."""
+    """Return a first guess: Kabsch's rotation of points, or the mean of rotations."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -111,7 +111,7 @@ def device_rotation(
 
 
 def off_one_line(points: NDArray) -> bool:
-    """Whether (P, 3) points fix a frame."""
+    """Return whether (P, 3) points fix a frame."""
     if len(points) < _FEWEST_POINTS:
         return False
     size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -80,7 +80,7 @@ def responses(conditions: Conditions) -> Responses:
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """The same rows with clearances where they rest."""
+    """Return the same rows with clearances where they rest."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:
@@ -91,7 +91,7 @@ def _without_clearance(conditions: Conditions) -> Conditions:
 
 
 def _some(postures: Posture, rows: slice) -> Posture:
-    """A few of many postures."""
+    """Return a few of many postures."""
     return replace(
         postures,
         coordinates=postures.coordinates[rows],
@@ -100,7 +100,7 @@ def _some(postures: Posture, rows: slice) -> Posture:
 
 
 def _reading(conditions: Conditions) -> NDArray:
-    """(R, 6, 6) change of what is read per unit platform screw."""
+    """Return the (R, 6, 6) change of what is read per unit platform screw."""
     D = np.zeros((len(conditions), 6, 6))
     for k in range(6):
         screw = np.zeros((len(conditions), 6))

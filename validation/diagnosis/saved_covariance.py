@@ -81,7 +81,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """The robot whose joint gives more, or less, in one direction."""
+        """Return the robot whose joint gives more, or less, in one direction."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -113,7 +113,7 @@ class SavedCovariance:
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Covariance of the numbers of a fitted robot's file, to first order."""
+    """Return the covariance of the numbers of a fitted robot's file, to first order."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -153,7 +153,7 @@ def _names(function: Function) -> tuple[object, ...]:
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Numbers of a saved robot that the unknowns change."""
+    """Return the numbers of a saved robot that the unknowns change."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -191,7 +191,7 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """The covariance that a robot's file names.
+    """Return the covariance that a robot's file names.
 
     Returns:
         None where the file names none.

@@ -25,7 +25,7 @@ from validation.diagnosis.unknowns import Small
 
 
 def corrected(diagnosis: Diagnosis) -> Robot:
-    """The machine found, as it is saved.
+    """Return the machine found, as it is saved.
 
     Returns:
         The fitted robot with the range it was identified in, the point measured, the
@@ -45,7 +45,7 @@ def corrected(diagnosis: Diagnosis) -> Robot:
 
 
 def functions_of(diagnosis: Diagnosis) -> list[list[Function]]:
-    """Functions that were learned, with their numbers and standard deviations.
+    """Return functions that were learned, with their numbers and standard deviations.
 
     Returns:
         For every function learned one of a robot file, or several of one kind.
@@ -79,7 +79,7 @@ def _named(one: Function, units: Mapping[str, str]) -> Function:
 
 
 def _with_tolerances(fit: MachineFit) -> Robot:
-    """The robot whose geometric errors carry how uncertain they are."""
+    """Return the robot whose geometric errors carry how uncertain they are."""
     robot = fit.robot
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:

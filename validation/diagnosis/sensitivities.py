@@ -54,7 +54,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """The same of some rows, by number; forms are normalised over all."""
+        """Return the same of some rows, by number; forms are normalised over all."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -88,7 +88,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """(R, 6) change of the reading per unit of a component at a place."""
+        """Return (R, 6) change of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         axis = AXES.index(component)
@@ -108,7 +108,7 @@ class Sensitivities:
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
-        """(R, q) columns of a form of variables, of order one, and T (p, q)."""
+        """Return (R, q) columns of a form of variables, of order one, and T (p, q)."""
         raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
@@ -129,7 +129,7 @@ class Sensitivities:
         return raw @ mixed, mixed
 
     def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
-        """(R, p) columns of a form of variables."""
+        """Return the (R, p) columns of a form of variables."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]
             return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
@@ -175,7 +175,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """(m,) component that each unknown of a candidate acts in."""
+        """Return the (m,) component that each unknown of a candidate acts in."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -242,7 +242,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """The sessions in which variables are known, None for all."""
+        """Return the sessions in which variables are known, None for all."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)
@@ -255,7 +255,7 @@ class Sensitivities:
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """(N, m) change of a campaign's measured cells over sigma per unknown."""
+    """Return (N, m) change of a campaign's measured cells over sigma per unknown."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

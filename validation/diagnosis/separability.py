@@ -66,7 +66,7 @@ class Separability:
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
     def classes(self) -> list[tuple[str, ...]]:
-        """Effects that imitate each other, wholly and both ways.
+        """Return the effects that imitate each other, wholly and both ways.
 
         Returns:
             Classes of two and more; a verdict can only name the class.
@@ -93,7 +93,7 @@ class Separability:
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Pairs of which neither imitates the other, but parts of them do."""
+        """Return pairs of which neither imitates the other, but parts of them do."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -102,7 +102,7 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Angles between signatures.
+    """Return the angles between signatures.
 
     Args:
         columns: (N, k) by effect: change of the readings over sigma at plausible sizes.
@@ -135,14 +135,14 @@ def compare_signatures(
 
 
 def _basis(columns: NDArray, whole: float) -> NDArray:
-    """(N, r) orthonormal basis; ``whole`` is the size that counts as large."""
+    """Return (N, r) orthonormal basis; ``whole`` is the size that counts as large."""
     return orthonormal_basis(columns, _RANK, _RANK * whole)
 
 
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Basis of what columns span, whatever their units.
+    """Return the basis of what columns span, whatever their units.
 
     Args:
         columns: (N, k).

@@ -50,7 +50,7 @@ def errors_of(
 
 
 def rms(values: NDArray) -> float:
-    """Root mean square of what is finite; NaN of nothing."""
+    """Return the root mean square of what is finite; NaN of nothing."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
@@ -117,7 +117,7 @@ def stages(
 
 
 def _has_finite_motions(unknowns: Unknowns) -> bool:
-    """Whether finite motions are among the effects that are added."""
+    """Return whether finite motions are among the effects that are added."""
     return any(LIBRARY[one.hypothesis.effect].finite for one in unknowns.effects)
 
 
@@ -149,7 +149,7 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, Stage]], rows: NDArray
 ) -> list[Step]:
-    """The sequence judged on rows (R,) bool of all folds together.
+    """Return the sequence judged on rows (R,) bool of all folds together.
 
     Returns:
         The steps, in order; the last is the error of the diagnosis.  A fold without a

@@ -62,7 +62,7 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Set-up blunders whose correction reduces the residual decisively.
+    """Return the set-up blunders whose correction reduces the residual decisively.
 
     Args:
         campaign: measured deviations.
@@ -92,7 +92,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """A blunder with its sentence."""
+    """Return a blunder with its sentence."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
@@ -104,7 +104,7 @@ def _blunder(correction: Correction, before: float, after: float) -> SetupBlunde
 
 
 def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
-    """The corrections that leave least, by a beam search, and what they leave."""
+    """Return corrections that leave least, by a beam search, and what they leave."""
     tried = corrections(judge.campaign)
     best: tuple[Corrections, float] = ((), start)
     beam = [best]
@@ -129,7 +129,7 @@ def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
 def _needed(
     judge: "_Judge", chosen: Corrections, left: float
 ) -> tuple[Corrections, float]:
-    """The corrections without those that hardly change what is left."""
+    """Return the corrections without those that hardly change what is left."""
     for one in chosen:
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
@@ -148,7 +148,7 @@ def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Rows spread evenly over those by which a set-up can be judged."""
+    """Return the rows spread evenly over those by which a set-up can be judged."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -169,7 +169,7 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Trimmed rms with corrections made.
+        """Return the trimmed rms with corrections made.
 
         Args:
             made: corrections of the campaign as given.
@@ -206,7 +206,7 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Conditions of a set-up; None where a command cannot be reached."""
+        """Return the conditions of a set-up; None where a command cannot be reached."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()

@@ -26,7 +26,7 @@ _UNITS = {  # factors between units that are taken for one another
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Rotations whose quaternions have a part at the wrong end."""
+    """Return the rotations whose quaternions have a part at the wrong end."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
@@ -100,7 +100,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """The set-up corrected."""
+        """Return the set-up corrected."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -113,7 +113,7 @@ class Correction:
 
 
 def as_given(campaign: Campaign) -> SetUp:
-    """The set-up of a campaign of R rows as its files give it."""
+    """Return the set-up of a campaign of R rows as its files give it."""
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     axes = T[:, :3, :3]
     points = T[:, :3, 3] + np.einsum("rij,rj->ri", axes, campaign.targets)
@@ -196,18 +196,18 @@ def _of_loads(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _xyz(stem: str) -> tuple[str, ...]:
-    """Three columns of a campaign's table."""
+    """Return three columns of a campaign's table."""
     return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Factors between units, both ways, and what they do in words."""
+    """Return the factors between units, both ways, and what they do in words."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """(R, 3, 3) rotations changed; NaN stays."""
+    """Return the (R, 3, 3) rotations changed; NaN stays."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

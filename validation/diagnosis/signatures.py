@@ -60,7 +60,7 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """The conditions of a campaign, as its robot's file declares the machine.
+    """Return the conditions of a campaign, as its robot's file declares the machine.
 
     Args:
         campaign: of R rows.
@@ -99,7 +99,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
 
 
 def loaded_components(campaign: Campaign) -> list[str]:
-    """Components of the load that are not zero in every row."""
+    """Return the components of the load that are not zero in every row."""
     return [name for name, w in zip(LOAD, campaign.loads.T, strict=True) if w.any()]
 
 
@@ -154,7 +154,7 @@ class Tangents:
         return Signature(hypothesis, one.offset, columns)
 
     def _at_start(self, hypothesis: Hypothesis) -> Signature:
-        """A hypothesis with numbers of all rows where it begins."""
+        """Return a hypothesis with numbers of all rows where it begins."""
         if not hypothesis.slots:
             offset = np.zeros_like(self.declared)
             if not self._invisible(hypothesis):
@@ -190,7 +190,7 @@ class Tangents:
         return bool(np.mean(size**2) * len(self.declared) < _HARDLY)
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
-        """(N,) derivative in one slot of one effect, where the effect begins."""
+        """Return (N,) derivative in one slot of one effect, where the effect begins."""
         begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
         return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 

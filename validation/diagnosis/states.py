@@ -61,7 +61,7 @@ class State:
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
     def _z(self) -> NDArray:
-        """(n,) readings minus the offsets of the elements."""
+        """Return the (n,) readings minus the offsets of the elements."""
         return self.readings.without_offsets(self.elements)
 
     @cached_property

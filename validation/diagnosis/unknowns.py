@@ -242,13 +242,13 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """The same without one of its effects."""
+        """Return the same without one of its effects."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Effects of a robot's file in all rows, or those of one session alone."""
+    """Return effects of a robot's file in all rows, or those of one session alone."""
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -257,7 +257,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """A robot with other effects in all rows, or in one session alone."""
+    """Return a robot with other effects in all rows, or in one session alone."""
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -265,7 +265,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """The linear model, clearances of closed chains held where they rest."""
+    """Return the linear model, clearances of closed chains held where they rest."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:

@@ -18,7 +18,7 @@ Sets = tuple[tuple[tuple[str, ...], float], ...]
 
 
 def by_names(selected: Selected) -> Sets:
-    """Probabilities of models by the effects that they have, likeliest first.
+    """Return probabilities of models by the effects that they have, likeliest first.
 
     Returns:
         Names and probabilities; of a model that has a function, ``"function"`` is last.
@@ -35,7 +35,7 @@ def verdict(
     selected: Selected, names: tuple[str, ...], *, functions: bool, small: bool,
     more_than_noise: bool,
 ) -> tuple[str, tuple[str, ...]]:  # fmt: skip
-    """The verdict, and which effects it claims.
+    """Return the verdict, and which effects it claims.
 
     Args:
         selected: models with their probabilities.

@@ -89,7 +89,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """The map of cells (R, 6) bool by a campaign's sigma and noise in common."""
+    """Return the map of cells (R, 6) bool by a campaign's sigma and noise in common."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:

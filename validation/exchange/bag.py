@@ -29,7 +29,7 @@ def is_bag(path: Path | str) -> bool:
 
 
 def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
-    """Readings of all points, poses and transforms in a bag.
+    """Return the readings of all points, poses and transforms in a bag.
 
     Args:
         path: a rosbag2 folder or a ROS 1 bag.

@@ -20,7 +20,7 @@ def columns_of(
     commands: Commands, rows: Rows, gaps: NDArray, turns: NDArray, frame: DeviceFrame,
     names: Sequence[str],
 ) -> dict[str, NDArray]:  # fmt: skip
-    """Columns of the campaign's table, SI.
+    """Return the columns of the campaign's table, SI.
 
     Args:
         commands: what was commanded.
@@ -56,7 +56,7 @@ def columns_of(
 
 
 def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
-    """Standard deviations of readings along the base's axes.
+    """Return the standard deviations of readings along the base's axes.
 
     Args:
         rows: of the campaign.
@@ -75,7 +75,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Ids of the rows: the command's, numbered where it is there again.
+    """Return the ids of the rows: the command's, numbered where it is there again.
 
     Args:
         commands: what was commanded.
@@ -94,14 +94,14 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
 
 def cell(value: float) -> str:
-    """A number with all its digits, nothing where there is none."""
+    """Return a number with all its digits, nothing where there is none."""
     return repr(float(value)) if np.isfinite(value) else ""
 
 
 def declaration(
     declared: TargetsFile, folder: Path, spread: NDArray, turned: bool
 ) -> str:
-    """Text of ``campaign.toml``.
+    """Return the text of ``campaign.toml``.
 
     Args:
         declared: the targets file.

@@ -14,7 +14,7 @@ _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 
 
 def missing(cell: str) -> bool:
-    """Whether a cell says that nothing was read."""
+    """Return whether a cell says that nothing was read."""
     return cell.lower() in _NO_READING
 
 
@@ -58,7 +58,7 @@ class CellValues:
         return LENGTHS[unit]
 
     def number(self, line: int, column: str, cell: str) -> float:
-        """A finite number of a cell."""
+        """Return a finite number of a cell."""
         decimal = self.sheet.decimal
         value = parse_number(cell, decimal)
         if abs(value) <= LARGEST:

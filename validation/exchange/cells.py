@@ -38,7 +38,7 @@ class Sheet:
 
 
 def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
-    """Cells of a table.
+    """Return the cells of a table.
 
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
@@ -73,7 +73,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Rows, in which two blanks part a header of words, such as Point Name."""
+    """Return rows, in which two blanks part a header of words, such as Point Name."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)
@@ -120,7 +120,7 @@ def _mark(lines: Sequence[str], decimal: str) -> str:
 
 
 def _cells(line: str, mark: str) -> list[str]:
-    """Cells of a line."""
+    """Return the cells of a line."""
     if mark == _BLANK:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:

@@ -72,5 +72,5 @@ def _dated(year: str, month: str, day: str, clock: str) -> float:
 
 
 def _seconds(text: str, style: str) -> float:
-    """[s] since 1970 of a time in UTC."""
+    """Return the [s] since 1970 of a time in UTC."""
     return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

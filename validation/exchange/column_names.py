@@ -84,7 +84,7 @@ def column_of(cell: str) -> Column:
 
 
 def unit_word(text: str) -> str:
-    """Short name of a unit.
+    """Return short name of a unit.
 
     Args:
         text: such as Millimeters, inch, ° or mm.

@@ -140,7 +140,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Units that a column may have, with their factors; None where any."""
+    """Return the units that a column may have, with their factors; None where any."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]
@@ -160,7 +160,7 @@ def _placed(
     path: Path | str, robot: Robot, ids: list[str], columns: dict[str, NDArray],
     joints: list[str],
 ) -> list[Posture]:  # fmt: skip
-    """The posture of each command."""
+    """Return the posture of each command."""
     given = [name for name in joints if name in columns]
     posed = any(name.startswith("pose.") for name in columns)
     if posed == bool(given) or (given and len(given) < len(joints)):

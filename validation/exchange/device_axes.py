@@ -117,7 +117,7 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """How many times larger nominal distances are; robust against blunders."""
+    """Return how many times larger nominal distances are; robust against blunders."""
     if known:
         pairs = [(measured, nominal)]
     else:  # between readings: wherever the device stood
@@ -133,7 +133,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """[m] scatter about the frame that fits best, or about the base's own."""
+    """Return [m] scatter about the frame that fits best, or about the base's own."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]

@@ -32,12 +32,12 @@ class DeviceFrame:
     shift: NDArray
 
     def to_base(self, points: NDArray) -> NDArray:
-        """(..., 3) [m] points of the device in base axes."""
+        """Return the (..., 3) [m] points of the device in base axes."""
         return points @ self.rotation.T + self.shift
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """The frame that brings measured points nearest to nominal ones.
+    """Return the frame that brings measured points nearest to nominal ones.
 
     Args:
         measured: (N, 3) [m] device axes.
@@ -60,7 +60,7 @@ def spans_a_plane(points: NDArray) -> bool:
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """The frame with gross readings left aside, and the scatter about it.
+    """Return the frame with gross readings left aside, and the scatter about it.
 
     Args:
         measured: (N, 3) [m] device axes.
@@ -82,13 +82,13 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """[m] robust scatter of (N,) distances; rounding where all are zero."""
+    """Return the [m] robust scatter of (N,) distances; rounding where all are zero."""
     # the median length of a Gaussian vector in space is 1.538 of one component's sigma
     return float(np.median(gaps)) / 1.538 + 1e-12
 
 
 def is_gross(gap: float, scatter: float) -> bool:
-    """Whether a distance [m] is beyond any scatter [m]."""
+    """Return whether a distance [m] is beyond any scatter [m]."""
     return gap > _GROSS * scatter
 
 
@@ -123,7 +123,7 @@ def exchanged_throughout(
 def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
     tuple[int, ...] | None
 ):  # fmt: skip
-    """Targets of one row that were taken for each other.
+    """Return the targets of one row that were taken for each other.
 
     Args:
         measured: (k, 3) [m] base axes already.

@@ -33,7 +33,7 @@ from validation.exchange.reading import Reading, Writing
 def read_device_table(
     path: Path | str, writing: Writing, targets: Mapping[str, NDArray]
 ) -> list[Reading]:
-    """Points of an export.
+    """Return the points of an export.
 
     Args:
         path: the file.
@@ -65,13 +65,13 @@ def read_device_table(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """The first axis that a line of names does not have."""
+    """Return the first axis that a line of names does not have."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
 
 def _is_data(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a line is a row already."""
+    """Return whether a line is a row already."""
     return int(np.isfinite([parse_number(c, decimal) for c in cells]).sum()) >= 3
 
 
@@ -82,7 +82,7 @@ class _HeadedRows:
     values: CellValues
 
     def readings(self, line: int, cells: list[str]) -> list[Reading]:
-        """Readings of a row: one for each target that has columns."""
+        """Return the readings of a row: one for each target that has columns."""
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
@@ -110,7 +110,7 @@ class _HeadedRows:
         return parse_time(place, stamp, self.values.writing)
 
     def _has_place(self, own: list[int]) -> bool:
-        """Whether columns hold a point: x, y, z, each once."""
+        """Return whether columns hold a point: x, y, z, each once."""
         columns = self.values.header.columns
         axes = [columns[k].axis for k in own if columns[k].kind == "axis"]
         twice = [axis for axis in axes if axes.count(axis) > 1]
@@ -125,7 +125,7 @@ class _HeadedRows:
         self, line: int, cells: list[str], names: tuple[str, ...], own: list[int],
         time: float,
     ) -> Reading:  # fmt: skip
-        """A target's reading of a row."""
+        """Return a target's reading of a row."""
         columns, writing = self.values.header.columns, self.values.writing
         position, sigma = np.full(3, np.nan), np.full(3, np.nan)
         for k in own:
@@ -153,7 +153,7 @@ class _HeadedRows:
         return value if value > 0 else np.nan
 
     def _rotation(self, line: int, cells: list[str], own: list[int]) -> NDArray | None:
-        """The target's axes seen from the device's; None where it has none."""
+        """Return the target's axes seen from the device's; None where it has none."""
         header, writing = self.values.header, self.values.writing
         place = f"{self.values.sheet.file}: line {line}"
         kind, at = orientation_columns(header.columns, own)

@@ -41,7 +41,7 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """The header of a table, after what a program may write before it.
+    """Return the header of a table, after what a program may write before it.
 
     Args:
         rows: of the sheet, by line.
@@ -135,7 +135,7 @@ def _by_target(
 
 
 def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
-    """Groups of x, y, z given to the targets in their order, if as many."""
+    """Return the groups of x, y, z given to the targets in their order, if as many."""
     groups = -1
     ordered = []
     for column in columns:
@@ -148,7 +148,7 @@ def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
 
 
 def _complete(columns: Sequence[Column], least: int = 1) -> bool:
-    """Whether every target that has a coordinate has all three, once."""
+    """Return whether every target that has a coordinate has all three, once."""
     axes: dict[str, str] = {}
     for column in columns:
         if column.kind == "axis" and column.target:
@@ -157,7 +157,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Meaning of a column that names a target before or after what it holds."""
+    """Return meaning of a column that names a target before or after what it holds."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -174,7 +174,7 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """The target that a label names, as in arm:SMR1; empty if it names none."""
+    """Return the target that a label names, as in arm:SMR1; empty if it names none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
@@ -190,7 +190,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Labels of merged cells: an empty one has the label before it."""
+    """Return the labels of merged cells: an empty one has the label before it."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -209,12 +209,12 @@ def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
 
 
 def _is_number(cell: str, decimal: str = ".") -> bool:
-    """Whether a cell is a number."""
+    """Return whether a cell is a number."""
     return bool(np.isfinite(parse_number(cell, decimal)))
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Numbers of the columns of each target; of none, under the empty name.
+    """Return the numbers of the columns of each target; of none, under the empty name.
 
     Args:
         columns: of a table.

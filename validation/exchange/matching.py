@@ -110,7 +110,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Whether two readings are equal to the last digit, of one name and time."""
+    """Return whether two readings are equal to the last digit, of one name and time."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -118,7 +118,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Readings of targets; without a name, all are of the only target."""
+    """Return the readings of targets; without a name, all are of the only target."""
     ours = []
     for reading in readings:
         named = [part for part in reading.names if part in targets]
@@ -140,13 +140,13 @@ def _of_targets(
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Row of the command nearest in time, -1 if none is within the window."""
+    """Return row of the command nearest in time, -1 if none is within the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 
 
 def _in_order(ours: list[tuple[Reading, str]], commands: Commands) -> list[int]:
-    """The k-th reading of a target belongs to the k-th command."""
+    """Return the k-th reading of a target belongs to the k-th command."""
     named = [target for _, target in ours]
     first = ours[0][0]
     counts: Mapping[str, int] = Counter(named)

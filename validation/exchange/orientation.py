@@ -37,7 +37,7 @@ def orders() -> tuple[str, ...]:
 def orientation_columns(
     columns: Sequence[Column], own: Sequence[int]
 ) -> tuple[str, dict[str, int]]:
-    """Columns of a target's orientation.
+    """Return the columns of a target's orientation.
 
     Args:
         columns: of the table.
@@ -58,7 +58,7 @@ def orientation_columns(
 
 
 def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
-    """(3, 3) target axes seen from the device's, of a quaternion w x y z.
+    """Return the (3, 3) target axes seen from the device's, of a quaternion w x y z.
 
     Args:
         place: file and line, for messages.
@@ -80,7 +80,7 @@ def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
 def from_angles(
     place: str, angles: Mapping[str, float], order: str | None
 ) -> NDArray:  # fmt: skip
-    """(3, 3) target axes seen from the device's, of three angles [rad].
+    """Return the (3, 3) target axes seen from the device's, of three angles [rad].
 
     Args:
         place: file and line, for messages.
@@ -126,7 +126,7 @@ class Turns:
 def turns_of(
     file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
 ) -> Turns:
-    """Deviations of orientations read.
+    """Return the deviations of orientations read.
 
     Args:
         file: the targets file, for messages.

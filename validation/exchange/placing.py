@@ -131,7 +131,7 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """(R, 3) mean of (R, T, 3) over the targets read; NaN where none was."""
+    """Return the (R, 3) mean of (R, T, 3) over the targets read; NaN where none was."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -165,7 +165,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Targets of one command, read where they cannot stand, and why."""
+    """Return the targets of one command, read where they cannot stand, and why."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)

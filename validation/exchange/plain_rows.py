@@ -19,7 +19,7 @@ def read_plain_rows(
     rows: Sequence[tuple[int, list[str]]],
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:
-    """Readings of rows without a header.
+    """Return the readings of rows without a header.
 
     Args:
         values: of the cells.
@@ -42,7 +42,7 @@ def read_plain_rows(
 
 
 def _nameless(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a row begins with a number, or with nothing read."""
+    """Return whether a row begins with a number, or with nothing read."""
     return missing(cells[0]) or bool(np.isfinite(parse_number(cells[0], decimal)))
 
 
@@ -102,7 +102,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """A row of numbers alone: x, y, z of each target in their order."""
+    """Return a row of numbers alone: x, y, z of each target in their order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(
@@ -118,7 +118,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """A reading of three cells."""
+    """Return a reading of three cells."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

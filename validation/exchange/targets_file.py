@@ -111,12 +111,12 @@ def read_targets(path: Path | str) -> TargetsFile:
 
 
 def _choice(root: Table, key: str, valid: Iterable[str]) -> str | None:
-    """A word out of a few, None where it is not given."""
+    """Return a word out of a few, None where it is not given."""
     return root.choice(key, valid) if root.has(key) else None
 
 
 def _decimals(root: Table) -> tuple[str, str]:
-    """Decimal marks of the exports and of the commands."""
+    """Return the decimal marks of the exports and of the commands."""
     if not isinstance(root.get("decimal"), dict):
         mark = root.choice("decimal", _MARKS, ".")
         return mark, mark
@@ -127,7 +127,7 @@ def _decimals(root: Table) -> tuple[str, str]:
 
 
 def _rotations(root: Table, places: Mapping[str, NDArray]) -> dict[str, NDArray]:
-    """(3,) [rad] rotation vectors of targets, platform axes."""
+    """Return the (3,) [rad] rotation vectors of targets, platform axes."""
     if not root.has("rotations"):
         return {}
     table = root.table("rotations")

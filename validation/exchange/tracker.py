@@ -61,7 +61,7 @@ class Import:
     remarks: tuple[str, ...]
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         return {
             "robot": self.robot,
             "joined_by": self.how,
@@ -78,7 +78,7 @@ class Import:
         }
 
     def text(self) -> str:
-        """A few lines for people."""
+        """Return a few lines for people."""
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
@@ -129,7 +129,7 @@ def import_readings(
 
 
 def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
-    """Readings of a table or a bag."""
+    """Return the readings of a table or a bag."""
     if is_bag(file):
         return read_bag(file, declared.writing.oriented)
     return read_device_table(file, declared.writing, declared.places)
@@ -138,7 +138,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """The campaign's two texts, and what was left out."""
+    """Return the campaign's two texts, and what was left out."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -168,7 +168,7 @@ def _campaign(
 
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
-    """Readings that are not in the campaign, in words; too many are refused."""
+    """Return readings that are not in the campaign, in words; too many are refused."""
     why = {"time": "no command near it in time"}.get(
         joined.how, "no command's id in its name"
     )

@@ -34,7 +34,7 @@ def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
 
 
 def element_stiffness(link: BeamLink, step: float) -> NDArray:
-    """EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
+    """Return EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a length, corrected.
 
     An element of constant strain lacks the deflection step^3 / 12 EI of its own
     bending; given to its shear, the tip of a cantilever is exact for any number.

@@ -103,7 +103,7 @@ def _power_series(factors: Sequence[float], x: float) -> float:
 
 
 def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
-    """A vector seen from axes turned by half of w."""
+    """Return a vector seen from axes turned by half of w."""
     half = turn / 2
     first = math.sin(half) / turn if turn else 0.5
     second = 2 * (math.sin(half / 2) / turn) ** 2 if turn else 0.125
@@ -112,12 +112,12 @@ def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
 
 
 def _sum(a: _Vector, factor: float, b: _Vector) -> _Vector:
-    """A + factor b."""
+    """Return a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 def _cross(a: _Vector, b: _Vector) -> _Vector:
-    """A x b."""
+    """Return a x b."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

@@ -43,7 +43,7 @@ class ClearanceCone:
     arm: float = 0.0
 
     def offsets(self, screw: Sequence[float]) -> list[float]:
-        """[rad or m] one or two components that it bounds, of a screw (6,)."""
+        """Return [rad or m] one or two components that it bounds, of a screw (6,)."""
         if self.arm:
             return [
                 screw[3] + self.arm * screw[1],
@@ -65,7 +65,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """The same with the stiffness of its contacts times a factor."""
+        """Return the same with the stiffness of its contacts times a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
@@ -80,7 +80,7 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Clearances of a frame's joint, and its own motion if no spring resists it.
+    """Return clearances of a frame's joint, and its own motion if no spring resists it.
 
     Args:
         frame: of a robot.
@@ -142,7 +142,7 @@ def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> fl
 def _overlap(
     cone: ClearanceCone, offsets: list[float], width: float
 ) -> tuple[float, float]:
-    """P and sqrt(x^2 + w^2) of the head of this module."""
+    """Return P and sqrt(x^2 + w^2) of the head of this module."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size

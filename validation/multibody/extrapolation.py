@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 def without_squares(
     steps: Sequence[float], differences: Sequence[NDArray]
 ) -> list[NDArray]:
-    """Neighbouring differences extrapolated to no step.
+    """Return the neighbouring differences extrapolated to no step.
 
     Args:
         steps: k of them, falling.
@@ -36,7 +36,7 @@ def without_squares(
 def steadiest(
     found: Sequence[NDArray], size: Callable[[NDArray], float]
 ) -> tuple[NDArray, NDArray]:
-    """The one that differs least from the one before it.
+    """Return the one that differs least from the one before it.
 
     Args:
         found: at least two arrays of the same shape.

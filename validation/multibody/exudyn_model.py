@@ -92,7 +92,7 @@ class Model:
         self.container.Reset()
 
     def add_body(self, T: NDArray) -> Place:
-        """A rigid body built at ``T``; statics never sees its mass."""
+        """Return a rigid body built at ``T``; statics never sees its mass."""
         x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
         node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
         body = self.item.ObjectRigidBody(
@@ -101,7 +101,7 @@ class Model:
         return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
 
     def add_marker(self, place: Place) -> int:
-        """A marker at a place."""
+        """Return a marker at a place."""
         marker = self.item.MarkerBodyRigid(
             bodyNumber=place.body, localHT=self.transform(place.local)
         )
@@ -124,7 +124,7 @@ class Model:
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """A new body at the place, free along one axis but for a weak spring."""
+        """Return a new body at the place, free along one axis but for a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
@@ -189,7 +189,7 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Elements along the base's x, clamped there, and their ends.
+        """Return the elements along the base's x, clamped there, and their ends.
 
         Args:
             base: where it begins.
@@ -221,7 +221,7 @@ class Model:
         return tuple(parts), tuple(bodies)
 
     def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
-        """A connector that is stress-free while the closure is open."""
+        """Return a connector that is stress-free while the closure is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
@@ -249,11 +249,11 @@ class Model:
             raise TimeoutError
 
     def node(self, place: Place) -> Any:
-        """Exudyn's node of a place's body."""
+        """Return Exudyn's node of a place's body."""
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:
-        """Exudyn's own kind of transform."""
+        """Return Exudyn's own kind of transform."""
         return self.exu.HT(rotation=T[:3, :3], translation=T[:3, 3])
 
     def _follow_energy(self, spring: int, far: int, K: NDArray) -> None:
@@ -276,7 +276,7 @@ class Model:
         self.set_law(spring, law)
 
     def _connect(self, markers: list[int], K: NDArray) -> int:
-        """A 6 by 6 spring between two markers."""
+        """Return a 6 by 6 spring between two markers."""
         spring = self.item.RigidBodySpringDamper(
             markerNumbers=markers,
             stiffness=K[np.ix_(_SWAP, _SWAP)],

@@ -19,13 +19,13 @@ def pose(model: Model, place: Place) -> NDArray:
 
 
 def closure_error(model: Model, closure: Closure) -> NDArray:
-    """(6,) [rad, m] screw from the closed position to the present one."""
+    """Return the (6,) [rad, m] screw from the closed position to the present one."""
     first = pose(model, closure.first) @ closure.closed
     return logarithm(inverse(first) @ pose(model, closure.second))
 
 
 def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
-    """(6,) [rad, m] logarithm of the far place seen from the near one."""
+    """Return the (6,) [rad, m] logarithm of the far place seen from the near one."""
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
@@ -36,7 +36,7 @@ def idle_motions(model: Model, idle: Mapping[str, Elastic]) -> NDArray:
 
 
 def energy(model: Model, part: Elastic) -> float:
-    """[J] stored in an elastic part."""
+    """Return the [J] stored in an elastic part."""
     if part.modes is not None:
         q = _mode_coordinates(model, part.modes)
         return float(q @ part.modes.stiffness @ q) / 2
@@ -46,7 +46,7 @@ def energy(model: Model, part: Elastic) -> float:
 
 
 def contact_energy(model: Model, contact: Contact) -> float:
-    """[J] stored in the contact's compliance."""
+    """Return the [J] stored in the contact's compliance."""
     screw = screw_between(model, contact).tolist()
     return sum(
         cone_energy(cone, screw, model.width) for cone in contact.clearance.cones
@@ -54,7 +54,7 @@ def contact_energy(model: Model, contact: Contact) -> float:
 
 
 def wrench(model: Model, part: Elastic) -> NDArray:
-    """(6,) [N m, N] on the outer side, at the outer place, in its axes."""
+    """Return the (6,) [N m, N] on the outer side, at the outer place, in its axes."""
     if part.modes is not None:
         near, far = (pose(model, p)[:3, :3] for p in (part.near, part.far))
         halves = part.modes.wrench @ _mode_coordinates(model, part.modes)
@@ -72,7 +72,7 @@ def wrench(model: Model, part: Elastic) -> NDArray:
 
 
 def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
-    """(6,) [N m, N] on the first chain, at a point of the base, base axes."""
+    """Return (6,) [N m, N] on the first chain, at a point of the base, base axes."""
     T = pose(model, closure.second)
     own = connector_wrench(model, closure.connector).reshape(2, 3)
     moment, force = (T[:3, :3] @ half for half in own)

@@ -123,7 +123,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Exudyn's function before each step: moves targets, narrows contacts."""
+    """Return Exudyn's function before each step: moves targets, narrows contacts."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -201,7 +201,7 @@ def raise_callback_error(model: Model, stage: str) -> None:
 
 
 def static_settings(model: Model, start: float, steps: int) -> Any:
-    """Exudyn's settings of :func:`equilibrate`."""
+    """Return Exudyn's settings of :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
@@ -226,6 +226,6 @@ def _record(model: Model) -> None:
 
 
 def largest_gap(model: Model, closures: list[Closure]) -> float:
-    """[rad, m] largest component of the closure errors."""
+    """Return the [rad, m] largest component of the closure errors."""
     gaps = [np.abs(closure_error(model, closure)).max() for closure in closures]
     return float(max(gaps, default=0.0))

@@ -45,7 +45,7 @@ _POLISH = 2  # steps of Newton's method: closures' rounding moves soft robots
 def linearised_compliance(
     model: Model, tree: OpenTree, platform: str
 ) -> tuple[NDArray, float, bool]:
-    """Compliance at the equilibrium in which a model stands.
+    """Return the compliance at the equilibrium in which a model stands.
 
     Args:
         model: solved.
@@ -98,7 +98,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
-    """V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
+    """Return V Z (Z'KZ)^-1 Z'V' over the motions Z that keep joints and closures."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
     count = solver.GetODE2size()
@@ -145,7 +145,7 @@ def _compliance(
 
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
-    """Whether no motion lowers the potential by more than K is known to."""
+    """Return whether no motion lowers the potential by more than K is known to."""
     # what nothing resists is rounding, of either sign
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
@@ -154,7 +154,7 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """The modes' stiffness with the idle springs."""
+    """Return the modes' stiffness with the idle springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
@@ -170,7 +170,7 @@ def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
 
 
 def _solve(K: NDArray, right: NDArray) -> NDArray:
-    """K^-1 right, of stiffnesses far apart."""
+    """Return K^-1 right, of stiffnesses far apart."""
     K = (K + K.T) / 2
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = K * np.outer(size, size)
@@ -180,7 +180,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Derivatives along Z of gaps, of the platform's pose, of idle joints."""
+    """Return derivatives along Z of gaps, of the platform's pose, of idle joints."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -35,7 +35,7 @@ def stepped_compliance(
     model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
-    """Compliance by differences at the equilibrium in which a model stands.
+    """Return the compliance by differences at the equilibrium in which a model stands.
 
     Args:
         model: solved.

@@ -19,12 +19,12 @@ def matrix(rotation: NDArray, translation: ArrayLike) -> NDArray:
 
 
 def turned(rotation_vector: ArrayLike) -> NDArray:
-    """(3, 3) rotation by a vector [rad]."""
+    """Return the (3, 3) rotation by a vector [rad]."""
     return Rotation.from_rotvec(np.array(rotation_vector, dtype=float)).as_matrix()
 
 
 def turn_of(R: NDArray) -> NDArray:
-    """(3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
+    """Return (3,) [rad] rotation vector, of length at most pi, of a rotation (3, 3)."""
     # by the quaternion, of which the largest component comes first (Shepperd 1978)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
     trace = xx + yy + zz
@@ -59,7 +59,7 @@ def inverse(T: NDArray) -> NDArray:
 
 
 def exponential(screw: NDArray) -> NDArray:
-    """Finite motion of a constant screw acting for unit time.
+    """Return the finite motion of a constant screw acting for unit time.
 
     Args:
         screw: (6,) ``[RX RY RZ TX TY TZ]`` [rad, m].
@@ -71,7 +71,7 @@ def exponential(screw: NDArray) -> NDArray:
 
 
 def logarithm(T: NDArray) -> NDArray:
-    """Constant screw that makes a finite motion in unit time.
+    """Return the constant screw that makes a finite motion in unit time.
 
     Args:
         T: (4, 4) of a rotation by less than pi.

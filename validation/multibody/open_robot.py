@@ -70,7 +70,7 @@ def link_springs(
     given: Mapping[str, NDArray],
     meshes: Mapping[str, MeshBody],
 ) -> dict[str, NDArray]:
-    """Stiffness of every link that is to be neither a beam nor a mesh.
+    """Return the stiffness of every link that is to be neither a beam nor a mesh.
 
     Args:
         robot: any.
@@ -128,7 +128,7 @@ class OpenTree:
 
 
 def build(model: Model, case: Case) -> OpenTree:
-    """The open, stress-free robot with its errors, its closures and its loads.
+    """Return the open, stress-free robot with its errors, its closures and its loads.
 
     Args:
         model: empty.

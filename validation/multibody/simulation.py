@@ -175,7 +175,7 @@ def simulate_assembly(
     couple: ArrayLike | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> MultibodyAssembly:
-    """Force a robot together in Exudyn.
+    """Return the force a robot together in Exudyn.
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
@@ -295,7 +295,7 @@ def closing_sequence(
     scale: float = 1.0,
     load: ArrayLike | None = None,
 ) -> NDArray:
-    """Frames of a robot without clearances while its closures are closed.
+    """Return the frames of a robot without clearances while its closures are closed.
 
     Args:
         posture: as in :func:`simulate_assembly`; links with a section are beams, the
@@ -338,7 +338,7 @@ def closing_sequence(
 
 
 def without_clearance(robot: Robot) -> Robot:
-    """The same robot without clearances, to compare with a simulation.
+    """Return the same robot without clearances, to compare with a simulation.
 
     Args:
         robot: any.
@@ -353,7 +353,7 @@ def without_clearance(robot: Robot) -> Robot:
 def _read(
     model: Model, robot: Robot, tree: OpenTree, started: float
 ) -> MultibodyAssembly:
-    """The equilibrium's screws, wrenches and energies."""
+    """Return the equilibrium's screws, wrenches and energies."""
     count = len(robot.frames)
     screws = {kind: np.zeros((count, 6)) for kind in ("link", "joint", "clearance")}
     wrenches = {kind: np.zeros((count, 6)) for kind in ("link", "joint")}
@@ -394,7 +394,7 @@ def _read(
 
 
 def import_exudyn() -> tuple[Any, Any, Any]:
-    """Exudyn without windows and without a word on the console."""
+    """Return Exudyn without windows and without a word on the console."""
     with contextlib.redirect_stdout(io.StringIO()):
         import exudyn
         from exudyn import FEM, itemInterface

@@ -70,7 +70,7 @@ def simulated_tangent(
     steps: bool = True,
     time_limit: float = TIME_LIMIT,
 ) -> SimulatedTangent:
-    """The platform's compliance at the equilibrium of errors, load and weight.
+    """Return the platform's compliance at the equilibrium of errors, load and weight.
 
     Args:
         posture: where the robot stands; its errors count.
@@ -111,7 +111,7 @@ def _first(
     case: Case, ways: list[Regularisation], load_steps: int, steps: bool,
     started: float, limit: float,
 ) -> SimulatedTangent:  # fmt: skip
-    """The answer by the first regularisation that has one in time."""
+    """Return the answer by the first regularisation that has one in time."""
     *first, last = ways
     for way in first:
         try:

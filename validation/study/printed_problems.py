@@ -63,7 +63,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Energies; inside an assembly zone they are zero but for rounding."""
+    """Return Energies; inside an assembly zone they are zero but for rounding."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(

@@ -29,7 +29,7 @@ def distances(
     coordinates: NDArray,
     program: str = "multibody",
 ) -> NDArray:
-    """How far a machine stands from the poses wanted.
+    """Return how far a machine stands from the poses wanted.
 
     Args:
         robot: declared.

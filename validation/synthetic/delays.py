@@ -13,7 +13,7 @@ def behind(time_constant: float) -> str:
 
 
 def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Row]:
-    """Rows with what follows the temperature, which is straight between them.
+    """Return rows with what follows the temperature, which is straight between them.
 
     Args:
         rows: in the order of time.

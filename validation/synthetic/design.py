@@ -83,7 +83,7 @@ class CampaignDesign:
 
 
 def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
-    """A design that varies what effects depend on.
+    """Return a design that varies what effects depend on.
 
     Args:
         design: any.
@@ -173,7 +173,7 @@ def plan_campaign(
 def _configurations(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> NDArray:
-    """(k, n) joint coordinates at which the nominal closures hold."""
+    """Return the (k, n) joint coordinates at which the nominal closures hold."""
     home = home_posture(robot)
     spans = np.array([
         0.0 if not f.actuated
@@ -246,7 +246,7 @@ def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> 
 
 
 def _load(largest: float, rng: np.random.Generator) -> NDArray:
-    """(3,) [N] along an axis, in full or by half, or in any direction."""
+    """Return the (3,) [N] along an axis, in full or by half, or in any direction."""
     if rng.random() < 0.5:
         axis = np.zeros(3)
         axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
@@ -255,7 +255,7 @@ def _load(largest: float, rng: np.random.Generator) -> NDArray:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """(3,) unit vector of any direction."""
+    """Return the (3,) unit vector of any direction."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 

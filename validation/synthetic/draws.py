@@ -24,7 +24,7 @@ class NotApplicable(ValueError):
 def draw_effect(
     name: str, robot: Robot, duration: float, rng: np.random.Generator
 ) -> Hidden:
-    """An effect with plausible parameters, some at one place and some at all.
+    """Return an effect with plausible parameters, some at one place and some at all.
 
     Args:
         name: of the effect.
@@ -47,7 +47,7 @@ def draw_effect(
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
-    """The same effect, its contribution to the readings scaled by about a factor.
+    """Return same effect, its contribution to the readings scaled by about a factor.
 
     Args:
         effect: any.
@@ -89,7 +89,7 @@ def _beams(robot: Robot) -> list[Frame]:
 
 
 def _bodies(robot: Robot) -> list[Frame]:
-    """Beams, or all bodies of some length of a robot that has none."""
+    """Return the beams, or all bodies of some length of a robot that has none."""
     return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 

@@ -89,7 +89,7 @@ Moved = Callable[[NDArray, Row, Parameters], NDArray]
 
 
 def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
-    """A robot with a fixed frame between a joint and its children."""
+    """Return a robot with a fixed frame between a joint and its children."""
     new = f"{name}~{suffix}"
     frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
     return replace(robot, frames=(*frames, Frame(new, name, **given)))
@@ -103,12 +103,12 @@ def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """(6, 6) stiffness along a joint's own motion, rigid otherwise."""
+    """Return the (6, 6) stiffness along a joint's own motion, rigid otherwise."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
 def beam_length(robot: Robot, name: str) -> float:
-    """[m] declared length of a frame's beam, or between its body's joints."""
+    """Return [m] declared length of a frame's beam, or between its body's joints."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):
         return float(np.linalg.norm(frame.translation))
@@ -130,13 +130,13 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """The same robot with the frame of that name replaced."""
+    """Return the same robot with the frame of that name replaced."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """A machine one of whose joints deviates from its command [rad or m]."""
+    """Return a machine one of whose joints deviates from its command [rad or m]."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -281,7 +281,7 @@ def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Mach
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Offset of the measured point, and displacement of the measuring frame."""
+    """Return offset of the measured point, and displacement of the measuring frame."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()
@@ -304,7 +304,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Frames that a component is given for, as in ``<frame>.<component>``."""
+    """Return frames that a component is given for, as in ``<frame>.<component>``."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 

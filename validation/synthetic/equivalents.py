@@ -72,7 +72,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Squared part of a vector outside the span of columns."""
+    """Return the squared part of a vector outside the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -84,7 +84,7 @@ def _residual(A: NDArray, target: NDArray) -> float:
 
 
 def signatures(campaign: Synthetic) -> dict[str, NDArray]:
-    """Whitened columns of every public effect that applies to the robot.
+    """Return the whitened columns of every public effect that applies to the robot.
 
     Args:
         campaign: whose design and noise are used.
@@ -210,7 +210,7 @@ class _FiniteDifferences:
         return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
     def loaded(self, name: str, key: str, value: float, step: float) -> NDArray:
-        """(rows, 6) derivative of the readings by a parameter of an effect."""
+        """Return (rows, 6) derivative of the readings by a parameter of an effect."""
         readings = self._read(self._rows, [Hidden(name, {key: value})])
         return (readings - self._loaded_readings) / step
 

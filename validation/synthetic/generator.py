@@ -208,7 +208,7 @@ class _SimulatedMachine:
     update: Progress | None
 
     def read(self, effects: Sequence[Hidden], stage: str) -> NDArray:
-        """Readings of all rows without noise."""
+        """Return the readings of all rows without noise."""
         update = self.update
         progress = None if update is None else (lambda d, n: update(stage, d, n))
         return simulate_readings(
@@ -262,7 +262,7 @@ def _scaled_effect(
     sigma: NDArray,
     declared: NDArray,
 ) -> tuple[Hidden, NDArray, NDArray]:
-    """The effect scaled to a strength, its readings, and the noise."""
+    """Return the effect scaled to a strength, its readings, and the noise."""
     factor = 1.0
     for attempt in range(_TRIES):
         tried = strengthened(effect, factor) if attempt else effect
@@ -286,7 +286,7 @@ def _scaled_effect(
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """(rows, 6) readings of the machine linear in its errors and its load."""
+    """Return (rows, 6) readings of the machine linear in its errors and its load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -298,7 +298,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Readings with noise, blunders and gaps; and the rows with blunders."""
+    """Return the readings with noise, blunders and gaps; and the rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
@@ -310,7 +310,7 @@ def _measured(
 
 
 def _rms(values: NDArray) -> float:
-    """Root mean square of all that was measured."""
+    """Return the root mean square of all that was measured."""
     return float(np.sqrt(np.nanmean(values**2)))
 
 
@@ -331,7 +331,7 @@ def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
 
 
 def _toml(campaign: Synthetic) -> str:
-    """The text of campaign.toml."""
+    """Return the text of campaign.toml."""
     return (
         'robot = "robot.toml"\n'
         'measurements = "measurements.csv"\n'
@@ -344,7 +344,7 @@ def _toml(campaign: Synthetic) -> str:
 
 
 def _table(campaign: Synthetic) -> str:
-    """The text of measurements.csv."""
+    """Return the text of measurements.csv."""
     plan = campaign.plan
     loads = np.array([row.load for row in plan.rows])
     loaded = [k for k in range(6) if loads[:, k].any()]

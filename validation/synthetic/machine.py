@@ -51,7 +51,7 @@ def simulate_readings(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
-    """Deviations of a simulated machine at the rows of a design, without noise.
+    """Return deviations of a simulated machine at the rows of a design, without noise.
 
     Rows whose machine is the same are simulated once.
 
@@ -104,13 +104,13 @@ def acts_on_machine(name: str) -> bool:
 
 
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
-    """The robot with its reference point as the platform."""
+    """Return the robot with its reference point as the platform."""
     point = Frame("platform~point", robot.platform, translation=reference_point)
     return replace(robot, platform=point.name, frames=(*robot.frames, point))
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """(4, 4) nominal platform of the robot, along its chain."""
+    """Return the (4, 4) nominal platform of the robot, along its chain."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
@@ -125,7 +125,7 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
 
 
 def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
-    """The machine of a row, with the effects that change it."""
+    """Return the machine of a row, with the effects that change it."""
     gravity = np.array([row.covariates.get(f"gravity.{k}", 0.0) for k in "xyz"])
     machine = Machine(robot, row.coordinates, row.load, gravity)
     for effect in changing:
@@ -137,7 +137,7 @@ def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
 def _read(
     pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
 ) -> NDArray:
-    """(6,) [rad, m] reading of the measuring device at a pose."""
+    """Return the (6,) [rad, m] reading of the measuring device at a pose."""
     for effect in effects:
         if effect.name in POSES:
             pose = POSES[effect.name](pose, row, effect.parameters)

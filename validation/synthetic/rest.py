@@ -44,7 +44,7 @@ _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
 def rest_poses(
     machines: Sequence[Machine], program: str, update: Progress | None = None
 ) -> NDArray:
-    """Equilibria of machines of one structure under their loads.
+    """Return the equilibria of machines of one structure under their loads.
 
     Args:
         machines: with all their effects.
@@ -101,7 +101,7 @@ def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
 
 
 def _clearance_position(law: ClearanceLaw, wrench: NDArray) -> NDArray:
-    """(6,) [rad, m] position of a joint within its clearance, under a load."""
+    """Return (6,) [rad, m] position of a joint within its clearance, under a load."""
     position = np.zeros(6)
     for name, rows in _ROWS.items():
         bound = getattr(law.clearance, name) or 0.0

@@ -67,7 +67,7 @@ class _SpringModel:
 
 
 def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
-    """Equilibria of machines whose links are springs.
+    """Return the equilibria of machines whose links are springs.
 
     Args:
         machines: of one structure, without clearances.
@@ -119,7 +119,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
 
 
 def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
-    """Compliances, places and chains of machines."""
+    """Return the compliances, places and chains of machines."""
     robot = machines[0].robot
     drawn = _placements(np.array([
         [[*f.rotation, *f.translation] for f in m.robot.frames] for m in machines
@@ -181,7 +181,7 @@ def _deflections(screws: NDArray) -> NDArray:
 
 
 def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """(k, n, 4, 4) frames by products along the chains.
+    """Return the (k, n, 4, 4) frames by products along the chains.
 
     Args:
         robot: whose tree it is.
@@ -223,7 +223,7 @@ def _maps(T: NDArray) -> NDArray:
 
 
 def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
-    """(k, passive, 6) screws of unit motions."""
+    """Return the (k, passive, 6) screws of unit motions."""
     own = [parts.robot.frames[i].own_axis for i in parts.passive]
     maps = _maps(T[:, parts.passive])
     columns = [maps[:, k, :, axis] for k, axis in enumerate(own)]
@@ -231,7 +231,7 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Inverses of Newton's matrix, and the compliance that scales wrenches."""
+    """Return inverses of Newton's matrix, and the compliance that scales wrenches."""
     # rows of one configuration and the same springs have the same matrix
     distinct = np.hstack([
         q,
@@ -263,7 +263,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
 def _carried(
     machines: Sequence[Machine], parts: _SpringModel, ends: NDArray, closing: NDArray
 ) -> NDArray:
-    """(2, k, n, 6) wrenches through each body's end and through its joint."""
+    """Return (2, k, n, 6) wrenches through each body's end and through its joint."""
     robot, (bodies, before) = parts.robot, ends
     carried = np.zeros((2, *before.shape[:2], 6))
     platform = robot.index(robot.platform)
@@ -308,18 +308,18 @@ def _add_weights(
 
 
 def _force(vectors: NDArray) -> NDArray:
-    """(k, 6) wrenches of forces (k, 3)."""
+    """Return the (k, 6) wrenches of forces (k, 3)."""
     return np.concatenate([np.zeros_like(vectors), vectors], axis=1)
 
 
 def _at_base(wrenches: NDArray, points: NDArray) -> NDArray:
-    """(k, 6) wrenches at points, read at the base origin."""
+    """Return the (k, 6) wrenches at points, read at the base origin."""
     moments = wrenches[:, :3] + np.cross(points, wrenches[:, 3:])
     return np.concatenate([moments, wrenches[:, 3:]], axis=1)
 
 
 def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
-    """(..., 6) wrenches read at frames, in their axes."""
+    """Return the (..., 6) wrenches read at frames, in their axes."""
     return np.einsum("...ij,...i->...j", _maps(T), wrenches)
 
 

@@ -41,7 +41,7 @@ def truth_of(
     accept: list[list[str]] | None = None,
     note: str = "",
 ) -> dict[str, Any]:
-    """The truth of a campaign.
+    """Return the truth of a campaign.
 
     Args:
         campaign: with what is hidden in it.
@@ -103,7 +103,7 @@ def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
 
 
 def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
-    """The unit of a parameter."""
+    """Return the unit of a parameter."""
     last = key.rpartition(".")[2]
     special = {
         "phase": "rad", "tilt": "rad", "exponent": "1", "factor": "1",
@@ -118,6 +118,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Root mean square of what was measured; 1 where nothing is known."""
+    """Return the root mean square of what was measured; 1 where nothing is known."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

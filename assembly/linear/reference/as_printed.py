@@ -32,7 +32,7 @@ _UNIT = 1e-3  # screws are in mrad and mm here
 def energy_as_printed(
     posture: Posture, load: ArrayLike | None = None
 ) -> tuple[float, NDArray]:
-    """Minimum assembly energy as printed, (22).
+    """Return the minimum assembly energy as printed, (22).
 
     Args:
         posture: where the robot stands.
@@ -67,7 +67,7 @@ def energy_as_printed(
 
 
 def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float | None:
-    """Margin of problem (21): the least factor on the clearances that assembles.
+    """Return margin of problem (21): the least factor on the clearances that assembles.
 
     Args:
         posture: where the robot stands.
@@ -102,7 +102,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
+    """Return eqs (2)-(5); ``factor`` (n, 4) multiplies the bounds."""
     import cvxpy as cp
 
     constraints = []
@@ -121,14 +121,14 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
 
 
 def _assembly_constraints(posture: Posture, x_p: Any, screws: Any) -> list:
-    """Eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
+    """Return eqs (16)-(20): every chain's end, and the platform's pose error x_p."""
     import cvxpy as cp
 
     robot = posture.robot
     stacked = cp.vec(screws, "C")
 
     def pose_error(name: str) -> Any:
-        """Eq. (8): displacement of a frame by the screws along its path."""
+        """Return Eq. (8): displacement of a frame by the screws along its path."""
         on_path = robot.on_path[robot.index(name)]
         return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
 

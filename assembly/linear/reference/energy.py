@@ -116,7 +116,7 @@ def solve_with(
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Least energy of a reduced problem; infeasible ones are named."""
+    """Return the least energy of a reduced problem; infeasible ones are named."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""

@@ -115,7 +115,7 @@ class ReachableSet:
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
     def at_point(self, offset: ArrayLike) -> "ReachableSet":
-        """The same set for another point of the platform.
+        """Return the same set for another point of the platform.
 
         Args:
             offset: (3,) [m] from the platform's origin to the point, base axes.
@@ -131,7 +131,7 @@ class ReachableSet:
         )  # fmt: skip
 
     def support(self, direction: ArrayLike, method: Method = "compiled") -> "Support":
-        """Largest component of the platform screw along a direction.
+        """Return the largest component of the platform screw along a direction.
 
         Args:
             direction: (6,) weights of the screw's components.
@@ -182,7 +182,7 @@ class ReachableSet:
     def farthest(
         self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
-        """Bounds of the largest size of half a screw, and what attains it.
+        """Return the bounds of the largest size of half a screw, and what attains it.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
@@ -220,7 +220,7 @@ class ReachableSet:
 def reachable_screws(
     assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """The set of platform screws that an assumption of (27) leaves possible.
+    """Return the set of platform screws that an assumption of (27) leaves possible.
 
     Args:
         assembly: of least energy.
@@ -269,7 +269,7 @@ def within_bounds(
     assembly: Assembly, compliant: Compliant, kept: frozenset[int],
     moving: Callable[[VirtualJoints], MovingCones],
 ) -> ReachableSet:  # fmt: skip
-    """Platform screws as cones move about an assembly and free motions follow.
+    """Return platform screws as cones move about an assembly and free motions follow.
 
     Args:
         assembly: where they start.
@@ -359,13 +359,13 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Orthonormal rows spanning those of A, but for rounding."""
+    """Return the orthonormal rows spanning those of A, but for rounding."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Clearances whose constraint is active, by strict complementarity.
+    """Return the clearances whose constraint is active, by strict complementarity.
 
     Args:
         assembly: of least energy.

@@ -115,7 +115,7 @@ class Reduction:
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """(6 closures,) scaled closure wrenches, the least where not unique."""
+        """Return (6 closures,) scaled closure wrenches, the least where not unique."""
         all_springs = self.spread @ springs
         inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
         return self.load_multipliers + self.basis @ inner
@@ -186,7 +186,7 @@ def reduce_problem(
 
 
 def complement(A: NDArray, tolerance: float) -> NDArray:
-    """Orthonormal basis of what is orthogonal to the columns of A.
+    """Return the orthonormal basis of what is orthogonal to the columns of A.
 
     Args:
         A: (m, n).
@@ -205,7 +205,7 @@ def spring_deformations(
     frame_loads: FrameLoads,
     multipliers: NDArray,
 ) -> NDArray:
-    """Deformations of the springs in balance with closures and loads.
+    """Return the deformations of the springs in balance with closures and loads.
 
     Args:
         lin: the assembly constraints.
@@ -225,7 +225,7 @@ def spring_deformations(
 def _load_multipliers(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Multipliers that balance the loads along every free motion."""
+    """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
     # what is left is orthogonal to A_q's rows: a free motion, which the load drives

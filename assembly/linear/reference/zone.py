@@ -49,7 +49,7 @@ def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
 ) -> tuple[float, float, NDArray]:
-    """Margin with a given choice of what may move.
+    """Return the margin with a given choice of what may move.
 
     Args:
         lin: the assembly constraints.
@@ -91,7 +91,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
 def _margin_bound(
     B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
 ) -> float:
-    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    """Return the certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
     sizes = cone_sizes(B.T @ y, joints.group)
     scaled = joints.scaled[cone_starts(joints.group)[:-1]]
     work = float(y @ right) - float(sizes[~scaled].sum())
