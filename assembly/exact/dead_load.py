@@ -65,7 +65,7 @@ def dead_loads(
     """Return the loads as dead loads.
 
     Args:
-        posture: where the robot stands, of n frames.
+        posture: the robot's configuration, of n frames.
         load: (6,) [N m, N] on the platform at a point, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.

@@ -110,7 +110,7 @@ class ExactAssembly:
     is a local minimum ``least_curvature`` says; that none is lower is not proved.
 
     Attributes:
-        whole: where the robot stands nominally, its beams not cut.
+        whole: the robot's configuration nominally, its beams not cut.
         cut: its frames and those of its beams' pieces.
         linear: the linear model's solution, where the steps began.
         expansion: of the problem here, with the multipliers of the scaled closures.
@@ -311,7 +311,7 @@ def solve_exact(
     """Close a manipulator at least energy with finite motions, from the linear model.
 
     Args:
-        posture: where the robot stands; its errors, clearances, links and joint
+        posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.
         load: (6,) [N m, N] on the platform at ``point``, base axes.  The force is
             dead; the moment's work is its product with the rotation vector.

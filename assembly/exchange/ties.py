@@ -1,4 +1,4 @@
-"""Elements of unknown type, and whether they may tie bodies to one another."""
+"""Elements of unknown type, and whether they may tie bodies to each other."""
 
 from collections.abc import Container, Mapping
 

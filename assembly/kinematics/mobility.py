@@ -32,7 +32,7 @@ def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
     """Return the mobility and overconstraint at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         tolerance: relative size below which a singular value counts as zero.
 
     Returns:

@@ -371,7 +371,7 @@ def all_loads(
     """Return the loads on all small screws, from the arguments of ``solve_assembly``.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
         gravity: (3,) [m/s^2] base axes.

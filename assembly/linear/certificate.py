@@ -232,6 +232,6 @@ def _extents(reachable: ReachableSet) -> NDArray:
         try:
             height = reachable.support(d).height
             extents.append(height - float(d @ reachable.centre))
-        except SolverFailed:  # nothing is known in that direction
+        except SolverFailed:  # no bound is known in that direction
             extents.append(np.inf)
     return np.maximum(np.reshape(extents, (2, 6)).max(axis=0), 0.0)

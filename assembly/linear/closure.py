@@ -202,7 +202,7 @@ class Linearisation:
     """The assembly constraints at a posture.
 
     Attributes:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         size: [m] reference length.
     """
 
@@ -240,7 +240,7 @@ def linearise(posture: Posture) -> Linearisation:
     """Return the assembly constraints (19)-(20) at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
 
     Returns:
         The constraint matrix and the map to the platform screw.

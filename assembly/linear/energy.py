@@ -90,7 +90,7 @@ def solve_assembly(
     """Close a manipulator at least energy, problem (22), under optional loads.
 
     Args:
-        posture: where the robot stands; its errors, clearances, links and joint
+        posture: the robot's configuration; its errors, clearances, links and joint
             springs are the robot's.  Or k postures of one robot.
         load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
             energy minus its work is then what is minimised.

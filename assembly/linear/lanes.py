@@ -84,8 +84,8 @@ def bounds_side_by_side(
             (k, nu) clearances in the cones of ``held``, (k,) [J] energies, and those
             with every clearance at zero; and (cones,) the cone of ``held`` of each of
             ``structure``.
-        asked: (3,) [m] from the platform's origin to the point whose error is meant;
-            (2,) [rad, m] asked of upper minus lower bounds.
+        asked: (3,) [m] from the platform's origin to the point whose error is bounded;
+            (2,) [rad, m] required difference of upper and lower bounds.
         out: to fill: (k, 2) [rad] lower and upper bounds of the rotation and [m] of the
             translation, (k, 6) [rad, m] screws that attain the lower of each, (k,)
             support functions computed, and (k,) outcomes, where what is not solved

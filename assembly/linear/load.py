@@ -181,7 +181,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
     """Weight of all links with a density and of all bodies with a mass.
 
     Args:
-        posture: where the robot stands, of n frames; or many postures, as above.
+        posture: the robot's configuration, of n frames; or many postures, as above.
         gravity: (..., 3) [m/s^2] base axes, such as (0, 0, -9.81).
 
     Returns:
@@ -248,7 +248,7 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
     """The part of :func:`weights` that acts along the links and counts at their tips.
 
     Args:
-        posture: where the robot stands, of n frames; or many postures, as above.
+        posture: the robot's configuration, of n frames; or many postures, as above.
         gravity: (..., 3) [m/s^2] base axes.
 
     Returns:
@@ -334,7 +334,7 @@ def with_distributed(
 
     Args:
         loads: with :func:`weights` among them.
-        posture: where the robot stands, one or many.
+        posture: the robot's configuration, one or many.
         gravity: (..., 3) [m/s^2] base axes.
 
     Returns:

@@ -24,9 +24,9 @@ class Asked:
     Attributes:
         assumption: see the head of :mod:`assembly.linear.pose_error`.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] asked of upper minus lower bound.
+        tolerance_rotation: [rad] required difference of upper and lower bound.
         tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant.
+        offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
 

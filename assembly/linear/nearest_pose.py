@@ -51,8 +51,8 @@ def nearest_pose(
 
     Args:
         assembly: of least energy.
-        offset: (3,) [m] from the platform's origin to the point whose deviation counts,
-            base axes.
+        offset: (3,) [m] from the platform's origin to the point whose deviation is
+            minimised, base axes.
         method: of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:

@@ -145,9 +145,9 @@ def bound_pose_error(
         assembly: of least energy, one or many, without a load for ``budget``.
         assumption: see the head of this module.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] asked of upper minus lower bound.
+        tolerance_rotation: [rad] required difference of upper and lower bound.
         tolerance_translation: [m] likewise.
-        offset: (3,) [m] from the platform's origin to the point whose error is meant,
+        offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
         method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone: tenths of
             a second.

@@ -129,7 +129,7 @@ def zone_margin(
     """Return the factor on all clearances at which a rigid manipulator just assembles.
 
     Args:
-        posture: where the robot stands; or many postures of one robot.
+        posture: the robot's configuration; or many postures of one robot.
         compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness, see above.
         errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
             a set for each of k postures, or k sets at one.

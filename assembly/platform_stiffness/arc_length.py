@@ -146,7 +146,7 @@ def follow_load(
     """Follow the path of equilibria until the load leaves a range.
 
     Args:
-        posture: where the robot stands; its errors count, its clearances are held.
+        posture: the robot's configuration; its errors count, its clearances are held.
         component: of the load that changes, 0 to 5.
         first: [N m or N] load at which the path begins.
         last: [N m or N] load beyond which it ends, on its own side.

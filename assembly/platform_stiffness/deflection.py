@@ -70,7 +70,7 @@ class DeflectionCurve:
     """How the platform follows one component of the load.
 
     Attributes:
-        posture: where the robot stands nominally.
+        posture: the robot's configuration nominally.
         component: of the wrench and of the screw, 0 to 5.
         loads: (k,) [N m or N] that component, in the order in which it was followed.
         screws: (k, 6) [rad, m] of the platform at its origin, base axes.
@@ -128,7 +128,7 @@ def deflection_curve(
     """Follow the platform while one component of the load changes.
 
     Args:
-        posture: where the robot stands; its errors and clearances count.
+        posture: the robot's configuration; its errors and clearances count.
         component: which of ``[mx my mz fx fy fz]``, 0 to 5.
         loads: [N m or N] its values, in the order in which they act.
         load: (6,) [N m, N] the rest of the load, at the platform's origin, base axes.

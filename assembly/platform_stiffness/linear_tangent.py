@@ -45,7 +45,7 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
     """Return the classical virtual-joint model: every clearance is held at zero.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
 
     Returns:
         The stiffness at the platform's origin.

@@ -29,7 +29,7 @@ class Stiffnesses:
     what has the same shape everywhere: compliances, eigen-stiffnesses, shares.
 
     Attributes:
-        posture: where the robot stands nominally, k postures.
+        posture: the robot's configuration nominally, k postures.
         state: as of :class:`PlatformStiffness`.
         point: (k, 3) [m] where screws and wrenches are read, base axes.
         length: [m] characteristic length.

@@ -89,7 +89,7 @@ class PlatformStiffness:
     """How stiff the platform is at one point; see the head of this module.
 
     Attributes:
-        posture: where the robot stands nominally.
+        posture: the robot's configuration nominally.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``.
         point: (3,) [m] where screws and wrenches are read, base axes.
         length: [m] characteristic length.

@@ -57,7 +57,7 @@ def platform_stiffness(
     """How stiff the platform is: the tangent of its small motion under a small wrench.
 
     Args:
-        posture: where the robot stands; or many postures of one robot.
+        posture: the robot's configuration; or many postures of one robot.
         state: ``"nominal"``, the classical virtual-joint model of the nominal
             robot, every clearance held at zero; ``"contact"``, the tangent of
             problem (22) with the robot's errors, clearances and loads; ``"exact"``, the

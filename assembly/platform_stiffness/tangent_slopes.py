@@ -91,7 +91,7 @@ def compliance_slope(
     """Return the derivative of the platform's compliance by a number of its robot.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         ahead: where it stands with the number a step larger.
         back: a step smaller.
         step: of the number.

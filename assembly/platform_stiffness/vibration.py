@@ -46,7 +46,7 @@ class NaturalModes:
     """The lowest modes, slowest first.
 
     Attributes:
-        posture: where the robot stands nominally.
+        posture: the robot's configuration nominally.
         frequencies: (k,) [Hz]; 0 of motions that nothing resists, NaN if unstable.
         platform_screws: (6, k) [rad, m] platform's motion, of modal mass 1 kg.
         shares: for each mode the share of every part in its elastic energy, largest
@@ -78,7 +78,7 @@ def natural_modes(
     """Return the natural frequencies and modes of a robot, its drives held.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         count: how many modes at most.
         load: (6,) [N m, N] on the platform, in the state ``"exact"`` alone; it has no
             mass.

@@ -108,7 +108,7 @@ def farthest(
         start: (nv,) within the unit cones.
         starts: (cones + 1,) first column of each cone, and nv.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] asked of upper minus lower bound.
+        tolerance: [rad or m] required difference of upper and lower bound.
         support: of a direction (3,) of that half, its gradient X^T d less what the
             rows' multipliers take; asked where the compiled method does not come close
             enough.

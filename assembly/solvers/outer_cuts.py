@@ -28,7 +28,7 @@ def farthest(
     Args:
         centre: (6,) [rad, m] a screw of the body.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] asked of upper minus lower bound.
+        tolerance: [rad or m] required difference of upper and lower bound.
         support: of a direction (3,) of that half.
 
     Returns:

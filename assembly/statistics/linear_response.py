@@ -42,7 +42,7 @@ class LinearResponse:
     ``screws`` and ``motions`` take the columns [clearances | errors].
 
     Attributes:
-        posture: where the robot stands; its own errors do not matter.
+        posture: the robot's configuration; its own errors do not matter.
         joints: what may move.
         starts: (cones + 1,) first clearance of each cone, and nu.
         G: (r, nu) sensitivity of the scaled strains to the clearances.
@@ -134,7 +134,7 @@ def linear_response(
     """Eliminate free motions and springs at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 

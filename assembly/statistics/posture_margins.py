@@ -27,7 +27,7 @@ class PostureMargins:
     """A posture prepared for the margins of any errors, by :func:`prepare_margins`.
 
     Attributes:
-        posture: where the robot stands; its own errors do not matter.
+        posture: the robot's configuration; its own errors do not matter.
         starts: (cones + 1,) first clearance of each cone, and nu.
         B: (p, nu) orthonormal rows that the clearances must satisfy.
         K: (p, 6n) and their right side by the errors: B u = K e.
@@ -84,7 +84,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
     """Eliminate free motions at a posture, for the margins of any errors.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:

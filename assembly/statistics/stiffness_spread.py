@@ -35,7 +35,7 @@ def draw_stiffnesses(
     """Return the stiffness along every axis, the others free, of each draw.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         errors: (k, n, 6) [rad, m] of its frames.
         state: ``"contact"`` or ``"exact"``.
         load: (6,) [N m, N] on the platform at its origin, base axes.

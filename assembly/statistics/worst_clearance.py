@@ -29,7 +29,7 @@ from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
-PRECISION = (1e-6, 1e-6)  # [rad, m] asked of upper minus lower bounds
+PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
 _SUPPORT_PRECISION = 1e-12  # [rad or m] of a support whose multipliers are slopes
 
 
@@ -40,7 +40,8 @@ def bound_worst_errors(
 
     Args:
         draws: k of them, at one posture.
-        precision: [rad, m] asked of upper minus lower bounds; inf leaves a part out.
+        precision: [rad, m] required difference of upper and lower bounds; inf leaves a
+            part out.
 
     Returns:
         (k, 2, 2) lower and upper bounds of the rotation [rad] and the translation [m],

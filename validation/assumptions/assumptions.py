@@ -43,7 +43,7 @@ def assumption_costs(
     Closures are compared without clearances, where the pose is unique.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
         solids: whether beams are meshed, some seconds a shape.

@@ -154,7 +154,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     and of free joints; a solid's energy is that of both its ends' motions in space.
 
     Args:
-        posture: where the robot stands; clearances are held at zero.
+        posture: the robot's configuration; clearances are held at zero.
         solids: by frame; other links are springs with their K_E.
 
     Returns:

@@ -206,7 +206,7 @@ def crosscheck(
     """Solve a robot with both models at several scales of its imperfections.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         scales: at least two different factors on errors, clearances and load, > 0;
             smaller ones are added where these leave a check undecided.
         load: (6,) [N m, N] on the platform at its origin, base axes.

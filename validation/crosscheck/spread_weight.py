@@ -46,7 +46,7 @@ def heavy_beams(posture: Posture, gravity: ArrayLike) -> Iterator[HeavyBeam]:
     """All beams of a robot that have a density.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
 
     Yields:
@@ -82,7 +82,7 @@ def energy_between_ends(
     q^2 L^3 / 24 EA for that along the beam.  The ends' motion does no work on it.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
         pieces: number of equal ones at whose ends the weight acts, with the moments of
             a clamped piece: their own energy is left out, the share 1 / pieces^4 of

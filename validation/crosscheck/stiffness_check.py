@@ -235,7 +235,7 @@ def check_stiffness(
     """Compare the tangent of the exact equilibrium with load steps in Exudyn.
 
     Args:
-        posture: where the robot stands; its errors count.
+        posture: the robot's configuration; its errors count.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         links: ``"spring"``, ``"beam"`` or ``"fem"``.
         gravity: (3,) [m/s^2] base axes.

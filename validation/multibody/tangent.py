@@ -73,7 +73,7 @@ def simulated_tangent(
     """Return the platform's compliance at the equilibrium of errors, load and weight.
 
     Args:
-        posture: where the robot stands; its errors count.
+        posture: the robot's configuration; its errors count.
         model: of its links; its clearances count if they do in the model, in contacts
             of 1e12 N/m that are smoothed, and then there are no load steps.
         load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and

@@ -19,7 +19,7 @@ def compare_printed(
     """Solve the printed problems, and compare energy and margins with ours.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         assembly: ours, without loads.
         zone: our ``margin`` and ``margin_free``.
 

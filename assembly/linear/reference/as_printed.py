@@ -35,7 +35,7 @@ def energy_as_printed(
     """Return the minimum assembly energy as printed, (22).
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes; energy minus its
             work is then minimised.
 
@@ -70,7 +70,7 @@ def margin_as_printed(posture: Posture, compliant: Compliant = "rigid") -> float
     """Return margin of problem (21): the least factor on the clearances that assembles.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         compliant: ``"rigid"`` as printed, or ``"free"``.
 
     Returns:

@@ -42,7 +42,7 @@ def least_energy(
     Bounds of passive joints' own motion count where they matter.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
         compliant: see :func:`assembly.linear.closure.virtual_joints`.

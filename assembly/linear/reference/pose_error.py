@@ -186,7 +186,7 @@ class ReachableSet:
 
         Args:
             part: 0 for the rotation, 3 for the translation.
-            tolerance: [rad or m] asked of upper minus lower bound.
+            tolerance: [rad or m] required difference of upper and lower bound.
             method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone.
 
         Returns:

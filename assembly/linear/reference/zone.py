@@ -26,7 +26,7 @@ def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
     """Factor on all clearances at which a rigid manipulator just assembles, (21).
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
