@@ -42,17 +42,17 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """All that may move in a robot beside its drives, as columns of small screws.
+    """Columns of small screws that may move in a robot, except its drives.
 
     Attributes:
         robot: of n frames.
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
-        group: (nu,) which cone a column belongs to: two columns for a disc.
-        scaled: (nu,) bool, whether the margin's factor scales the cone.
+        group: (nu,) cone of each column: two columns for a disc.
+        scaled: (nu,) bool, whether the margin's factor scales the column's cone.
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: frames whose bound of the passive joint's own motion is kept.
+        bounded_motion: frames whose passive joint's own motion keeps its bound.
     """
 
     robot: Robot
@@ -71,14 +71,15 @@ def virtual_joints(
     robot: Robot, compliant: Compliant = "elastic",
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Return the columns of all that may move.
+    """Return the columns of all screws that may move.
 
     Args:
         robot: of n frames.
-        compliant: what passive joints with stiffness do: ``"elastic"``, all springs
-            act; ``"hinged"``, all but the one about (or along) the joint's own z, which
-            is free; ``"rigid"`` and ``"free"``, no spring acts anywhere, and the own
-            z is locked or free: the two margins of problem (21).
+        compliant: behaviour of passive joints with stiffness.  ``"elastic"``: all
+            springs act.  ``"hinged"``: all springs act except the one about (or along)
+            the joint's own z, which is free.  ``"rigid"`` and ``"free"``: no spring
+            acts anywhere, and the own z is locked or free; these are the two margins of
+            problem (21).
         bounded_motion: keep the bounds of passive joints' own motion, of all or of
             these frames.  They are large and almost never active, so they are left
             out first and checked afterwards.
@@ -100,7 +101,7 @@ class _JointsKey:
 
 
 def _parts(robot: Robot) -> tuple:
-    """All that virtual joints depend on; links by identity, the robot keeps them."""
+    """Return what virtual joints depend on; links by identity, the robot keeps them."""
     return tuple(
         (
             f.parent, f.joint, f.actuated, f.clearance, id(f.link),
@@ -115,7 +116,7 @@ def _parts(robot: Robot) -> tuple:
 def _virtual_joints(
     key: _JointsKey, compliant: Compliant, bounded_motion: frozenset[int]
 ) -> VirtualJoints:
-    """Return the columns, once for all robots of the same parts."""
+    """Return the columns, cached for all robots of the same parts."""
     robot = key.robot
     bounds = clearance_bounds(robot, compliant)
     scaled = scales_with_margin(robot)
@@ -158,7 +159,7 @@ def _elastic(links: NDArray, joints: NDArray, count: int) -> tuple[NDArray, NDAr
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return columns of the bounded clearances, their group and whether they scale."""
+    """Return the columns of bounded clearances, their cones and whether they scale."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -224,7 +225,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(6, 6 n) screws to the platform screw, eq. (8), not scaled."""
+        """(6, 6 n) map of the frames' screws to the platform screw, (8), not scaled."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)
@@ -253,13 +254,13 @@ def linearise(posture: Posture) -> Linearisation:
 
 @lru_cache(maxsize=64)
 def checked_size(robot: Robot) -> float:
-    """[m] reference length of a robot whose errors are small enough to compute with.
+    """Return the reference length [m] of a robot, after a check of its errors.
 
     Args:
         robot: any.
 
     Returns:
-        :func:`assembly.kinematics.nominal.size_of` it.
+        The result of :func:`assembly.kinematics.nominal.size_of`.
 
     Raises:
         BadInput: a geometric error is beyond 1e6 rad or m.

@@ -23,14 +23,14 @@ from assembly.solvers.conic import least_factor
 
 
 def least_margin(posture: Posture, compliant: Compliant) -> tuple[float, float]:
-    """Factor on all clearances at which a rigid manipulator just assembles, (21).
+    """Return the factor on all clearances at which a rigid manipulator assembles, (21).
 
     Args:
         posture: the robot's configuration.
         compliant: ``"rigid"`` or ``"free"``, see :mod:`assembly.linear.zone`.
 
     Returns:
-        The margin and its certified lower bound; inf for both if no factor does.
+        The margin and its certified lower bound; inf for both if no factor suffices.
 
     Raises:
         SolverFailed: the cone solver gave up.
@@ -56,7 +56,7 @@ def margin_with(
         joints: what may move, without springs.
 
     Returns:
-        The margin and its certified lower bound, inf if no factor does; the (n, 6)
+        The margin and its certified lower bound, inf if no factor suffices; the (n, 6)
         [rad, m] clearance screws that attain it.
 
     Raises:
@@ -72,14 +72,14 @@ def margin_with(
 
 
 def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
-    """Margin of a reduced problem, its bound, and the clearances that attain it."""
+    """Return the margin of a reduced problem, its bound, and its clearances."""
     joints = reduced.joints
     u = np.zeros(joints.cones.shape[1])
     if reduced.inconsistent:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # orthonormal rows, whatever the units of the closures
+    # orthonormal rows make the result independent of the closures' units
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
