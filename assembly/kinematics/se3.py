@@ -29,7 +29,7 @@ _SERIES = 9  # terms of the Stumpff series: 1e-17 at angle 1
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip
-_ROUNDING = 1e-16  # [-] below which the series of the second derivative ends
+_ROUNDING = 1e-16  # [-] size of terms at which the series of the second derivative ends
 
 
 def exponential(screw: ArrayLike) -> NDArray:
@@ -67,13 +67,13 @@ def logarithm(T: ArrayLike) -> NDArray:
 
 
 def inverse(T: NDArray) -> NDArray:
-    """(..., 4, 4) the inverse motions."""
+    """Return the (..., 4, 4) inverse motions."""
     R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
     return transform(-(R_inverse @ T[..., :3, 3, None])[..., 0], R_inverse)
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
-    """(..., 3, 3) J of SO(3): small turn in fixed axes per change of the vector."""
+    """Return the (..., 3, 3) J of SO(3): small rotation per change of the vector."""
     W = skew(turn)
     _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
     return np.eye(3) + c2 * W + c3 * (W @ W)
@@ -137,7 +137,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """How many orders of brackets count, beside the first: turns make a power each."""
+    """Return the order of brackets that counts: each order is a power of the angle."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:
@@ -156,7 +156,7 @@ def bracket(screw: ArrayLike) -> NDArray:
 
 
 def bracket_form(wrench: ArrayLike) -> NDArray:
-    """(..., 6, 6) antisymmetric Omega with ``a @ Omega @ b = wrench @ [a, b]``."""
+    """Return (..., 6, 6) antisymmetric Omega: ``a @ Omega @ b = wrench @ [a, b]``."""
     w = np.asarray(wrench, dtype=float)
     form = np.zeros((*w.shape[:-1], 6, 6))
     form[..., :3, :3] = -skew(w[..., :3])

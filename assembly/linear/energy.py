@@ -43,8 +43,8 @@ from assembly.solvers.method import Method, check_method
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcomes of assembly/kernels/linear/energies.h: from _LEFT on they are no answer; those
-# in _AT_BOUNDS may be due to a bound of a passive joint's own motion that was left out
+# outcomes of assembly/kernels/linear/energies.h: from _LEFT on they are no answer, and
+# _AT_BOUNDS may come from a bound of a passive joint's own motion that was left out
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
