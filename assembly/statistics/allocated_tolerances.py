@@ -1,4 +1,4 @@
-"""An allocation: tolerances, their cost, their proof; as plain values and data set."""
+"""An allocation: tolerances, their cost and their proof, as values and as data set."""
 
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -33,19 +33,19 @@ class Allocation:
         plan: costs and limits.
         tolerances: (G,) [rad or m].
         price: their cost.
-        uniformly_scaled: (G,) [rad or m] those with the proportions of the convex
+        uniformly_scaled: (G,) [rad or m] tolerances with the proportions of the convex
             programme, scaled uniformly to meet all limits.
-        price_uniformly_scaled: their cost; no less than ``price``.
+        price_uniformly_scaled: their cost, at least ``price``.
         price_bound: lower bound of the cost of tolerances that always meet the convex
             limits; NaN for a yield below 1, or where a limit is not convex.
         cuts: planes in the convex programme.
         worst: by limit and for yield 1: the worst corner found and the proven upper
-            bound, over all postures; NaN where nothing is proven.
+            bound, over all postures; NaN if not proven.
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
-            meet the limits too; NaN where nothing is proven.
+            meet the limits too; NaN if not proven.
         verification: by fresh draws: yields with their intervals.
-        perfect_parts: by limit on a pose error, what clearances alone take of it [rad
-            or m], and at which posture.
+        perfect_parts: by limit on a pose error, the pose error [rad or m] due to
+            clearances alone, and its posture.
     """
 
     plan: Plan
@@ -110,11 +110,11 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Share of each class in what looser tolerances would save.
+    """Return the share of each class in the saving by looser tolerances.
 
-    At least cost the saving for a relative change of a tolerance is the multiplier of
-    the limit times the change of the limited quantity: cost / tolerance, or the cost if
-    the law is logarithmic.  It has no unit, so angles and lengths compare.
+    At least cost, the saving for a relative change of a tolerance is the multiplier of
+    the limit times the change of the limited quantity.  This is cost / tolerance, or
+    the cost if the law is logarithmic.  It has no unit, so angles and lengths compare.
 
     Args:
         allocation: the tolerances.
@@ -133,9 +133,9 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """What clearances alone take of a limit, and what the errors would be without."""
+    """Return the part of a limit due to clearances, and the cost without it."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # pose errors by errors and by clearances add up, nearly; tolerances scale with them
+    # pose errors by errors and by clearances nearly add up; tolerances scale with them
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -167,7 +167,7 @@ def _unit(allocation: Allocation, group: int) -> str:
 
 
 def allocation_text(results: dict[str, Any]) -> str:
-    """Return an allocation for people."""
+    """Return an allocation as text."""
     lines = []
     for one in results["tolerances"]:
         scale, unit = _SHOWN[one["unit"]]
@@ -205,7 +205,7 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """What clearances alone take of a limit."""
+    """Return the text on the part of a limit due to clearances alone."""
     scale, unit = _SHOWN[one["unit"]]
     reached, limit = scale * one["reached"], scale * one["limit"]
     return (
@@ -217,7 +217,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Return the number of looks, and the confidence of each and of all."""
+    """Return the number of verifications, and the confidence of each and of all."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (

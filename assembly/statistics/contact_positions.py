@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # of what a position attains along its direction
+_PRECISION = 1e-9  # relative precision of a position's component along its direction
 
 
 def move_to_contact(
@@ -17,7 +17,7 @@ def move_to_contact(
     Args:
         rows: (p, nu) orthonormal, zero where not ``free``.
         starts: (cones + 1,) first column of each cone, and nu.
-        free: (nu,) bool, which may move; whole cones.
+        free: (nu,) bool, True for clearances that may move; whole cones.
         positions: (k, nu) points of the set.
         directions: (k, nu) linear objectives to be maximised.
 

@@ -2,11 +2,10 @@
 
 Two requirements are convex in the tolerances t:
 
-- *always* (yield 1): margin or energy at every corner of the tolerances, for
-  ``m(t s)`` is convex in t for every choice s of signs, and proportional to t if it is
-  the margin;
+- *always* (yield 1): margin or energy at every corner of the tolerances.  For every
+  choice s of signs ``m(t s)`` is convex in t; for the margin it is proportional to t.
 - *with a yield*: the mean of the worst (1 - yield) of many fixed draws s (the
-  conditional value at risk), which is more than the yield asks.
+  conditional value at risk), which is stricter than the yield.
 
 Each iteration solves the programme, finds the largest violation of the requirement, and
 adds the plane of its slopes.  Every plane holds for all tolerances that meet the
@@ -26,7 +25,7 @@ from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # of a limit: largest violation at the end
+_TOLERANCE = 1e-3  # of a limit: largest violation accepted at the end
 _MOST_CUTS = 200
 
 
@@ -76,12 +75,12 @@ def cheapest_within(
         (G,) [rad or m].
 
     Raises:
-        BadInput: there are none.
+        BadInput: no tolerances satisfy the planes.
     """
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled: each alone would reach its plane at 1
+    # scaled so that each tolerance alone reaches its plane at 1
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -101,7 +100,7 @@ def cheapest_within(
 
 
 def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
-    """Planes ``a.t <= 1`` that cut off the tolerances t."""
+    """Yield planes ``a.t <= 1`` that cut off the tolerances t."""
     plan = requirement.plan
     spread = plan.spread(t)
     for key, prepared in requirement.convex.items():

@@ -121,7 +121,7 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale <= 1e-12 * np.abs(x).max():  # all equal up to rounding
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # a long tail must not widen the bins: the mode is not there
+    # a long tail must not widen the bins: the mode is elsewhere
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -137,8 +137,8 @@ def most_probable(
 
 
 def _modes(counts: NDArray, width: float) -> NDArray:
-    """Bins where smoothed histograms, as rows, are largest, refined by parabolas."""
-    # a cosine transform goes on beyond both ends as in a mirror
+    """Return the modes of smoothed histograms, one a row, refined by parabolas."""
+    # a cosine transform continues the density beyond both ends by reflection
     bins = counts.shape[1]
     decay = np.exp(-0.5 * (np.pi * np.arange(bins) / bins * width) ** 2)
     density = fft.idct(fft.dct(counts.astype(float), axis=1) * decay, axis=1)

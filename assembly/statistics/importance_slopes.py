@@ -1,10 +1,10 @@
 """Exact slopes of the platform's screw with the errors, by groups of errors.
 
-A quotient of sampled deviations is no derivative: its noise is that of the sample.
-Where the same clearances are active the solution of (22) follows the errors linearly,
-and its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's
-gain is their root mean square, over the group's errors by their variance and over some
-draws: where the answer is linear each draw has the same.
+A quotient of sampled deviations is no derivative, because it has the sample's noise.
+Where the same clearances are active the solution of (22) is linear in the errors, and
+its slopes are known exactly (:mod:`assembly.statistics.sensitivity`).  A group's gain
+is their root mean square: over the group's errors, weighted by variance, and over some
+draws.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from assembly.statistics.importance import SaltelliDesign
 from assembly.statistics.linear_response import LinearResponse
 from assembly.statistics.sensitivity import solution_slopes
 
-DRAWS = 32  # whose slopes are averaged
+DRAWS = 32  # number of draws whose slopes are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
@@ -25,7 +25,7 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
 
     Args:
         experiment: distributions and posture.
-        design: whose first draws are taken, and whose groups.
+        design: its first draws and its groups are used.
 
     Returns:
         (2, d) rotation [rad] and translation [m] for each rad or m; NaN for a group of

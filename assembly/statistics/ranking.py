@@ -20,8 +20,8 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
         shares: by name (value, lower, upper).
 
     Returns:
-        By name: 1 + how many are surely larger, and the number of all less how many are
-        surely smaller; none for a share that is not known.
+        By name: 1 + the number of surely larger shares, and the number of all shares
+        less that of surely smaller ones; none for an unknown share.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
@@ -48,15 +48,15 @@ def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Return the names of contributors, those of all legs as one.
+    """Return the names of contributors, with those of all legs joined to one.
 
     Args:
         names: such as ``leg1.hinge.RX``, the contributors.
-        among: names of all there are.
+        among: all names.
 
     Returns:
-        ``hinge.RX of all legs`` where each leg's is among the names, in the order of
-        the names; the others as they are.
+        ``hinge.RX of all legs`` if each leg's is among the names, in the order of the
+        names; other names unchanged.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}

@@ -17,7 +17,7 @@ from assembly.statistics.sensitivity import solution_slopes
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
 _STEP = 1e-6  # of a wrench, for differences of the stress formula
-_PRECISION = 1e-9  # [rad or m] asked of the largest pose errors
+_PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
 
@@ -32,7 +32,7 @@ def respond(
         prepared: a posture prepared for margins, or for energies and all others.
         sources: m of them.
         values: (k, m) [rad or m].
-        key: which quantity, of a posture prepared for energies: energy [J], force [N],
+        key: the quantity, for a posture prepared for energies: energy [J], force [N],
             moment [N m], stress [Pa], rotation [rad] or translation [m].
         clearance_model: for a pose error, one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.  With the
@@ -42,7 +42,7 @@ def respond(
             :class:`assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) and (k, m); NaN where there is no solution.
+        (k,) and (k, m); NaN without a solution.
     """
     errors = sources.errors(values)
     if isinstance(prepared, PostureMargins):
@@ -54,7 +54,7 @@ def respond(
         return draws.energy, -draws.wrenches[:, sources.frame, sources.component]
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # without clearances in unit cones their active bounds are not known
+    # without clearances in unit cones their active bounds are unknown
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -77,7 +77,7 @@ def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Size of a pose error, and its slopes with platform screw and clearances."""
+    """Return a pose error, and its slopes with platform screw and clearances."""
     part, (clearance_model, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance_model == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
