@@ -11,14 +11,14 @@ from assembly.linear.energy import Assembly
 from assembly.measurement.conditions import Conditions, ContactLaw
 from assembly.model.links import in_series, own_screw
 
-ITERATIONS = 100  # at most
-CONVERGED = 1e-11  # relative change of a contact's deflection
+ITERATIONS = 100  # largest number of iterations
+CONVERGED = 1e-11  # relative change of a contact's deflection at convergence
 
 
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return posture with linear springs of the laws' secant compliance in series."""
+    """Return the posture with springs of the laws' secant compliance in series."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -33,7 +33,7 @@ def softened(
 def secants(
     assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
 ) -> NDArray:
-    """[rad/(N m), m/N] deflection over load of every law at the load it carries."""
+    """Return the secant compliance [rad/(N m), m/N] of every law at its load."""
     robot = assembly.posture.robot
     compliances = []
     for law in laws:
@@ -44,7 +44,7 @@ def secants(
 
 
 def _deflection(law: ContactLaw, load: float) -> float:
-    """Return the [rad or m] under a load >= 0."""
+    """Return the deflection [rad or m] under a load >= 0."""
     return float((load / law.coefficient) ** (1 / law.exponent))
 
 

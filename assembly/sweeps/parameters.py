@@ -1,10 +1,10 @@
 """Design parameters: any number of a robot file, addressed by its path.
 
-A path is the frame's name and the keys that lead to the number, such as
+A path is the frame's name and the keys of the number, such as
 ``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame's name
 without its leg means that frame in every leg.  Three numbers in brackets are x, y, z;
-six are rx .. tz, and so are the rows of six by six (``stiffness.rx.ty`` sets both
-places of a symmetric matrix).
+six are rx .. tz, and so are the rows and columns of six by six (``stiffness.rx.ty``
+sets both entries of a symmetric matrix).
 """
 
 import copy
@@ -20,7 +20,7 @@ from assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
-_ABSENT: dict[str, Any] = {  # values of keys that a frame leaves out
+_ABSENT: dict[str, Any] = {  # values of keys that a frame may omit
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
@@ -43,7 +43,7 @@ class Design:
 
     Attributes:
         content: the root table, plain values.
-        file: name of the file, for messages; paths in the table lead from its folder.
+        file: name of the file, for messages; paths in the table start in its folder.
         name: of the robot if the table has none.
     """
 
@@ -153,7 +153,7 @@ def load_design(name: str | Path) -> Design:
     from assembly.exchange.robot_files import OTHERS, load_robot
     from assembly.robots import BUILT_IN
 
-    # refuses a wrong file before numbers are changed
+    # refuses an invalid file before numbers are changed
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or Path(name).suffix.lower() in OTHERS:
         return design_of(robot)
@@ -161,7 +161,7 @@ def load_design(name: str | Path) -> Design:
 
 
 def unit_of(path: str) -> str:
-    """Return unit of the number a path leads to; ``"SI"`` where it depends on more."""
+    """Return the unit of the number at a path; ``"SI"`` if it depends on other keys."""
     *_, above, key = path.split(".")
     if above == "dh":
         return _DH_UNITS[key]
@@ -171,7 +171,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Path, value, setter of every number; absent ones that mean zero are put there."""
+    """Yield path, value and setter of every number; absent zeros are added."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -182,7 +182,7 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
 
 
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Numbers of a table."""
+    """Yield the numbers of a table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):
@@ -211,7 +211,7 @@ def _setter(place: Any, key: Any) -> Setter:
 
 
 def _setter_of_two(rows: list[list[float]], i: int, j: int) -> Setter:
-    """Return the same for both places of a symmetric matrix."""
+    """Return the function that writes both entries of a symmetric matrix."""
 
     def write(number: float) -> None:
         rows[i][j] = rows[j][i] = number

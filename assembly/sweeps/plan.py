@@ -28,7 +28,7 @@ class Sweep:
         values: of each varied parameter, in the order of ``question.varied``.
         draws: number of draws of errors; 0 for the robot's own.
         command: of the command line, for provenance; empty without one.
-        block_size: points solved and journalled together.
+        block_size: number of points solved and journalled together.
     """
 
     question: Question
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all that is not named above
+            # all values that are not named above
             "question_sha256": question_hash(question),
         }

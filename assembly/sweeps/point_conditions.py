@@ -1,8 +1,8 @@
 """Conditions at the points of a sweep: load, gravity and the effects of the robot.
 
-Points are solved together by compiled functions, under loads and with effects that
-change errors, springs or clearances.  Where places give by laws of their own each is
-solved by itself, which takes some milliseconds.
+Compiled functions solve points together, under loads and with effects that change
+errors, springs or clearances.  Points with nonlinear compliances are solved one by one,
+in some milliseconds each.
 """
 
 from dataclasses import replace
@@ -60,7 +60,7 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Whether there are loads, weights, or compliances of effects and contacts."""
+    """Return whether there are loads, weights, or compliant effects or contacts."""
     loaded = conditions.load.any() or conditions.gravity.any()
     return bool(loaded or conditions.laws or conditions.yields)
 
@@ -73,7 +73,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
     Returns:
         Assemblies, screws and certificates in the order given; the (k, n, 6) [N m, N]
-        wrenches of the links' springs; and (k, n, 6) of these the part that is the
+        wrenches of the links' springs; and (k, n, 6) the part of them that is the
         links' own weight.
     """
     c = conditions
@@ -91,7 +91,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """Return a point by itself, or why there is no solution."""
+    """Return one point solved separately, or the exception raised."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

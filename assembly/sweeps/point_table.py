@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# whose axes are those of the points: of sweeps and draws, and of tolerances
+# variables whose axes are those of the points: of sweeps and draws, and of tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
@@ -70,7 +70,7 @@ def write_point_table(
     Args:
         data: as for :func:`point_table`.
         path: of the file.
-        rows: likewise.
+        rows: as for :func:`point_table`.
 
     Raises:
         BadInput: as :func:`point_table`; or the file cannot be written.
@@ -91,5 +91,5 @@ def write_point_table(
 
 
 def _head(name: str, unit: str) -> str:
-    """Return the head of a column."""
+    """Return the heading of a column."""
     return f"{name} [{unit}]" if unit else name

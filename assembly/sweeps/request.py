@@ -1,4 +1,4 @@
-"""A sweep from the options of its command, checked first; and its summary."""
+"""A sweep from the options of its command, checked before solving; its summary."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from assembly.model.error_distributions import ErrorSources
     from assembly.sweeps.netcdf import Stored, StoredDataset
 
-_MODES = 100  # natural frequencies at most
+_MODES = 100  # largest number of natural frequencies
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
         options: of the command.
 
     Returns:
-        The sweep, everything in it checked.
+        The sweep, with all its options checked.
 
     Raises:
         BadInput: an option, a file it names or the robot breaks a rule.
@@ -168,7 +168,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
 def _sources(
     options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
 ) -> "ErrorSources | None":
-    """Return how the errors drawn are distributed; None if none are."""
+    """Return the distributions of the errors drawn; None if none are drawn."""
     if (options.errors is None) != (options.draws is None):
         raise BadInput("sweep: --errors and --draws go together; found one of them")
     if options.errors is None:
@@ -210,7 +210,7 @@ def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Target
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Values by path; the least and the largest must be valid in a robot file."""
+    """Return values by path; least and largest must be valid in a robot file."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -235,7 +235,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """Return the command of the same sweep, options at their default left out."""
+    """Return the command of the same sweep, without options at their default."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -251,12 +251,12 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default[key]:
             words += [name, str(value)]
-    # names of files may hold bytes that are not UTF-8
+    # names of files may contain bytes that are not UTF-8
     return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """As on the command line, zeros left out; None if nothing is left."""
+    """Return values as on the command line, without zeros; None if all are zero."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
@@ -300,7 +300,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """Return same for people: statuses, and the first reason of each that is not ok."""
+    """Return it as text: statuses, and the first reason of each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:
