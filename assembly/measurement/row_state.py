@@ -208,7 +208,7 @@ class RowState:
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) poses before and after bodies' deformation, after joints', final."""
+        """(R, n, 4, 4) poses: before and after bodies deform, after joints, final."""
         rows = self.rows
         partial = [rows.bodies]
         for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
