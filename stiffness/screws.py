@@ -1,6 +1,6 @@
 """Screws and wrenches: small motions and loads, read at a point in some axes.
 
-One convention, written once:
+All packages use one convention:
 
 ======  =====================  ==============================  ================
 symbol  code                   order                           unit
@@ -34,7 +34,7 @@ def skew(vector: ArrayLike) -> NDArray:
     """
     v = np.asarray(vector, dtype=float)
     S = np.zeros((*v.shape[:-1], 3, 3))
-    S[..., (2, 0, 1), (1, 2, 0)] = v  # of three components, no less and no more
+    S[..., (2, 0, 1), (1, 2, 0)] = v  # exactly three components
     return S - np.swapaxes(S, -1, -2)
 
 
@@ -110,7 +110,7 @@ def rotation_vector(rotation: ArrayLike) -> NDArray:
 
 
 def transform(translation: ArrayLike, rotation: ArrayLike) -> NDArray:
-    """Return the homogeneous matrices ``T_a_b`` from where frame b stands in frame a.
+    """Return the homogeneous matrices ``T_a_b`` of frame b's pose in frame a.
 
     Args:
         translation: (..., 3) [m] origin of b in the axes of a.

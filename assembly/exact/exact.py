@@ -77,9 +77,8 @@ if TYPE_CHECKING:
 _STEPS = 160  # largest number of steps; 3 to 5 are usual, metres of travel take 80
 _NEAR = 1e-2  # relative energy still to gain below which Newton's method is tried
 _DECREMENT = 1e-14  # relative energy still to gain at the last step
-_RESTLESS = (
-    100  # steps after which a balanced state counts, though clearances still move
-)
+# steps after which a balanced state counts, though clearances still move
+_RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 _STATIONARY = 1e-7  # largest relative imbalance of a solution; 1e-12 is usual
 _ROUNDING = 1e-30  # [J] below it energies are rounding, some 1e-48 J without errors
