@@ -1,4 +1,4 @@
-"""Volumes and centres of simple bodies, for masses that a file makes of shapes."""
+"""Volumes and centres of simple bodies, for masses from shapes."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ def volume(shape: str, sizes: Sequence[float]) -> float:
         shape: ``box`` (three edges), ``sphere`` (radius), ``ellipsoid`` (three
             half axes), ``cylinder``, ``capsule`` (without its caps) or ``cone``
             (radius, length).
-        sizes: [m] as many as the shape has.
+        sizes: [m] sizes of the shape.
 
     Returns:
         [m^3].
@@ -35,7 +35,7 @@ def area(shape: str, sizes: Sequence[float]) -> float:
 
     Args:
         shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``, see :func:`volume`.
-        sizes: [m] likewise.
+        sizes: [m] sizes of the shape.
 
     Returns:
         [m^2].
@@ -53,7 +53,7 @@ def area(shape: str, sizes: Sequence[float]) -> float:
 def together(masses: Sequence[float], centres: Sequence[NDArray]) -> (
     tuple[float, NDArray]
 ):  # fmt: skip
-    """Return the mass and centre of bodies that are one.
+    """Return the mass and centre of several bodies together.
 
     Args:
         masses: [kg] of each.

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """(cones + 1,) first column of each cone, and nu; of (nu,) cones in order."""
+    """Return (cones + 1,) first columns of cones, and nu, of (nu,) cones in order."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
@@ -17,10 +17,10 @@ def cone_sums(values: NDArray, group: NDArray) -> NDArray:
 
 
 def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
-    """(..., cones) Euclidean size of vectors' parts in each cone."""
+    """Return the (..., cones) Euclidean size of vectors' parts in each cone."""
     return np.sqrt(cone_sums(values**2, group))
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Return the cones' vectors shortened to length 1 where they are longer."""
+    """Return vectors with the part in each cone shortened to length 1 if longer."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]
