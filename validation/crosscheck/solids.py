@@ -1,4 +1,4 @@
-"""Meshed links as solids for a simulation: the mesh K_E comes from, and its matrix."""
+"""Meshed links as solids for a simulation: the mesh behind K_E, and its matrix."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -11,18 +11,18 @@ from validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
-    """Return the solids of the links that a robot gives by a mesh, for a simulation.
+    """Return the solids of a robot's mesh links, for a simulation.
 
     Args:
         robot: any.
 
     Returns:
-        By frame, the finest mesh from which the linear model's K_E comes too; links of
+        By frame, the finest mesh, from which the linear model's K_E comes too; links of
         one shape and material share one solid.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded, or an interface is
-            not rigid, the only kind a floating frame has here.
+            not rigid, the only kind supported here.
     """
     known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}

@@ -19,14 +19,14 @@ from validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
-    """A meshed body in its floating frame, clamped so that its tip is at the place.
+    """Add a meshed body in its floating frame, clamped so that its tip is at the place.
 
-    Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), found
-    by Exudyn from the full stiffness matrix.
+    Its modes are the static ones of rigid interfaces (Hurty-Craig-Bampton), computed by
+    Exudyn from the full stiffness matrix.
 
     Args:
-        model: to add it to.
-        place: where the frame is while the body is free of stress.
+        model: the model to be extended.
+        place: pose of the frame while the body is free of stress.
         body: the solid.
 
     Returns:
@@ -60,7 +60,7 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
     """Return a marker that moves with an interface, 0 the base and 1 the tip."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
-    # weights whose mean is the centre: an offset would not turn with the nodes
+    # weights whose mean is the centre: an offset would not rotate with the nodes
     rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
     weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
     marker = model.item.MarkerSuperElementRigid(
