@@ -35,7 +35,7 @@ class Hidden:
     """An effect that the declared model lacks.
 
     Attributes:
-        name: a public one, or one that begins with an underscore.
+        name: public name, or one that begins with an underscore.
         parameters: as in the public formats.
     """
 
@@ -53,12 +53,12 @@ def simulate_readings(
 ) -> NDArray:
     """Return deviations of a simulated machine at the rows of a design, without noise.
 
-    Rows whose machine is the same are simulated once.
+    Rows with the same machine are simulated once.
 
     Args:
         robot: declared; every joint is tight unless it has a clearance.
-        reference_point: (3,) [m] where the load acts and the pose is read, platform
-            axes.
+        reference_point: (3,) [m] point at which the load acts and the pose is read,
+            platform axes.
         rows: commanded configurations, loads and covariates.
         effects: of the machine, which the declared model lacks.
         program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
@@ -99,7 +99,7 @@ def simulate_readings(
 
 
 def acts_on_machine(name: str) -> bool:
-    """Whether an effect changes the machine; otherwise only what a device reads."""
+    """Return whether an effect changes the machine, not only the reading."""
     return name in _ALL_CHANGES
 
 
