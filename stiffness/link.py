@@ -50,7 +50,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """How stiff, and how well that is known."""
+        """Return how stiff, and how well that is known."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -145,7 +145,7 @@ def check_definite(who: str, matrix: NDArray) -> None:
 
 
 def inverted(matrix: NDArray) -> NDArray:
-    """Inverse of a symmetric positive definite matrix of mixed units.
+    """Return the inverse of a symmetric positive definite matrix of mixed units.
 
     Args:
         matrix: (6, 6) a stiffness or a compliance.
@@ -159,7 +159,7 @@ def inverted(matrix: NDArray) -> NDArray:
 
 
 def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
-    """The same link, described in other axes with the same origin.
+    """Return the same link, described in other axes with the same origin.
 
     Args:
         link: the link.

@@ -34,7 +34,7 @@ def levels_here() -> list[str]:
 
 
 def chosen() -> ModuleType:
-    """The module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
+    """Return module for this processor, or for the level that ``FORCEFIT_MARCH`` names.
 
     Returns:
         The compiled functions.
@@ -57,12 +57,12 @@ def chosen() -> ModuleType:
 
 
 def _on_x86_64() -> bool:
-    """Whether this processor is of that kind."""
+    """Return whether this processor is of that kind."""
     return platform.machine().lower() in {"x86_64", "amd64"}
 
 
 def _load(name: str) -> ModuleType:
-    """A compiled module of this folder."""
+    """Return a compiled module of this folder."""
     full = f"{__package__}.{name}"
     if find_spec(full) is None:
         raise ImportError(

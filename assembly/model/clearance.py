@@ -6,8 +6,8 @@ symbol  code                  shape    meaning
 c-bar   ``clearance_bounds``  (n, 4)   [RXY RZ TXY TZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
-The free motion of a passive joint is one of these directions without a bound (or with
-the bound the file gives for it), so a joint's own motion needs no special place.
+The free motion of a passive joint is one of these directions without a bound, or with
+the bound in the file.  So a joint's own motion needs no separate treatment.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _KEYS = ("tilt", "spin", "radial", "axial")
 
 
 def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
-    """Bounds of every joint's clearance.
+    """Return the bounds of every joint's clearance.
 
     Args:
         robot: of n frames.
@@ -46,19 +46,19 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
 
 
 def component_bounds(bounds: NDArray) -> NDArray:
-    """(n, 6) the bound of each component of a screw, from bounds (n, 4)."""
+    """Return the (n, 6) bound of each component of a screw, from bounds (n, 4)."""
     return bounds[:, list(BOUND_OF_COMPONENT)]
 
 
 def own_cone(frame: Frame) -> int | None:
-    """Which bound limits a passive joint's own motion; None where a spring does."""
+    """Return the bound that limits a passive joint's own motion; None for a spring."""
     if not frame.passive or frame.compliant:
         return None
     return 3 if frame.joint == "prismatic" else 1
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """(n, 4) bool: bounds of clearances, not the range of a passive joint's motion."""
+    """Return (n, 4) bool: bounds of clearances, not the range of a passive joint."""
     scaled = np.ones((len(robot.frames), 4), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
@@ -68,13 +68,13 @@ def scales_with_margin(robot: Robot) -> NDArray:
 
 
 def has_bounded_motion(robot: Robot) -> bool:
-    """Whether some passive joint's own motion has a bound."""
+    """Return whether a passive joint's own motion has a bound."""
     own = ~scales_with_margin(robot)
     return bool(np.isfinite(clearance_bounds(robot)[own]).any())
 
 
 def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
-    """By how much the worst clearance screw leaves its cone, eqs (2)-(5).
+    """Return the largest excess of a clearance screw over its cone, eqs (2)-(5).
 
     Args:
         screws: (..., n, 6) [rad, m].
@@ -90,7 +90,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
-    with np.errstate(over="ignore"):  # of a bound next to nothing
+    with np.errstate(over="ignore"):  # by a very small bound
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
     return np.maximum(0.0, worst)

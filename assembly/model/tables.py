@@ -1,8 +1,8 @@
 """Results as labelled arrays (xarray) and tables (pandas).
 
 Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
-``long_name`` are attributes of every variable.  Neither package is imported before it
-is asked for.
+``long_name`` are attributes of every variable.  Both packages are imported on first
+use.
 """
 
 import math
@@ -24,7 +24,7 @@ _LABELS = {
     "screw": SCREW, "wrench_component": WRENCH, "bound": ("lower", "upper")
 }  # fmt: skip
 _SCREW, _WRENCH = ("rad, m", ("screw",)), ("N m, N", ("wrench_component",))
-# name: unit, dimensions beside those of the points or frames, meaning
+# name: unit, dimensions in addition to those of the points or frames, meaning
 _OF_FRAMES = {
     "geometric_error": (*_SCREW, "delta l"),
     "clearance_screw": (*_SCREW, "clearance, and small motions of passive joints"),
@@ -62,7 +62,7 @@ class PlacedRobot(Protocol):
         """The manipulator."""
 
     def pose(self) -> dict[str, float]:
-        """Nominal platform pose by component."""
+        """Return the nominal platform pose by component."""
 
 
 class ForcedAssembly(Protocol):
@@ -70,7 +70,7 @@ class ForcedAssembly(Protocol):
 
     @property
     def posture(self) -> PlacedRobot:
-        """Where the robot stands nominally."""
+        """Nominal configuration of the robot."""
 
     @property
     def clearance_screws(self) -> NDArray:
@@ -98,7 +98,7 @@ class ForcedAssembly(Protocol):
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """An assembly over its frames and closures, with the platform's error.
+    """Return an assembly over its frames and closures, with the platform's error.
 
     Args:
         assembly: by the linear model or with finite motions.
@@ -135,7 +135,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Results of many points over ``point``.
+    """Return the results of many points over ``point``.
 
     Args:
         values: (k, ...) by the names of a sweep's variables.
@@ -148,11 +148,10 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """The variables over some dimensions as a table, a column for each component.
+    """Return variables over some dimensions as a table, a column for each component.
 
     Args:
-        data: any, such as of this module; variables that lack one of the dimensions
-            are left out.
+        data: any data set; variables that lack one of the dimensions are left out.
         rows: the dimensions that become the index, a row for each of their points.
 
     Returns:
@@ -194,7 +193,7 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
 
 def component_unit(unit: str, component: str) -> str:
-    """Unit of one component of a variable that mixes angles and lengths.
+    """Return the unit of one component of a variable that mixes angles and lengths.
 
     Args:
         unit: of the variable, such as ``"rad, m"``.
@@ -202,7 +201,7 @@ def component_unit(unit: str, component: str) -> str:
             are rotation and translation.
 
     Returns:
-        The unit of that component; the variable's where that is one already.
+        The unit of that component; the variable's if it has only one.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:
@@ -216,7 +215,7 @@ def component_unit(unit: str, component: str) -> str:
 def _dataset(
     values: Mapping[str, Any], known: Mapping[str, tuple], *points: Any
 ) -> "xarray.Dataset":
-    """Values with units and meaning; ``points`` names their first axis and labels."""
+    """Return values with units and meaning; ``points`` names their first axis."""
     import xarray
 
     first = points[:1]

@@ -32,7 +32,7 @@ BUILT_IN: dict[str, Callable[[], Robot]] = {
 
 
 def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
-    """A built-in robot by its name, or the robot of a file.
+    """Return a built-in robot by its name, or the robot of a file.
 
     Args:
         name: such as ``"irsbot2"``, or the path of a robot file.

@@ -48,7 +48,7 @@ class Arm6Parameters:
 
 
 def arm6(parameters: Arm6Parameters | None = None) -> Robot:
-    """The arm at its home posture.
+    """Return the arm at its home posture.
 
     Args:
         parameters: of the arm, those above if absent.

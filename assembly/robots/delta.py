@@ -61,7 +61,7 @@ class DeltaParameters:
 
 
 def delta(parameters: DeltaParameters | None = None) -> Robot:
-    """The robot at its home pose, on its axis.
+    """Return the robot at its home pose, on its axis.
 
     Args:
         parameters: of the robot, those above if absent.
@@ -87,7 +87,7 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
 def drive_angle(
     parameters: DeltaParameters, azimuth: float, position: NDArray
 ) -> float:
-    """Angle of one arm below the base's plane, elbow outward.
+    """Return the angle of one arm below the base's plane, elbow outward.
 
     Args:
         parameters: of the robot.
@@ -117,7 +117,7 @@ def drive_angle(
 
 
 def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
-    """Unit vectors outward and across, in the base's plane."""
+    """Return the unit vectors outward and across, in the base's plane."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 
@@ -125,7 +125,7 @@ def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
 def _leg(
     name: str, azimuth: float, angle: float, P: DeltaParameters
 ) -> list[PlacedFrame]:
-    """A driven arm and its two rods."""
+    """Return a driven arm and its two rods."""
     out, across = _radial(azimuth)
     foot = P.base_radius * out
     arm = math.cos(angle) * out - math.sin(angle) * np.array([0.0, 0.0, 1.0])

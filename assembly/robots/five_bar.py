@@ -31,7 +31,7 @@ class FiveBarParameters:
 
 
 def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
-    """The robot at its home pose, both elbows outward.
+    """Return the robot at its home pose, both elbows outward.
 
     Args:
         parameters: of the robot, those above if absent.

@@ -40,7 +40,7 @@ class FourBarParameters:
 
 
 def four_bar(parameters: FourBarParameters | None = None) -> Robot:
-    """The linkage at its home angle.
+    """Return the linkage at its home angle.
 
     Args:
         parameters: of the linkage, those above if absent.
@@ -71,7 +71,7 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
 
 
 def corners(angle: float) -> tuple[NDArray, ...]:
-    """Positions of the linkage at a crank angle, in units of the crank.
+    """Return the positions of the linkage at a crank angle, in units of the crank.
 
     Args:
         angle: [rad] of the crank to the ground link.

@@ -52,7 +52,7 @@ class HexapodParameters:
 
 
 def hexapod(parameters: HexapodParameters | None = None) -> Robot:
-    """The robot at its home pose, the platform parallel to the base.
+    """Return the robot at its home pose, the platform parallel to the base.
 
     Args:
         parameters: of the robot, those above if absent.
@@ -71,13 +71,13 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
 
 
 def points() -> tuple[NDArray, NDArray]:
-    """(6, 3) [m] centres of the joints in base axes and in platform axes."""
+    """Return the (6, 3) [m] centres of the joints in base axes and in platform axes."""
     flat = np.zeros((6, 1))
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 
 
 def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[PlacedFrame]:
-    """A strut from a to b, where its ball joint holds the platform."""
+    """Return a strut from a to b, where its ball joint holds the platform."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length
     first = np.cross([0.0, 0.0, 1.0], along)
@@ -99,6 +99,6 @@ def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed
 
 
 def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
-    """A direction in base axes, in a frame's axes."""
+    """Return a direction in base axes, in a frame's axes."""
     x, y, z = (T[:3, :3].T @ vector).tolist()
     return x, y, z

@@ -86,7 +86,7 @@ class IRSBot2Parameters:
 def irsbot2(
     parameters: IRSBot2Parameters | None = None, x: float = 0.0, z: float = -0.5
 ) -> Robot:
-    """The robot with all its joints at zero in one home pose.
+    """Return the robot with all its joints at zero in one home pose.
 
     Args:
         parameters: the paper's if absent.
@@ -119,7 +119,7 @@ def irsbot2(
 
 
 def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
-    """Angle of leg 1's moving sides to the x axis, elbow outward.
+    """Return the angle of leg 1's moving sides to the x axis, elbow outward.
 
     Args:
         parameters: of the robot.
@@ -151,7 +151,7 @@ def _planar_length(P: IRSBot2Parameters) -> float:
 
 
 def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
-    """Frames of leg 1 seen from the base at a platform position."""
+    """Return the frames of leg 1 seen from the base at a platform position."""
     q = drive_angle(P, x, z)
     arm = np.array([math.cos(q), 0.0, math.sin(q)])
     side = P.d * np.array([math.cos(P.alpha), 0.0, math.sin(P.alpha)])
@@ -179,7 +179,7 @@ def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
 def _link(
     P: IRSBot2Parameters, which: str, y: float, near: NDArray, far: NDArray
 ) -> dict[str, NDArray]:
-    """Frames of one distal link and its two universal joints."""
+    """Return the frames of one distal link and its two universal joints."""
     along = (far - near) / np.linalg.norm(far - near)
     level, rise = math.cos(P.alpha_d), math.sin(P.alpha_d)
     fixed = np.array([level * math.cos(P.beta), y * level * math.sin(P.beta), -rise])
@@ -198,13 +198,13 @@ def _link(
 
 
 def _axes(x: NDArray, z: NDArray) -> NDArray:
-    """Rotation matrix with given x (scaled to 1) and z axes."""
+    """Return the rotation matrix with given x (scaled to 1) and z axes."""
     x = x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[Frame]:
-    """A leg's frames with their joints and links."""
+    """Return a leg's frames with their joints and links."""
     frames = []
     for name in NAMES:
         above = _PARENTS[name]
@@ -222,7 +222,7 @@ def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[
 
 
 def _joint(name: str, P: IRSBot2Parameters) -> dict:
-    """Joint, clearance and link of a frame."""
+    """Return the joint, clearance and link of a frame."""
     part: dict = {}
     if name in _REVOLUTE or name.endswith(("_first", "_second", "link_a", "link_b")):
         part = {"joint": "revolute", "actuated": name == "drive"}

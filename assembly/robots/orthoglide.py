@@ -42,7 +42,7 @@ class OrthoglideParameters:
 
 
 def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
-    """The robot at its isotropic point.
+    """Return the robot at its isotropic point.
 
     Args:
         parameters: of the robot, those above if absent.
@@ -67,7 +67,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
 ) -> list[PlacedFrame]:
-    """A leg along an axis of the base, its hinges along another."""
+    """Return a leg along an axis of the base, its hinges along another."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,

@@ -18,7 +18,7 @@ PlacedFrame = tuple[Frame, NDArray]  # a frame and its (4, 4) home pose
 
 
 def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
-    """Frames with the translation and rotation of their home poses.
+    """Return the frames with the translation and rotation of their home poses.
 
     Args:
         placed: frames, parents first, each with its (4, 4) transform seen from the base
@@ -49,7 +49,7 @@ def _own_motion(frame: Frame) -> NDArray:
 def at(
     origin: ArrayLike, z: ArrayLike = (0, 0, 1), x: ArrayLike = (1, 0, 0)
 ) -> NDArray:
-    """A frame by its origin and two of its axes.
+    """Return a frame by its origin and two of its axes.
 
     Args:
         origin: (3,) [m].
@@ -69,7 +69,7 @@ def at(
 def pin(
     name: str, parent: str, clearance: Clearance | None = None, link: Link | None = None
 ) -> Frame:
-    """A passive revolute joint, with the body that leads to it."""
+    """Return a passive revolute joint, with the body that leads to it."""
     return Frame(name, parent, joint="revolute", clearance=clearance, link=link)
 
 
@@ -77,7 +77,7 @@ def cardan_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Two revolute joints at one point, their axes at right angles.
+    """Return two revolute joints at one point, their axes at right angles.
 
     Args:
         name: of the joint; its frames are ``name_1`` and ``name_2``.
@@ -101,7 +101,7 @@ def ball_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None, link: Link | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Three revolute joints at one point, their axes at right angles at home.
+    """Return three revolute joints at one point, their axes at right angles at home.
 
     It is singular where the second joint has turned by a right angle.
 
@@ -127,7 +127,7 @@ def ball_joint(
 
 
 def drive_stiffness(stiffness: float, joint: str = "revolute") -> NDArray:
-    """Joint stiffness of a drive that is elastic along its own motion only.
+    """Return the joint stiffness of a drive that is elastic along its own motion only.
 
     Args:
         stiffness: [N m/rad or N/m] of the drive.

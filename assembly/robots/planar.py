@@ -37,14 +37,14 @@ def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
 
 
 def direction(angle: float) -> NDArray:
-    """(2,) unit vector at an angle [rad] to the x axis."""
+    """Return the (2,) unit vector at an angle [rad] to the x axis."""
     return np.array([math.cos(angle), math.sin(angle)])
 
 
 def arm_angle(
     robot: str, foot: ArrayLike, tip: ArrayLike, near: float, far: float, side: int
 ) -> float:
-    """Angle of the first of two arms that reach from one point to another.
+    """Return the angle of the first of two arms that reach from one point to another.
 
     Args:
         robot: whose, for the message.
@@ -74,7 +74,7 @@ def arm_angle(
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
 ) -> list[PlacedFrame]:
-    """Drive, elbow and the frame at the second arm's end, where a pin may sit.
+    """Return drive, elbow and the frame at the second arm's end, where a pin may sit.
 
     The drive's coordinate is the arm's angle to the x axis.
 

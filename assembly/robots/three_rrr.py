@@ -50,7 +50,7 @@ class ThreeRRRParameters:
 
 
 def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
-    """The robot at its home pose, the platform parallel to the base.
+    """Return the robot at its home pose, the platform parallel to the base.
 
     Args:
         parameters: of the robot, those above if absent.
@@ -81,5 +81,5 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
 
 
 def _triangle() -> NDArray:
-    """(3, 2) corners of an equilateral triangle in the unit circle, tip up."""
+    """Return (3, 2) corners of an equilateral triangle in the unit circle, tip up."""
     return np.array([direction(math.pi * (1 / 2 + 2 * k / 3)) for k in range(3)])

@@ -28,7 +28,7 @@ from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 
-_PRECISION = 1e-3  # of a limit on a pose error: upper minus lower bound
+_PRECISION = 1e-3  # of a limit on a pose error: required upper minus lower bound
 
 
 @renamed_fields(clearance_model="clearance")
@@ -47,12 +47,12 @@ class Experiment:
         load: (6,) [N m, N] on the platform at its origin, base axes; none if absent.
         gravity: (3,) [m/s^2] base axes; none if absent.
         stiffness: state of the platform's stiffness, one of
-            :data:`assembly.sweeps.point_stiffness.STATES`, not the nominal one;
-            empty for none.
+            :data:`assembly.sweeps.point_stiffness.STATES` except the nominal one; empty
+            for none.
         precision: [rad, m] of the largest pose errors of the worst clearance model:
-            upper minus lower bound; inf for one that is not needed.
-        contact_length: [m] by which random moments of the contact model are as large as
-            forces; None for the robot's longest body.
+            required upper minus lower bound; inf if not needed.
+        contact_length: [m] random moments of the contact model divided by it are as
+            large as random forces; None for the robot's longest body.
     """
 
     posture: Posture
@@ -93,7 +93,7 @@ class Experiment:
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """The posture prepared for (22).
+        """The posture, prepared for problem (22).
 
         Raises:
             BadInput: the load drives a motion that nothing resists.
@@ -105,7 +105,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """The posture prepared for (21), by quantity."""
+        """The posture, prepared for problem (21), by quantity."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -119,7 +119,7 @@ class Experiment:
 
     @property
     def stress_errors(self) -> list[float]:
-        """[1] of each link's stress, the mesh's estimated relative error."""
+        """[-] estimated relative error of each link's stress by its mesh."""
         if not self.stress:
             return []
         return [x.relative_error for x in stressed_links(self.posture.robot)]
@@ -156,12 +156,12 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Records of the draws ``first`` .. ``first + count - 1``."""
+        """Return the records of the draws ``first`` .. ``first + count - 1``."""
         values = self.sources.draw(first, count, self.seed)
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Records of given values of the sources.
+        """Return the records of given values of the sources.
 
         Args:
             values: (k, m) [rad or m].
@@ -184,7 +184,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # the positions of "least" are not random, and generators are slow to make
+            # the positions of "least" are not random, and generators are slow to create
             numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
@@ -215,7 +215,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Precision of pose errors that suffices to check limits on them.
+    """Return the precision of pose errors that suffices to check limits on them.
 
     Args:
         limits: by quantity.

@@ -32,12 +32,12 @@ _UNLIMITED = {"platform_screw", "duality_gap", "rotation_lower", "translation_lo
 
 
 def limit_names() -> tuple[str, ...]:
-    """Quantities that may be limited."""
+    """Return the quantities that may be limited."""
     return tuple(k for k in UNITS if k not in _UNLIMITED)
 
 
 def parse_limit(text: str) -> tuple[str, float]:
-    """Quantity and limit from text such as ``"energy=5"``.
+    """Return the quantity and limit from text such as ``"energy=5"``.
 
     Args:
         text: one of energy [J], margin, margin_free, rotation [rad], translation [m],

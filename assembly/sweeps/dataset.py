@@ -33,19 +33,19 @@ _TEXT = {
     "reason": "what was said where the status is not ok",
     "near_singularity": "singularities near by, with the joints that show them",
 }
-# names in files of older releases, and the present ones
+# names in files of older releases, and the present names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# blocks written together: a write takes as long as that of a hundred points
+# number of blocks written together: one write takes as long as a hundred points
 _TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
-    """The data set of a whole sweep in memory.
+    """Return the data set of a whole sweep in memory.
 
     Args:
         sweep: of the results.
@@ -91,7 +91,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """The file, from its coordinates to its last block."""
+    """Write the file, from its coordinates to its last block."""
     import h5py
 
     text = h5py.string_dtype()
@@ -138,7 +138,7 @@ def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> 
 
 
 def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice, ...]]:
-    """Boxes that together hold the points ``first`` .. ``last - 1`` of an array.
+    """Yield boxes that together hold the points ``first`` .. ``last - 1`` of an array.
 
     Args:
         shape: of the array.
@@ -146,7 +146,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
         last: the one after the last point.
 
     Yields:
-        A slice for each axis; the boxes follow one another as the points do.
+        A slice for each axis; the boxes follow each other in the order of the points.
     """
     if len(shape) == 1:
         yield (slice(first, last),)
@@ -167,7 +167,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
 
 
 def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
-    """Blocks one after the other."""
+    """Return the blocks one after the other."""
     texts: Texts = {name: {} for name in TEXTS}
     start = 0
     for records, texts_of_block in blocks:
@@ -180,7 +180,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """(k,) of objects: a text variable of some points."""
+    """Return the (k,) texts of a variable, as objects."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -190,12 +190,12 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
 
 
 def _attributes(variable: Any) -> dict[str, str]:
-    """Unit and meaning of a variable."""
+    """Return the unit and meaning of a variable."""
     return {"units": variable.unit, "long_name": variable.meaning}
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Axes, values and attributes of every coordinate, by name."""
+    """Return the axes, values and attributes of every coordinate, by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -236,10 +236,11 @@ def check_dataset(path: Path | str, what: str) -> None:
 
     Args:
         path: of the file to be written later.
-        what: one of :data:`KINDS`; an existing file must be one.
+        what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
-        BadInput: it is not, or as :func:`forcefit.inputs.writing.check_writable`.
+        BadInput: it is of another kind, or as in
+            :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)
     path = Path(path)
@@ -251,7 +252,7 @@ def check_dataset(path: Path | str, what: str) -> None:
 
 
 def _is(path: Path, what: str) -> bool:
-    """Whether the attributes of a file are those of a kind of ours."""
+    """Return whether the attributes of a file are those of one of our kinds."""
     import h5py
 
     try:
@@ -264,7 +265,7 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """A data set from its file.
+    """Return a data set from its file.
 
     Args:
         path: of a NetCDF file.
@@ -284,14 +285,14 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     check_heaps(path)
     try:
         data = xarray.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # of a damaged file HDF5 raises whatever it meets
+    except Exception as error:  # for a damaged file HDF5 raises various exceptions
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
     return _with_new_names(data)
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """A data set of an older release under the present names."""
+    """Return a data set of an older release under the present names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

@@ -1,4 +1,4 @@
-"""The quantities of a sweep: what may be asked at its points, and their table."""
+"""The quantities of a sweep: those that may be requested, and their table."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -25,10 +25,10 @@ _READING = ("registration", "drift")  # effects that change readings, not screws
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities asked for at every point; sent to each worker once.
+    """The quantities requested at every point; sent to each worker once.
 
-    Attributes:
-        robot: with its errors, which are used where none are drawn.
+    robot: with its errors, which are used if none are drawn.
+    design: its parameters, if some vary; otherwise None.
         design: its parameters, if some vary; else None.
         varied: paths of the varied parameters.
         components: of the postures, see :mod:`assembly.sweeps.targets`.
@@ -43,9 +43,9 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
-        stiffness: also K_C and the shares of its parts, in a state of
-            :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
-        frequencies: how many natural frequencies, of the same K_C and declared masses.
+        stiffness: state of K_C, in :data:`assembly.sweeps.point_stiffness.STATES`, if
+            K_C and the shares of its parts are computed too; otherwise empty.
+        frequencies: number of natural frequencies, of the same K_C and declared masses.
         kept: names of the variables that are stored; all that are computed if empty.
     """
 
@@ -85,7 +85,7 @@ class Variable:
     """One quantity of a data set.
 
     Attributes:
-        dims: axes beside those of the points, with their labels.
+        dims: axes in addition to those of the points, with their labels.
         unit: of its numbers.
         meaning: for ``long_name``.
     """
@@ -96,7 +96,7 @@ class Variable:
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a sweep stores, by name.
+    """Return the numeric quantities that a sweep stores, by name.
 
     Args:
         question: of a sweep.
@@ -109,7 +109,7 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that are computed, some perhaps not stored.
+    """Return the numeric quantities that are computed; some may not be stored.
 
     Args:
         question: of a sweep.
@@ -186,12 +186,12 @@ def computed(question: Question) -> dict[str, Variable]:
 
 
 def _moving(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints that are not fixed."""
+    """Return the names of the joints that are not fixed."""
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """What is kept of K_C."""
+    """Return the variables of K_C."""
     along = {"wrench_component": WRENCH}
     return {
         "compliance": Variable(
@@ -214,7 +214,7 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 
 def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
-    """Suffix and meaning of each pair of bounds asked for."""
+    """Yield suffix and meaning of each pair of requested bounds."""
     if question.assumption is not None:
         yield "", f", {question.assumption}"
     if question.clearance_only:
@@ -222,12 +222,12 @@ def _bound_suffixes(question: Question) -> Iterator[tuple[str, str]]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: what is stored, and ``status`` as a code."""
+    """Return type of a point's record: stored quantities, and ``status`` as a code."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Type of a record of some quantities, and ``status`` as a code."""
+    """Return the type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

@@ -1,4 +1,4 @@
-"""Which quantities a sweep computes and stores, by the names of its data variables."""
+"""Selection of the quantities that a sweep computes and stores, by variable names."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,8 +6,8 @@ from dataclasses import replace
 from assembly.sweeps.quantities import Question, Variable, computed
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
-DEFAULT = "default"  # stands for what is stored where no quantity is named
-MODES = 6  # natural frequencies where their number is not given
+DEFAULT = "default"  # the quantities that are stored if none is named
+MODES = 6  # natural frequencies if their number is not given
 BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 _STIFFNESS = (
@@ -23,12 +23,12 @@ _NEEDED = (
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict a question to quantities that are named.
+    """Restrict a question to named quantities.
 
     Args:
         question: of the other options.
-        texts: names of data variables, between commas; ``"default"`` stands for those
-            that are stored without names.
+        texts: names of data variables, between commas; ``"default"`` means those that
+            are stored if none are named.
 
     Returns:
         The question; nothing is computed for variables that are not named.
@@ -52,7 +52,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """The question for every quantity whose options are given or have a default."""
+    """Return a question for all quantities whose options are given or have defaults."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -61,7 +61,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """The question for the variables kept and no others."""
+    """Return the question for exactly these variables."""
     every = _with_optional(question)
     return replace(
         question,
@@ -77,7 +77,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 
 def quantities_text() -> str:
-    """Every data variable of sweeps: name, unit, meaning, and the option it needs."""
+    """Return every data variable of sweeps: name, unit, meaning and needed option."""
     from assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()

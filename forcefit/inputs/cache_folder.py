@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 def cache_folder() -> Path | None:
-    """Folder for what is computed once: an absent one is made.
+    """Return the folder for what is computed once: an absent one is made.
 
     Returns:
         ``$FORCEFIT_CACHE``, the user's cache folder or one of the user's own among the
@@ -23,7 +23,7 @@ def cache_folder() -> Path | None:
 
 
 def is_writable(folder: Path) -> bool:
-    """Whether a file can be made in a folder, which is made if it is absent."""
+    """Return whether a file can be made in a folder, which is made if it is absent."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -43,7 +43,7 @@ def _candidates() -> Iterator[Path]:
 
 
 def _of_user() -> Path:
-    """The user's cache folder, as each system has it."""
+    """Return the user's cache folder, as each system has it."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA") or Path.home())
     if sys.platform == "darwin":

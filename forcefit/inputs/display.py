@@ -24,7 +24,7 @@ _FEW = 6  # numbers that are shown; of more only the count
 
 
 def short_repr(self: Any) -> str:
-    """A title and one line for each figure.
+    """Return a title and one line for each figure.
 
     Args:
         self: a dataclass, perhaps with a method ``_figures``.
@@ -39,7 +39,7 @@ def short_repr(self: Any) -> str:
 
 
 def html_table(self: Any) -> str:
-    """The same as a plain table, for notebooks.
+    """Return the same as a plain table, for notebooks.
 
     Args:
         self: a dataclass, perhaps with a method ``_figures``.
@@ -57,7 +57,7 @@ def html_table(self: Any) -> str:
 
 
 def title(thing: object) -> str:
-    """Kind of an object, and its own name or its robot's, if it has one."""
+    """Return the kind of an object, and its own name or its robot's, if it has one."""
     kind = type(thing).__name__
     posture = getattr(thing, "posture", None)
     owner = getattr(thing, "robot", None) or getattr(posture, "robot", None)
@@ -89,7 +89,7 @@ def brief(value: object) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers in brackets, rounded as by :func:`rounded`."""
+    """Return the numbers in brackets, rounded as by :func:`rounded`."""
     return "[" + " ".join(f"{rounded(v):.4g}" for v in values) + "]"
 
 
@@ -99,7 +99,7 @@ def rounded(value: float) -> float:
 
 
 def screw_text(screw: ArrayLike) -> str:
-    """A platform screw (6,) [rad, m] for people."""
+    """Return a platform screw (6,) [rad, m] for people."""
     s = 1e3 * np.asarray(screw, dtype=float)
     return f"{numbers(s[:3])} mrad, {numbers(s[3:])} mm"
 
@@ -125,13 +125,13 @@ def largest_row(sizes: ArrayLike) -> int:
 
 
 def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
-    """Two bounds [rad or m] in thousandths; the unit is mrad or mm."""
+    """Return two bounds [rad or m] in thousandths; the unit is mrad or mm."""
     low, high = 1e3 * bounds[0], 1e3 * bounds[1]
     return f"{low:.6g} to {high:.6g} {unit}" if low < float("inf") else "without bound"
 
 
 def _figures(thing: Any) -> Figures:
-    """The figures of an object by its own method, or its fields."""
+    """Return the figures of an object by its own method, or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]

@@ -22,7 +22,7 @@ class BadInput(ValueError):
 
 
 def one_line(text: str, longest: int) -> str:
-    """The text without control characters, abbreviated in the middle."""
+    """Return the text without control characters, abbreviated in the middle."""
     if len(text) > longest:
         half = (longest - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"
@@ -30,12 +30,12 @@ def one_line(text: str, longest: int) -> str:
 
 
 def printable(text: str) -> bool:
-    """Whether a text has no line breaks, other controls or lone surrogates."""
+    """Return whether a text has no line breaks, other controls or lone surrogates."""
     return not any(unicodedata.category(c) in {"Cc", "Cs", "Zl", "Zp"} for c in text)
 
 
 def plot_label(text: str) -> str:
-    """A text escaped for matplotlib, which reads a formula between dollar signs.
+    """Return a text escaped for matplotlib, which reads a formula between dollar signs.
 
     Args:
         text: with a name in it that a user chose.
@@ -47,12 +47,12 @@ def plot_label(text: str) -> str:
 
 
 def quoted(name: str) -> str:
-    """A name in double quotes, on one line, abbreviated if long."""
+    """Return a name in double quotes, on one line, abbreviated if long."""
     return f'"{one_line(name, 60)}"'
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """``'; did you mean "x"?'``, or the list of valid names if none is near."""
+    """Return ``'; did you mean "x"?'``, or the list of valid names if none is near."""
     names = list(dict.fromkeys(str(v) for v in valid))
     close = difflib.get_close_matches(name[:200], names, n=1, cutoff=0.6)
     if close:
@@ -63,7 +63,7 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def describe(value: object) -> str:
-    """Short description of a wrong value, abbreviated if long."""
+    """Return short description of a wrong value, abbreviated if long."""
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
@@ -97,7 +97,7 @@ def checked(
     least: float = -math.inf,
     below: float = math.inf,
 ) -> float:
-    """A finite number inside its range.
+    """Return a finite number inside its range.
 
     Args:
         option: such as ``--length``, for the message.

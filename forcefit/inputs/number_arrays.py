@@ -9,7 +9,7 @@ from forcefit.inputs.errors import describe
 
 
 def find_fault(value: object, shape: tuple[int, ...], infinite: bool = False) -> str:
-    """The fault in numbers of a given shape, and its place, counted from 1.
+    """Return the fault in numbers of a given shape, and its place, counted from 1.
 
     Args:
         value: wrong nested lists, or another value.
@@ -45,7 +45,7 @@ def number_array(value: object) -> NDArray | None:
 
 
 def comma_numbers(text: str) -> NDArray:
-    """Finite numbers between commas; none at all if one of them is not."""
+    """Return the finite numbers between commas; none at all if one of them is not."""
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -54,7 +54,7 @@ def comma_numbers(text: str) -> NDArray:
 
 
 def as_number(value: object) -> float:
-    """The number, or nan for anything that is not one (true and false are not)."""
+    """Return number, or nan for anything that is not one (true and false are not)."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return math.nan
     try:

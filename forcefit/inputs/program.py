@@ -8,7 +8,7 @@ from types import ModuleType
 
 
 def sources_hash(packages: Sequence[ModuleType], libraries: Sequence[str]) -> str:
-    """SHA-256 of packages' Python sources and of the versions of libraries.
+    """Return SHA-256 of packages' Python sources and of the versions of libraries.
 
     Args:
         packages: all ``.py`` files below their folders count.

@@ -44,7 +44,7 @@ _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){100}")  # a.a.a.a ...
 
 
 def read_bytes(path: Path | str) -> bytes:
-    """Content of a file.
+    """Return the content of a file.
 
     Args:
         path: the file.
@@ -67,7 +67,7 @@ def read_bytes(path: Path | str) -> bytes:
 
 
 def read_text(path: Path | str) -> str:
-    r"""Text of a UTF-8 file, with or without a byte order mark.
+    r"""Return the text of a UTF-8 file, with or without a byte order mark.
 
     Args:
         path: the file.
@@ -93,7 +93,7 @@ def read_text(path: Path | str) -> str:
 
 
 def read_rows(path: Path | str) -> list[list[str]]:
-    """Cells of a CSV file, a list for each of its lines.
+    """Return the cells of a CSV file, a list for each of its lines.
 
     Args:
         path: the file.
@@ -112,7 +112,7 @@ def read_rows(path: Path | str) -> list[list[str]]:
 
 
 def read_toml(path: Path | str) -> "Table":
-    """Root table of a TOML file.
+    """Return the root table of a TOML file.
 
     Args:
         path: the file.
@@ -154,22 +154,22 @@ class Table:
     _asked: set[str] = field(default_factory=set)
 
     def bad(self, key: str, message: str) -> BadInput:
-        """The error for a key of this table, to be raised by the caller."""
+        """Return the error for a key of this table, to be raised by the caller."""
         where = ".".join(part for part in (self.place, key) if part)
         return BadInput(f"{self.file}: {where}{': ' if where else ''}{message}")
 
     def has(self, key: str) -> bool:
-        """Whether the key is there; it then counts as known."""
+        """Return whether the key is there; it then counts as known."""
         self._asked.add(key)
         return key in self.content
 
     def get(self, key: str, default: object = None) -> Any:
-        """The raw value of a key, or the default."""
+        """Return the raw value of a key, or the default."""
         self._asked.add(key)
         return self.content.get(key, default)
 
     def require(self, key: str, expected: str) -> Any:
-        """The raw value of a key that must be there.
+        """Return the raw value of a key that must be there.
 
         Args:
             key: its name.
@@ -195,7 +195,7 @@ class Table:
         expected: str = "a string",
         longest: int = 4000,
     ) -> str:
-        """A string of one line.
+        """Return a string of one line.
 
         Args:
             key: its name.
@@ -224,7 +224,7 @@ class Table:
         return value
 
     def choice(self, key: str, valid: Iterable[str], default: str | None = None) -> str:
-        """A string out of a few.
+        """Return a string out of a few.
 
         Returns:
             The string.
@@ -242,7 +242,7 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """True or false.
+        """Return true or false.
 
         Returns:
             The value, or the default.
@@ -256,7 +256,7 @@ class Table:
         return value
 
     def integer(self, key: str, default: int | None = None, least: int = 0) -> int:
-        """A whole number of at least ``least``.
+        """Return a whole number of at least ``least``.
 
         Returns:
             The number.
@@ -283,7 +283,7 @@ class Table:
         below: float = math.inf,
         largest: float = math.inf,
     ) -> float:
-        """A finite number.
+        """Return a finite number.
 
         Args:
             key: its name.
@@ -328,7 +328,7 @@ class Table:
         *,
         largest: float = math.inf,
     ) -> NDArray:
-        """An array of finite numbers of a given shape.
+        """Return an array of finite numbers of a given shape.
 
         Args:
             key: its name.
@@ -358,7 +358,7 @@ class Table:
         return array
 
     def table(self, key: str) -> "Table":
-        """A table inside this one.
+        """Return a table inside this one.
 
         Returns:
             The table.
@@ -372,7 +372,7 @@ class Table:
         return Table(value, self.file, ".".join(filter(None, (self.place, key))))
 
     def tables(self, key: str) -> list["Table"]:
-        """The tables of ``[[key]]``, none if the key is absent.
+        """Return the tables of ``[[key]]``, none if the key is absent.
 
         Returns:
             One :class:`Table` for each, numbered from 1 in messages.

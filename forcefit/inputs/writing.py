@@ -121,7 +121,7 @@ def _check_there(path: Path, mode: int, kind: Kind | None) -> None:
 
 
 def unwritable(path: Path | str, error: Exception) -> str:
-    """The message of a file that cannot be written, with the reason."""
+    """Return the message of a file that cannot be written, with the reason."""
     number = getattr(error, "errno", None)
     reason = os.strerror(number) if number else str(error)
     return f"{path}: cannot be written: {reason}"
@@ -206,7 +206,7 @@ def whole_folder(folder: Path | str) -> Generator[Path, None, None]:
 
 
 def path_from(folder: Path, path: Path | str) -> str:
-    """A path as a file of a folder names it, on every system with slashes.
+    """Return a path as a file of a folder names it, on every system with slashes.
 
     Args:
         folder: of the file.
@@ -323,7 +323,7 @@ def write_json(results: dict, target: str | None) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Arrays as lists, numbers that are not finite as None, keys as text."""
+    """Return the arrays as lists, numbers that are not finite as None, keys as text."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):

@@ -9,7 +9,7 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """A number of a file.
+    """Return a number of a file.
 
     Args:
         path: for messages.
@@ -29,7 +29,7 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """A whole number of a file.
+    """Return a whole number of a file.
 
     Args:
         path: for messages.

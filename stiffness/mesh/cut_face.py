@@ -60,7 +60,7 @@ class CutFace:
 
 
 def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Faces that two tetrahedra have in common.
+    """Return the faces that two tetrahedra have in common.
 
     Args:
         cells: (t, 4).
@@ -76,7 +76,7 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Number triangles by their corners.
+    """Return the number triangles by their corners.
 
     Args:
         corners: (..., 3), in any order.
@@ -203,7 +203,7 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """A solid with the triangles on a face among those inside it."""
+    """Return a solid with the triangles on a face among those inside it."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
@@ -223,7 +223,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
 
 
 def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
-    """Corners near a face moved onto it, and which lie on it."""
+    """Return the corners near a face moved onto it, and which lie on it."""
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     height = np.abs(face.shape.signed(solid.points)[0])
     ends, _ = edges_of(solid.cells, len(solid.points))

@@ -38,12 +38,12 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Costs of all assumptions at one posture.
+    """Return the costs of all assumptions at one posture.
 
     Closures are compared without clearances, where the pose is unique.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes; none if absent.
         solids: whether beams are meshed, some seconds a shape.

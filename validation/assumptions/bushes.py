@@ -25,7 +25,7 @@ from assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Two bushes for every pin that has both radial clearance and tilt.
+    """Return two bushes for every pin that has both radial clearance and tilt.
 
     Args:
         joints: with discs and cones.
@@ -54,8 +54,8 @@ def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
     """Close a manipulator with pins in two bushes each at least energy.
 
     Args:
-        posture: where the robot stands; bounds of passive joints' own motion are left
-            out.
+        posture: the robot's configuration; bounds of passive joints' own motion are
+            left out.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:

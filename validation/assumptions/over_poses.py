@@ -66,7 +66,7 @@ def costs_over_poses(
     solids: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> CostsOverPoses:
-    """Costs of all assumptions at many poses.
+    """Return the costs of all assumptions at many poses.
 
     Args:
         robot: with its errors.
@@ -113,7 +113,7 @@ def costs_at(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> CostsOverPoses:
-    """Costs of all assumptions at one posture; see :func:`costs_over_poses`."""
+    """Return costs of all assumptions at one posture; see :func:`costs_over_poses`."""
     costs = assumption_costs(posture, load, gravity, solids)
     platform = stiffness_costs([posture], solids)
     asked = (posture.pose(),)

@@ -120,7 +120,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """(k,) largest relative differences; NaN where either is not known."""
+    """Return the (k,) largest relative differences; NaN where either is not known."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -129,7 +129,7 @@ def _differences(C: NDArray, other: NDArray) -> NDArray:
 
 
 def difference(C: NDArray, other: NDArray) -> float:
-    """Largest relative difference of two compliances along any wrench.
+    """Return the largest relative difference of two compliances along any wrench.
 
     Args:
         C: (6, 6) symmetric, positive semidefinite.
@@ -148,13 +148,13 @@ def difference(C: NDArray, other: NDArray) -> float:
 
 
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
-    """The platform's compliance with links as solids, by the displacement method.
+    """Return platform's compliance with links as solids, by the displacement method.
 
     Unknowns are the motions of every link's end against its base, of joints' springs
     and of free joints; a solid's energy is that of both its ends' motions in space.
 
     Args:
-        posture: where the robot stands; clearances are held at zero.
+        posture: the robot's configuration; clearances are held at zero.
         solids: by frame; other links are springs with their K_E.
 
     Returns:
@@ -201,7 +201,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Motions that keep the closures, as orthonormal columns."""
+    """Return the motions that keep the closures, as orthonormal columns."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]

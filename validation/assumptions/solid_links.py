@@ -66,7 +66,7 @@ class SolidLink:
 
 
 def solid_link(frame: Frame) -> SolidLink | None:
-    """A frame's link as a solid.
+    """Return a frame's link as a solid.
 
     Args:
         frame: any.
@@ -107,7 +107,7 @@ def solid_link(frame: Frame) -> SolidLink | None:
 
 
 def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
-    """The links of a robot that have a shape, as solids.
+    """Return the links of a robot that have a shape, as solids.
 
     Args:
         robot: any.
@@ -123,7 +123,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 
 def _mesh_error(solved: MeshedLink) -> float:
-    """[-] estimate of the largest error of the mesh's own K_E."""
+    """Return the [-] estimate of the largest error of the mesh's own K_E."""
     # of the interval whose middle is the link's K_E, the mesh's own is the upper end
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
@@ -132,13 +132,13 @@ def _mesh_error(solved: MeshedLink) -> float:
 
 @lru_cache(maxsize=_KEPT)
 def _bar(shape: tuple[tuple[str, float], ...], poisson: float) -> MeshedLink:
-    """A bar of unit length and modulus."""
+    """Return a bar of unit length and modulus."""
     return solve_bar(dict(shape), Material(1.0, poisson), _OPTIONS)
 
 
 @lru_cache(maxsize=_KEPT)
 def _stiffnesses(solved: MeshedLink) -> tuple[NDArray, NDArray]:
-    """K between both ends, and K_E with wrenches spread over both."""
+    """Return K between both ends, and K_E with wrenches spread over both."""
     lam, mu = solved.level.material[:, :2].T
     kind = "distributing-both"
     spread = condense(solved.level.mesh, lam, mu, solved.centers, kind).stiffness

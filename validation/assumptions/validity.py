@@ -70,7 +70,7 @@ class Cost:
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """Difference of a solution from a better one.
+    """Return the difference of a solution from a better one.
 
     Args:
         model: the solution with the assumption.
@@ -103,7 +103,7 @@ def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
     """What closures linear in the screws cost, against finite motions.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
@@ -125,7 +125,7 @@ def link_cost(
     """What it costs that links are beams.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         stiffness: by frame, the K_E (6, 6) [N m/rad .. N/m] they should have.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
@@ -150,7 +150,7 @@ def spread_cost(
     miss what the beams store between their ends.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         gravity: (3,) [m/s^2] base axes.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
@@ -169,7 +169,7 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
     """What disc and cone cost, against pins in two bushes.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
@@ -191,7 +191,7 @@ def pieces_cost(
     what none would leave, and how many leave less than the limits.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
 
@@ -216,7 +216,7 @@ def pieces_cost(
 
 
 def _in_pieces(posture: Posture, count: int) -> Posture:
-    """The same with every beam cut."""
+    """Return the same with every beam cut."""
     links = {
         frame.name: replace(frame.link, pieces=count)
         for frame in posture.robot.frames

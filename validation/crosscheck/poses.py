@@ -1,4 +1,4 @@
-"""A cross-check at every pose of a grid; one that fails says so and stops nothing."""
+"""A cross-check at every pose of a grid; a failure is recorded and stops no other."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -37,13 +37,13 @@ def check_poses(
     Args:
         robot: with its errors.
         axes: values [m or rad] by pose component; components not named are free.
-        check: what to run at a posture.
-        progress: called after each pose with the number done and the total.
+        check: function that runs at a posture.
+        progress: function called after each pose with the number done and the total.
 
     Returns:
-        For each pose what was ``asked``, ``passed``, ``status`` and the check's table;
-        poses out of reach have the status ``"out of reach"``, those beyond the joints'
-        limits ``"beyond_limits"``, and ``passed`` None.
+        For each pose the requested pose as ``asked``, ``passed``, ``status`` and the
+        check's table; unreachable poses have the status ``"out of reach"``, those
+        beyond the joints' limits ``"beyond_limits"``, and ``passed`` None.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -67,7 +67,7 @@ def _row(
     reason: str,
     check: Callable[[Posture], Crosscheck],
 ) -> dict[str, Any]:
-    """The result at one pose."""
+    """Return the result at one pose."""
     if posture is None:
         return {"status": OUT_OF_REACH, "reason": reason, "passed": None}
     if passed := limits_passed(robot, posture.coordinates):
@@ -77,14 +77,14 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """All poses for machines: ``passed`` if every reachable one did, and one did."""
+    """Return plain values: ``passed`` if all reachable poses did, at least one."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """A line for each pose, and the verdict."""
+    """Return a line for each pose, and the verdict."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())

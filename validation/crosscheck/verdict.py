@@ -1,12 +1,12 @@
-"""Verdicts of comparisons, on as many scales as a decision needs.
+"""Verdicts of comparisons, at as many scales as a decision needs.
 
-At large errors and few scales a limit is uncertain by more than its bound: terms of
+At large errors and few scales the uncertainty of a limit exceeds its bound: terms of
 higher order look like errors of first order, or cancel them.  Then smaller scales are
 added, each half of the last, until every check is decided: a wrong term of first order
-stays, all others vanish.  Nothing fails on fewer than four scales.
+remains, all others vanish.  No check fails on fewer than four scales.
 
-Where a quantity is below the noise of either model (a robot without errors and load)
-nothing was compared: such a check has no signal, and does not count as passed.
+If a quantity is below the noise of either model (a robot without errors and load)
+nothing is compared: such a check has no signal, and does not count as passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,8 @@ from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-_FEWEST, _MOST = 4, 6  # scales on which a check may fail; at which none is added
+# number of scales on which a check may fail; at which none is added
+_FEWEST, _MOST = 4, 6
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Check:
 
     @property
     def verdict(self) -> str:
-        """Whether it holds.
+        """Outcome of the check.
 
         ``"ok"``; ``"fails"``; ``"undecided"`` if its uncertainty is too large; ``"no
         signal"`` if there is nothing to compare.
@@ -59,7 +60,7 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # a value that is not a number is not known
+        # a value that is not a number is unknown
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 
@@ -73,21 +74,21 @@ class Judged(Protocol):
 
     @property
     def checks(self) -> Mapping[str, Check]:
-        """What must hold, by name."""
+        """The checks, by name."""
 
 
 Comparison = TypeVar("Comparison", bound=Judged)
 
 
 def verdict(comparison: Judged) -> str:
-    """Outcome of all checks on the scales solved.
+    """Return the outcome of all checks on the scales solved.
 
     Args:
         comparison: with its checks.
 
     Returns:
-        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` where no check
-        had anything to compare.
+        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` if no check
+        had a signal.
     """
     outcomes = {check.verdict for check in comparison.checks.values()}
     if FAILS in outcomes and len(comparison.pairs) >= _FEWEST:
@@ -106,9 +107,9 @@ def compare_scales(
 
     Args:
         scales: factors on all imperfections, at least two different ones.
-        solve: both models at a scale.
-        judge: makes a comparison of pairs, largest scale first, and the number of
-            those asked for.
+        solve: function that solves both models at a scale.
+        judge: function that makes a comparison of pairs, largest scale first, and the
+            number of requested ones.
 
     Returns:
         The comparison, decided or on six scales at least.
@@ -126,13 +127,13 @@ def compare_scales(
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Scales from which a slope can be read, largest first.
+    """Return the scales of a slope, largest first.
 
     Args:
         scales: factors on errors, clearances and load.
 
     Returns:
-        Those that differ, sorted.
+        The distinct scales, sorted.
 
     Raises:
         BadInput: fewer than two, or one that is not finite and > 0.
@@ -146,7 +147,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 
 
 def verdict_text(comparison: Judged) -> str:
-    """The verdict in a few words, with the number of checks without a signal."""
+    """Return the verdict in a few words, with the number of checks without a signal."""
     texts = {
         PASSED: "passed",
         FAILED: "FAILED",

@@ -102,7 +102,7 @@ class Traced:
         return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self, most: int = 3) -> list[Unknowns]:
-        """Machines of other effects than the best model's, likeliest first."""
+        """Return machines of other effects than the best model's, likeliest first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
@@ -125,7 +125,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """The measuring frame as it was found, one for each session."""
+        """Return the measuring frame as it was found, one for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -137,7 +137,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """A hypothesis at work, in each session for which it has numbers."""
+    """Return a hypothesis at work, in each session for which it has numbers."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -202,7 +202,7 @@ def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """The machine fitted without blunders among the rows that were not drawn."""
+    """Return the machine fitted without blunders among the rows that were not drawn."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -242,7 +242,7 @@ def _with_its_errors(
 
 
 def _errors(fit: MachineFit) -> NDArray:
-    """(n, 6) [rad, m] geometric errors found, beside those declared."""
+    """Return the (n, 6) [rad, m] geometric errors found, beside those declared."""
     return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
@@ -256,7 +256,7 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """The search; where rows follow one another, time itself explains the least."""
+    """Return search; where rows follow one another, time itself explains the least."""
     # it varies with whatever changed meanwhile, and says nothing of another day: it is
     # believed only where it predicts other spans of time clearly better
     # where nothing may act, what would is no noise
@@ -300,7 +300,7 @@ def _traced(
 
 
 def _fitted(traced: Traced) -> MachineFit:
-    """The machine found, without effects that the readings do not support."""
+    """Return the machine found, without effects that the readings do not support."""
     fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
     while True:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
@@ -312,6 +312,6 @@ def _fitted(traced: Traced) -> MachineFit:
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """[sigma^2] squared change of the fitted readings by an effect."""
+    """Return the [sigma^2] squared change of the fitted readings by an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

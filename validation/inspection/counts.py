@@ -7,13 +7,13 @@ from validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """How many rows each kind has."""
+    """Return how many rows each kind has."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
 
 def load_counts(c: Campaign) -> dict:
-    """Levels, sizes and directions of the load."""
+    """Return the levels, sizes and directions of the load."""
     force = np.linalg.norm(c.loads[:, 3:], axis=1)
     moment = np.linalg.norm(c.loads[:, :3], axis=1)
     pairs = np.unique(np.column_stack([c.configuration, c.repeat]), axis=0)

@@ -43,7 +43,7 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Components never measured, stuck, rounded, or suspiciously large."""
+    """Return the components never measured, stuck, rounded, or suspiciously large."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
@@ -76,7 +76,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
-    """Joints that never moved, and configurations measured in one go."""
+    """Return the joints that never moved, and configurations measured in one go."""
     remarks = []
     robot = campaign.robot
     still = [
@@ -142,7 +142,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Whether thermal expansion could show at all."""
+    """Return whether thermal expansion could show at all."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -173,7 +173,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Whether friction could show at all."""
+    """Return whether friction could show at all."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
@@ -194,7 +194,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Whether a drift could show at all."""
+    """Return whether a drift could show at all."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "
@@ -205,7 +205,7 @@ def _on_time(campaign: Campaign) -> list[Remark]:
 
 
 def _on_covariates(campaign: Campaign) -> list[Remark]:
-    """Covariates that rise and fall together."""
+    """Return the covariates that rise and fall together."""
     columns = dict(campaign.covariates)
     for name, values in zip(LOAD, campaign.loads.T, strict=True):
         columns[f"load.{name}"] = values
@@ -222,5 +222,5 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
 
 
 def _in_both(configuration: NDArray, side: NDArray) -> int:
-    """Number of configurations approached from both sides."""
+    """Return the number of configurations approached from both sides."""
     return len(np.intersect1d(configuration[side > 0], configuration[side < 0]))

@@ -41,7 +41,7 @@ class DesignSignatures:
 def design_signatures(
     campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> DesignSignatures:
-    """Signatures of all effects of the library on a campaign.
+    """Return the signatures of all effects of the library on a campaign.
 
     An unknown registration is fitted first, so that signatures are read in the axes of
     the measuring device; where it cannot be found they are read in the base's.
@@ -95,7 +95,7 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Columns for :func:`validation.inspection.repeats.repeat_noise`.
+    """Return the columns for :func:`validation.inspection.repeats.repeat_noise`.
 
     Args:
         campaign: of N measured cells.
@@ -129,7 +129,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """(N, k) change of the readings with one unknown at a time at its size."""
+    """Return (N, k) change of the readings with one unknown at a time at its size."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {
@@ -150,5 +150,5 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
 
 
 def _given(campaign: Campaign, covariate: str) -> bool:
-    """Whether a covariate is there and not zero throughout."""
+    """Return whether a covariate is there and not zero throughout."""
     return bool(np.any(campaign.covariates.get(covariate, 0.0)))

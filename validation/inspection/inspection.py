@@ -137,7 +137,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Noise from repeats against the stated one, suspects by their labels."""
+    """Return noise from repeats against the stated one, suspects by their labels."""
     if noise is None:
         return None
     return {

@@ -51,7 +51,7 @@ class Revisits:
 
 
 def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
-    """How often, and when, the same was measured again.
+    """Return how often, and when, the same was measured again.
 
     Args:
         campaign: of R rows; their order is that of ``cov.time``, else of the file.

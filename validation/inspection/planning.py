@@ -119,7 +119,7 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Rows to choose from, in the time that the rows wanted take."""
+    """Return the rows to choose from, in the time that the rows wanted take."""
     # the machine warms and cools slowly: rows at one time have one temperature
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
@@ -140,7 +140,7 @@ def rows_as_campaign(
     robot: Robot, plan: CampaignPlan, design: CampaignDesign,
     sigma: tuple[float, float],
 ) -> Campaign:  # fmt: skip
-    """A plan as a campaign that read nothing but zeros.
+    """Return a plan as a campaign that read nothing but zeros.
 
     Args:
         robot: declared.
@@ -177,7 +177,7 @@ def _alike(columns: NDArray) -> NDArray:
 
 
 def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
-    """Rows in the order of measuring."""
+    """Return the rows in the order of measuring."""
     time = [plan.rows[i].covariates["time"] for i in chosen]
     order = chosen[np.argsort(time, kind="stable")]
     return CampaignPlan(
@@ -195,7 +195,7 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """(e, e) mean non-centrality of one effect where another is fitted."""
+        """Return (e, e) mean non-centrality of one effect where another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
@@ -220,7 +220,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Rows exchanged one for one while that tells more."""
+        """Return the rows exchanged one for one while that tells more."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -241,12 +241,12 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """The criterion."""
+    """Return the criterion."""
     return float(np.nansum(np.log1p(apart)))
 
 
 def table(planned: Planned) -> dict[str, Any]:
-    """A plan for machines: pairs of effects, the hardest to tell apart first."""
+    """Return a plan for machines: pairs of effects, the hardest to tell apart first."""
     names = planned.effects
     pairs = [
         {
@@ -264,7 +264,7 @@ def table(planned: Planned) -> dict[str, Any]:
 
 
 def text(planned: Planned) -> str:
-    """The same for people: the five hardest pairs."""
+    """Return the same for people: the five hardest pairs."""
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
     lines.append("hardest to tell apart, with as many random rows in brackets [sigma]:")

@@ -70,7 +70,7 @@ def on_repeats(
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
-    """Whether readings far from their repeats look like single mistakes."""
+    """Return whether readings far from their repeats look like single mistakes."""
     suspects = noise.suspects
     if len(suspects) < _SEVERAL:
         return []

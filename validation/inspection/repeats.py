@@ -83,7 +83,7 @@ class RepeatNoise:
 def repeat_noise(
     campaign: Campaign, slow: Mapping[str, NDArray] | None = None
 ) -> RepeatNoise | None:
-    """Noise from the repeats of a campaign, slow changes taken out.
+    """Return the noise from the repeats of a campaign, slow changes taken out.
 
     They are left in where they would use up more than half of what the repeats can
     tell.
@@ -137,7 +137,7 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Columns that shift the components one by one.
+    """Return the columns that shift the components one by one.
 
     Args:
         campaign: of R rows, N measured cells.
@@ -153,7 +153,7 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """(N,) number of the set of repeats of each measured cell."""
+    """Return the (N,) number of the set of repeats of each measured cell."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
@@ -193,7 +193,7 @@ class _RepeatFit:
         self.rss = float(self.rest @ self.rest)
 
     def _centred(self, columns: NDArray) -> NDArray:
-        """Columns less their mean in every set."""
+        """Return the columns less their mean in every set."""
         sums = np.zeros((len(self.count), columns.shape[1]))
         np.add.at(sums, self.set, columns)
         return columns - (sums / self.count[:, None])[self.set]
@@ -216,7 +216,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """The answer."""
+        """Return the answer."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)
@@ -255,7 +255,7 @@ class _RepeatFit:
 
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
-    """(rows, rank) orthonormal basis of all columns."""
+    """Return the (rows, rank) orthonormal basis of all columns."""
     return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 

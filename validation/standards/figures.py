@@ -85,7 +85,7 @@ class StandardFigures:
     axes: dict[str, AxisFigures]
 
     def table(self) -> dict[str, Any]:
-        """Plain values for ``--json``."""
+        """Return plain values for ``--json``."""
         return {
             "campaign": self.campaign,
             "registration": self.registration,
@@ -97,7 +97,7 @@ class StandardFigures:
         }
 
     def text(self) -> str:
-        """A table for people, the worst of each in the last line."""
+        """Return a table for people, the worst of each in the last line."""
         lines = [f"{self.campaign}: ISO 9283, {len(self.poses)} poses with repeats",
                  "pose              cycles  AP [um]  RP [um]  drift [um]"]  # fmt: skip
         for pose in self.poses:
@@ -125,12 +125,12 @@ class StandardFigures:
 
 
 def _micro(value: float | None) -> str:
-    """A length in um, in eight characters."""
+    """Return a length in um, in eight characters."""
     return f"{'-':>7}" if value is None else f"{1e6 * value:7.4g}"
 
 
 def standard_figures(campaign: Campaign) -> StandardFigures:
-    """Figures of ISO 9283 and ISO 230-2 of a campaign.
+    """Return the figures of ISO 9283 and ISO 230-2 of a campaign.
 
     Args:
         campaign: with rows measured more than once.
@@ -160,13 +160,13 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
 
 
 def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
-    """Rows in the order measured."""
+    """Return the rows in the order measured."""
     time = campaign.covariates.get("time")
     return rows if time is None else rows[np.argsort(time[rows], kind="stable")]
 
 
 def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
-    """ISO 9283 of one set of repeats."""
+    """Return ISO 9283 of one set of repeats."""
     turns, shifts = campaign.measured[rows, :3], campaign.measured[rows, 3:]
     turns, shifts = (d[np.isfinite(d).all(axis=1)] for d in (turns, shifts))
     placed, turned = len(shifts) > 1, len(turns) > 1

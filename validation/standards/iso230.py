@@ -41,7 +41,7 @@ class AxisFigures:
 def axis_figures(
     forward: Sequence[ArrayLike], backward: Sequence[ArrayLike]
 ) -> AxisFigures:
-    """Figures of ISO 230-2 from repeated approaches to m positions.
+    """Return the figures of ISO 230-2 from repeated approaches to m positions.
 
     Args:
         forward: for each position the deviations [m or rad], approached from below;
@@ -70,6 +70,6 @@ def axis_figures(
 
 
 def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
-    """(m,) means and (m,) standard deviations."""
+    """Return the (m,) means and (m,) standard deviations."""
     rows = [np.asarray(row, dtype=float) for row in positions]
     return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])

@@ -13,7 +13,7 @@ DRIFT_CYCLES = 10  # of each block whose AP is compared with the first block's
 
 
 def position_accuracy(deviations: ArrayLike) -> float:
-    """AP_P [m]: from the commanded position to the barycentre of those attained.
+    """Return AP_P [m]: from the commanded position to the barycentre of those attained.
 
     Args:
         deviations: (n, 3) [m] attained less commanded.
@@ -25,7 +25,7 @@ def position_accuracy(deviations: ArrayLike) -> float:
 
 
 def position_repeatability(deviations: ArrayLike) -> float:
-    """RP_l [m]: radius of the sphere about the barycentre, mean plus three S_l.
+    """Return RP_l [m]: radius of the sphere about the barycentre, mean plus three S_l.
 
     Args:
         deviations: (n, 3) [m] attained less commanded, n >= 2.
@@ -51,7 +51,7 @@ def orientation_accuracy(angles: ArrayLike) -> NDArray:
 
 
 def orientation_repeatability(angles: ArrayLike) -> NDArray:
-    """RP_a, RP_b, RP_c (3,) [rad]: three standard deviations of each angle.
+    """Return RP_a, RP_b, RP_c (3,) [rad]: three standard deviations of each angle.
 
     Args:
         angles: (n, 3) [rad] attained less commanded, n >= 2.
@@ -65,7 +65,7 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
 def distance_accuracy(
     first: ArrayLike, second: ArrayLike, commanded: float
 ) -> tuple[float, float]:
-    """AD_P and RD [m] of the distance between two positions.
+    """Return AD_P and RD [m] of the distance between two positions.
 
     Args:
         first: (n, 3) [m] attained, cycle by cycle.

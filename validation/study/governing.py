@@ -49,14 +49,14 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """The smallest bound first, those without an answer last."""
+    """Return the smallest bound first, those without an answer last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """The robot with each of its imperfections removed, one at a time."""
+    """Return the robot with each of its imperfections removed, one at a time."""
     cases = []
     for i, frame in enumerate(robot.frames):
         if robot.errors[i].any():

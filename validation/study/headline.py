@@ -48,7 +48,7 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
 
 def verdict(results: StudyResults) -> str:
-    """The conclusions of a study, in a few sentences.
+    """Return the conclusions of a study, in a few sentences.
 
     The pose error is the certified bound over all clearance positions, and over the map
     if there is one; beside it the error at least energy.
@@ -72,7 +72,7 @@ def verdict(results: StudyResults) -> str:
 
 
 def by_force(results: StudyResults) -> bool:
-    """Whether it goes together, and only by force, whatever its clearances do.
+    """Return whether it goes together, and only by force, whatever its clearances do.
 
     Args:
         results: of :func:`validation.study.study.run_study`.
@@ -88,7 +88,7 @@ def by_force(results: StudyResults) -> bool:
 
 
 def _assembly_text(results: StudyResults) -> str:
-    """Whether clearances suffice, or the energy that is needed."""
+    """Return whether clearances suffice, or the energy that is needed."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
@@ -105,7 +105,7 @@ def _assembly_text(results: StudyResults) -> str:
 
 
 def _pose_error_text(results: StudyResults) -> str:
-    """The platform's pose error: the certified bound first."""
+    """Return the platform's pose error: the certified bound first."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
@@ -143,14 +143,14 @@ def _other_assumptions(results: StudyResults) -> str:
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
-    """A pose error that is not exceeded."""
+    """Return a pose error that is not exceeded."""
     if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
         return "free to move without bound"
     return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Sizes of a pose error [rad, m] in mm and mrad."""
+    """Return the sizes of a pose error [rad, m] in mm and mrad."""
     return f"{1e3 * translation:.3g} mm and {1e3 * rotation:.3g} mrad"
 
 

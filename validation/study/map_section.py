@@ -82,7 +82,7 @@ def finite(one: Mapped) -> NDArray:
 
 
 def maps_section(maps: Any, summary: dict[str, Any]) -> str:
-    """Maps over the grid, their values under the pointer.
+    """Return the maps over the grid, their values under the pointer.
 
     Args:
         maps: data set over the grid.
@@ -115,7 +115,7 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """The map over two axes; of further ones a sentence says where they are held."""
+    """Return map over two axes; of further ones a sentence says where they are held."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
@@ -160,7 +160,7 @@ def _where(maps: Any, one: Mapped) -> str:
 
 
 def _place(maps: Any, at: dict[str, int]) -> str:
-    """Coordinates of a point in words."""
+    """Return the coordinates of a point in words."""
     return ", ".join(
         f"{name} = {float(maps[name].values[i]):.6g} {_UNITS.get(name, '')}".rstrip()
         for name, i in at.items()

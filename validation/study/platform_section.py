@@ -11,7 +11,7 @@ from stiffness.screws import SCREW
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
-    """K_C at the study's pose, and which part gives way, as HTML.
+    """Return K_C at the study's pose, and which part gives way, as HTML.
 
     Args:
         stiffness: of :func:`assembly.report.platform_stiffness.stiffness_of`.
@@ -50,7 +50,7 @@ def platform_section(stiffness: dict[str, Any]) -> str:
 
 
 def _chart(shares: dict[str, list[float]]) -> str:
-    """The largest shares, a bar for each direction."""
+    """Return the largest shares, a bar for each direction."""
     traces = [
         {"type": "bar", "name": label(name), "x": list(DIRECTIONS), "y": row}
         for name, row in shares.items()

@@ -27,7 +27,7 @@ def compare_printed(
     """Solve the printed problems, and compare energy and margins with ours.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         assembly: ours, without loads.
         zone: our ``margin`` and ``margin_free``.
 
@@ -71,7 +71,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Energies; inside an assembly zone they are zero but for rounding."""
+    """Return Energies; inside an assembly zone they are zero but for rounding."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(

@@ -53,7 +53,7 @@ class Service:
 
 
 def read_service(root: Table, robot: Robot) -> Service | None:
-    """The table ``[service]`` of a study file; None where there is none.
+    """Return the table ``[service]`` of a study file; None where there is none.
 
     Args:
         root: of the file.
@@ -88,7 +88,7 @@ def read_service(root: Table, robot: Robot) -> Service | None:
 
 
 def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, Any]:
-    """The robot at work at one pose.
+    """Return the robot at work at one pose.
 
     Args:
         posture: of the robot.
@@ -123,7 +123,7 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """The maps of a study with those of the robot at work.
+    """Return the maps of a study with those of the robot at work.
 
     Args:
         maps: without loads.

@@ -31,7 +31,7 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """The platform under load and weight."""
+    """Return the platform under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
@@ -52,7 +52,7 @@ def _loaded(service: dict[str, Any]) -> list[str]:
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Natural frequencies, and the parts whose motion each mode is."""
+    """Return the natural frequencies, and the parts whose motion each mode is."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []

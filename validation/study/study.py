@@ -219,12 +219,12 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
 
 
 def points_solved(maps: Any) -> int:
-    """Number of a grid's points that have a solution."""
+    """Return the number of a grid's points that have a solution."""
     return int((maps["status"] == OK).sum())
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Frames while the closures are closed; none where links are not known."""
+    """Return frames while the closures are closed; none where links are not known."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -235,7 +235,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Beam and finite elements side by side; links replaced where asked."""
+    """Return the beam and finite elements side by side; links replaced where asked."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):
@@ -258,7 +258,7 @@ def _compare_links(
 
 
 def _beams(frame: Frame) -> dict[str, NDArray]:
-    """K_E of a frame's beam by both theories."""
+    """Return K_E of a frame's beam by both theories."""
     assert isinstance(frame.link, BeamLink)
     links = {name: replace(frame.link, theory=name) for name in THEORIES}
     return {

@@ -69,7 +69,7 @@ class Study:
 
 
 def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
-    """A study from its file.
+    """Return a study from its file.
 
     Args:
         path: of the TOML file.
@@ -126,7 +126,7 @@ def read_study(path: Path | str, folder: Path | str | None = None) -> Study:
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """The files that a study is made of, each once."""
+    """Return the files that a study is made of, each once."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -148,7 +148,7 @@ def _robot(root: Table, folder: Path) -> Robot:
 
 
 def _closed(root: Table, name: Path | str) -> Robot:
-    """The robot, its closures made to hold as the study's keys ask."""
+    """Return the robot, its closures made to hold as the study's keys ask."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -163,7 +163,7 @@ def _closed(root: Table, name: Path | str) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """The robot with the errors asked for, and a sentence about them."""
+    """Return the robot with the errors asked for, and a sentence about them."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -196,7 +196,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
-    """Frames named by the key ``frames``."""
+    """Return the frames named by the key ``frames``."""
     names = table.get("frames", default)
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")
@@ -247,7 +247,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """The pose of the detailed checks; home if not given."""
+    """Return the pose of the detailed checks; home if not given."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -257,7 +257,7 @@ def _pose(root: Table) -> dict[str, float]:
 
 
 def _scales(root: Table) -> tuple[float, ...]:
-    """Scales of the cross-check."""
+    """Return the scales of the cross-check."""
     if not root.has("scales"):
         return SCALES
     value = root.get("scales")

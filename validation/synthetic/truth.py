@@ -47,14 +47,14 @@ def truth_of(
     accept: list[list[str]] | None = None,
     note: str = "",
 ) -> dict[str, Any]:
-    """The truth of a campaign.
+    """Return the truth of a campaign.
 
     Args:
-        campaign: with what is hidden in it.
+        campaign: with its hidden effects.
         verdict: of a correct diagnosis; if absent, that of a design that distinguishes
             the effects.
-        accept: sets of effects that explain the data as well.
-        note: why.
+        accept: sets of effects that explain the data equally well.
+        note: explanation.
 
     Returns:
         Plain values, keys of the practice campaigns' truth.
@@ -93,7 +93,7 @@ def truth_of(
 
 
 def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
-    """Name, place and parameters of an effect."""
+    """Return name, place and parameters of an effect."""
     names = [frame.name for frame in campaign.robot.frames]
     where: list[str] = []
     parameters = []
@@ -109,7 +109,7 @@ def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
 
 
 def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
-    """The unit of a parameter."""
+    """Return the unit of a parameter."""
     last = key.rpartition(".")[2]
     special = {
         "phase": "rad", "tilt": "rad", "exponent": "1", "factor": "1",
@@ -124,6 +124,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Root mean square of what was measured; 1 where nothing is known."""
+    """Return the root mean square of the measured values; 1 without any."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

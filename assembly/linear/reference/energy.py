@@ -1,4 +1,4 @@
-"""Problem (22) by the reference: the least energy less work, every |u_c| <= 1."""
+"""Problem (22) by the reference: minimise energy less work with every |u_c| <= 1."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ _RIGID_BESIDE = 1e19  # springs so much stiffer than the softest count as rigid
 class CannotAssemble(Exception):
     """No clearance and no elasticity of the model lets the closures hold.
 
-    A result, not a mistake of the caller: some closure is rigid in every direction.
+    This is a result, not a mistake of the caller: some closure is rigid in a direction.
     """
 
 
@@ -42,7 +42,7 @@ def least_energy(
     Bounds of passive joints' own motion count where they matter.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
         own_axes_free: see :func:`assembly.linear.closure.virtual_joints`.
@@ -116,7 +116,7 @@ def solve_with(
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Least energy of a reduced problem; infeasible ones are named."""
+    """Solve a reduced problem; name the open closure if it is infeasible."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""

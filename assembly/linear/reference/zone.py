@@ -22,14 +22,14 @@ from assembly.solvers.conic import least_factor
 
 
 def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
-    """Factor on all clearances at which a rigid manipulator just assembles, (21).
+    """Return the factor on all clearances at which a rigid manipulator assembles, (21).
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         own_axes_free: whether compliant joints are free about their own axis.
 
     Returns:
-        The margin and its certified lower bound; inf for both if no factor does.
+        The margin and its certified lower bound; inf for both if no factor suffices.
 
     Raises:
         SolverFailed: the cone solver gave up.
@@ -49,14 +49,14 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
 ) -> tuple[float, float, NDArray]:
-    """Margin with a given choice of what may move.
+    """Return the margin with a given choice of what may move.
 
     Args:
         lin: the assembly constraints.
         joints: what may move, without springs.
 
     Returns:
-        The margin and its certified lower bound, inf if no factor does; the (n, 6)
+        The margin and its certified lower bound, inf if no factor suffices; the (n, 6)
         [rad, m] clearance screws that attain it.
 
     Raises:
@@ -72,14 +72,14 @@ def margin_with(
 
 
 def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
-    """Margin of a reduced problem, its bound, and the clearances that attain it."""
+    """Return the margin of a reduced problem, its bound, and its clearances."""
     joints = reduced.joints
     u = np.zeros(joints.cones.shape[1])
     if reduced.inconsistent:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # orthonormal rows, whatever the units of the closures
+    # orthonormal rows make the result independent of the closures' units
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)
@@ -91,7 +91,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
 def _margin_bound(
     B: NDArray, right: NDArray, joints: VirtualJoints, y: NDArray
 ) -> float:
-    """Certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
+    """Return the certified lower bound: t sum_k |B_k^T y| >= y.right for every y."""
     sizes = cone_sizes(B.T @ y, joints.group)
     scaled = joints.scaled[cone_starts(joints.group)[:-1]]
     work = float(y @ right) - float(sizes[~scaled].sum())
