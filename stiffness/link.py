@@ -23,7 +23,7 @@ class LinkStiffness:
     read at ``tip``, in the axes in which ``tip`` and ``base`` are given.
 
     Attributes:
-        method: by which it was computed, such as ``"Timoshenko beam"``.
+        method: method by which it was computed, such as ``"Timoshenko beam"``.
         compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
         tip: (3,) [m] the point where screws and wrenches are read.
         base: (3,) [m] the centre of the held interface.

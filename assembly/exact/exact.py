@@ -116,8 +116,8 @@ class ExactAssembly:
         expansion: of the problem here, with the multipliers of the scaled closures.
         stationarity: [-] largest relative imbalance of an unknown.
         iterations: number of steps.
-        method: of all cone programmes: ``"compiled"``, with Clarabel in doubt; or
-            ``"reference"``, numpy and Clarabel alone.
+        method: method of all cone programmes: ``"compiled"``, with Clarabel in doubt;
+            or ``"reference"``, numpy and Clarabel alone.
     """
 
     whole: Posture
@@ -322,8 +322,8 @@ def solve_exact(
         point: (3,) [m] of the platform, in its axes; the force moves with it.
         near: an equilibrium of the same posture under another load, used as the start.
         progress: function called with the steps taken and their largest number.
-        method: of the linear solution and of every step: ``"compiled"``, with Clarabel
-            in doubt; or ``"reference"``, numpy and Clarabel alone.
+        method: method of the linear solution and of every step: ``"compiled"``, with
+            Clarabel in doubt; or ``"reference"``, numpy and Clarabel alone.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.

@@ -84,7 +84,7 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
 
     Args:
         mechanism: as it was read or written.
-        path: of the file.
+        path: path of the file.
 
     Returns:
         The comparison, or the reason why none was made.

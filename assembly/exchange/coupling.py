@@ -52,7 +52,7 @@ def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, .
 
     Args:
         couplings: in any order.
-        file: for messages.
+        file: name of the file, for error messages.
 
     Returns:
         The couplings.

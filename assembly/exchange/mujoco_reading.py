@@ -31,7 +31,7 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
 
     Args:
         mechanism: as it was read or written.
-        path: of a URDF or MJCF file.
+        path: path of a URDF or MJCF file.
 
     Returns:
         The comparison, or the reason why none was made.

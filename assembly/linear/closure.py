@@ -45,7 +45,7 @@ class VirtualJoints:
     """Columns of small screws that may move in a robot, except its drives.
 
     Attributes:
-        robot: of n frames.
+        robot: robot of n frames.
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.
@@ -74,7 +74,7 @@ def virtual_joints(
     """Return the columns of all screws that may move.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         compliant: behaviour of passive joints with stiffness.  ``"elastic"``: all
             springs act.  ``"hinged"``: all springs act except the one about (or along)
             the joint's own z, which is free.  ``"rigid"`` and ``"free"``: no spring

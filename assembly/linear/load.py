@@ -268,7 +268,7 @@ def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDA
     """Return the wrenches at the starts of links under their own weight.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         tips: (..., n, 6) [N m, N] through each link's section at its tip.
         distributed: (..., n, 6) [N m, N] of :func:`weights_at_tips`.
 
@@ -335,7 +335,7 @@ def with_distributed(
     """Return the loads with the links' own weight recorded in ``distributed``.
 
     Args:
-        loads: with :func:`weights` among them.
+        loads: loads with :func:`weights` among them.
         posture: the robot's configuration, one or many.
         gravity: (..., 3) [m/s^2] base axes.
 

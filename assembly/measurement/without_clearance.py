@@ -166,7 +166,7 @@ def responses_to(
 
     Args:
         flexible: at c postures.
-        columns: of (6n, s) screws, as bytes.
+        columns: columns of (6n, s) screws, as bytes.
         shape: (6n, s).
 
     Returns:

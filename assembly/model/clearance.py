@@ -28,7 +28,7 @@ def clearance_bounds(robot: Robot, compliant: Compliant = "elastic") -> NDArray:
     """Return the bounds of every joint's clearance.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         compliant: behaviour of a passive joint with stiffness about or along its own z:
             ``"elastic"``: only its spring moves (and ``spin``, if given, is a clearance
             in series).  ``"free"``: it moves freely, as in the second margin of problem

@@ -96,7 +96,7 @@ def compliance_slope(
         posture: the robot's configuration.
         ahead: the configuration with the number a step larger.
         back: the configuration with the number a step smaller.
-        step: of the number.
+        step: step of the number.
         asked: state of the tangent, and its point.
 
     Returns:

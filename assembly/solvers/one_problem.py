@@ -60,7 +60,7 @@ def newton(
     Args:
         problem: as for :func:`interior_point`.
         starts: as for :func:`interior_point`.
-        limits: of the iteration.
+        limits: limits of the iteration.
         u: (nu,) first guess within the cones; overwritten with the solution.
         y: (r + p,) overwritten with the multipliers of G's rows, and of H's, whose
             values are a first guess.

@@ -35,9 +35,9 @@ class Experiment:
     """Distributions of the errors at a posture, and the quantities of each draw.
 
     Attributes:
-        posture: of the robot; drawn errors replace its own.
-        sources: of the errors.
-        seed: of all draws.
+        posture: posture of the robot; drawn errors replace its own.
+        sources: sources of the errors.
+        seed: seed of all draws.
         clearance_model: one of
             :data:`assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the zone margins are computed.
@@ -212,8 +212,8 @@ def precision_for(
     """Return the precision of pose errors that suffices to check limits on them.
 
     Args:
-        limits: by quantity.
-        share: of a limit.
+        limits: limits by quantity.
+        share: share of a limit.
 
     Returns:
         [rad, m] for an :class:`Experiment`.

@@ -85,7 +85,7 @@ def scale_uniformly(
 
     Args:
         requirement: limits at all postures.
-        samples: of the errors.
+        samples: samples of the errors.
         t: (G,) [rad or m] proportions.
         precision: relative, of the largest utilisation, or of the factor.
 

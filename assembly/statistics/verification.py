@@ -118,7 +118,7 @@ def verify_yield(
         fresh: number of draws, used only here.
         progress: called with the name of a step, its progress and its total.
         stream: of random numbers.
-        level: of confidence of the interval.
+        level: level of confidence of the interval.
 
     Returns:
         Plain values: the yield with its interval, that of every posture, the verdict.

@@ -25,9 +25,9 @@ class Targets:
     """Poses or joint coordinates, on the axes of a grid or in a list.
 
     Attributes:
-        names: of the components, ``tx`` .. or ``q.<frame>``.
-        values: for a grid the values on each component's axis, for a list those of
-            each posture [m or rad].
+        names: names of the components, ``tx`` .. or ``q.<frame>``.
+        values: for a grid, the values on each component's axis, for a list those
+            of each posture [m or rad].
         labels: of the postures of a list; None for a grid.
     """
 
@@ -60,8 +60,8 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
     """Return the poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
 
     Args:
-        names: of the components, of one kind.
-        robot: of n frames.
+        names: names of the components, of one kind.
+        robot: robot of n frames.
         rows: (k, components) of :meth:`Targets.at`.
 
     Returns:

@@ -39,7 +39,7 @@ def plot_label(text: str) -> str:
     """Return a text escaped for matplotlib, which reads a formula between dollar signs.
 
     Args:
-        text: with a name that a user chose.
+        text: text with a name that a user chose.
 
     Returns:
         The escaped text.
@@ -101,9 +101,9 @@ def checked(
     """Return a finite number inside its range.
 
     Args:
-        option: for example ``--length``, for the error message.
+        option: name of the option, for example ``--length``, for the error message.
         value: the number given by the user.
-        unit: for the error message.
+        unit: unit for the error message.
         above: bound that the value must exceed.
         least: smallest value allowed.
         below: bound that the value must not reach.

@@ -290,7 +290,7 @@ class Table:
 
         Args:
             key: name of the key.
-            unit: for the error message.
+            unit: unit for the error message.
             default: value of an absent key; without a default, an absent key is an
                 error.
             above: bound that the value must exceed.
@@ -338,7 +338,7 @@ class Table:
         Args:
             key: name of the key.
             shape: expected shape.
-            unit: for the error message.
+            unit: unit for the error message.
             default: value of an absent key; without a default, an absent key is an
                 error.
             largest: bound on the absolute value of each entry.

@@ -225,7 +225,7 @@ def write_text(text: str, path: Path | str) -> None:
     r"""Write a text file as a whole or not at all.
 
     Args:
-        text: with line ends ``\n``, kept on every system; written in UTF-8.
+        text: text with line ends ``\n``, kept on every system; written in UTF-8.
         path: path of the file.
 
     Raises:

@@ -194,7 +194,7 @@ def peak_stress(
     Args:
         solved: from :func:`stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        section: of a straight beam from base to tip, as for
+        section: section of a straight beam from base to tip, as for
             :func:`stiffness.beam.beam_stress.peak_beam_stress`.
         up: (3,) the section's z, in the link's axes.
         away: [m] distance from the interfaces; one interface radius if absent.

@@ -58,7 +58,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements, 2 or 3.
+        order: order of the elements, 2 or 3.
 
     Returns:
         The elements; inverted ones are straightened in steps.
@@ -135,7 +135,7 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements to be made of them.
+        order: order of the elements to be made of them.
 
     Returns:
         The solid, finer where a wall is thin compared with its curvature.

@@ -114,7 +114,7 @@ def without_chords(solid: Solid) -> Solid:
     """Split edges that join two corners of a curved face but are not on it.
 
     Args:
-        solid: with its ``inner`` triangles.
+        solid: solid with its ``inner`` triangles.
 
     Returns:
         The solid; no tetrahedron has two sides on a curved face, between which it

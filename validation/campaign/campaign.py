@@ -21,7 +21,7 @@ class Campaign:
     reach every commanded configuration.
 
     Attributes:
-        name: of the campaign, that of its folder.
+        name: name of the campaign, that of its folder.
         robot: as declared.
         ids: R labels, unique.
         coordinates: (R, n) [rad or m] of every joint, nominal closure solved.

@@ -62,7 +62,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     """Return the campaign of a folder.
 
     Args:
-        folder: with ``campaign.toml`` in it, or that file.
+        folder: folder with ``campaign.toml`` in it, or that file.
 
     Returns:
         The campaign, every configuration placed.

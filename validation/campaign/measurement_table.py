@@ -122,7 +122,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
     """Join tables of rows, each a session unless it says otherwise.
 
     Args:
-        tables: of one campaign, at least one.
+        tables: tables of one campaign, at least one.
 
     Returns:
         A single table unchanged; for several, labels begin with the file's name.

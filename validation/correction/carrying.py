@@ -112,7 +112,7 @@ def carry(
     """Fit a saved robot to the set-up rows of sessions, and judge it on the others.
 
     Args:
-        campaign: of the saved robot.
+        campaign: campaign of the saved robot.
         declared: the same rows with the campaign's own robot.
         setup: (R,) bool, the set-up rows.
         fitted: names in :data:`OF_A_SESSION`.

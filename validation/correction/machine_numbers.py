@@ -76,7 +76,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
     """Return the numbers of a saved robot that every session shares.
 
     Args:
-        robot: with its covariance, or ``tolerance`` and ``std``, in its file.
+        robot: robot with its covariance, or ``tolerance`` and ``std``, in its file.
 
     Returns:
         Those with a stated uncertainty, except numbers of one session and of a

@@ -68,7 +68,7 @@ class SessionUnknowns:
         prior: (k,) prior precisions, 1 / variance; zero without information.
         step: (k,) change that moves the readings by micrometres, for slopes.
         constant: [s] the drift's time constant, absent if no drift is fitted.
-        functions: of time, whose numbers are fitted.
+        functions: functions of time, whose numbers are fitted.
     """
 
     names: tuple[tuple[str, str], ...]

@@ -28,7 +28,7 @@ def check_poses(
     """Run a check at every reachable pose of a grid.
 
     Args:
-        robot: with its errors.
+        robot: robot with its errors.
         axes: values [m or rad] by pose component; components not named are free.
         check: function that runs at a posture.
         progress: function called after each pose with the number done and the total.

@@ -56,13 +56,14 @@ class Traced:
     """What the search found.
 
     Attributes:
-        campaign: of R rows; sigma is as large as the search believed, of a blunder
-            many times as large, and so is the noise in common.
-        conditions: of all rows, registered, with what finite geometric errors add.
+        campaign: campaign of R rows; sigma is as large as the search believed, of a
+            blunder many times as large, and so is the noise in common.
+        conditions: conditions of all rows, registered, with what finite geometric
+            errors add.
         used: (R,) bool, rows that were fitted.
         outliers: (R,) bool, rows whose readings are blunders, left out.
         selected: models with their probabilities.
-        columns: of the campaign's cells.
+        columns: columns of the campaign's cells.
     """
 
     campaign: Campaign
@@ -149,7 +150,7 @@ def trace(
     """Search for the effects and functions that a declared model lacks.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         fitted: (R,) bool, the rows that are read.
         declared: of all rows.
         update: told what is done, how much of it and of how much.

@@ -127,7 +127,7 @@ class Unknowns:
 
     Attributes:
         robot: as declared, with the effects of its file.
-        effects: of the library, including the registration.
+        effects: effects of the library, including the registration.
         small: geometric errors and joint compliances.
         functions: learned ones.
         sensitivities: with the normalisation of functions; None without functions.

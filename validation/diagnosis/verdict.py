@@ -39,7 +39,7 @@ def verdict(
 
     Args:
         selected: models with their probabilities.
-        names: of the library's effects of the fitted machine.
+        names: names of the library's effects of the fitted machine.
         functions: whether it has functions.
         small: whether it has geometric errors or springs.
         more_than_noise: whether its residual is more than noise.

@@ -87,7 +87,7 @@ def unit_word(text: str) -> str:
     """Return the short name of a unit.
 
     Args:
-        text: such as Millimeters, inch, ° or mm.
+        text: text such as Millimeters, inch, ° or mm.
 
     Returns:
         The name, empty if it is no unit of length or angle.

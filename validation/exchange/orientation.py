@@ -40,7 +40,7 @@ def orientation_columns(
     """Return the columns of a target's orientation.
 
     Args:
-        columns: of the table.
+        columns: columns of the table.
         own: indices of the target's columns.
 
     Returns:

@@ -15,7 +15,7 @@ class Writing:
     """Format of an export, for what the export does not state itself.
 
     Attributes:
-        unit: of lengths, None if the header states it.
+        unit: unit of lengths, None if the header states it.
         decimal: the decimal mark of exports.
         commands_decimal: of the table of commands.
         dates: ``"day_first"`` or ``"month_first"`` for dates with slashes, or None.

@@ -40,7 +40,7 @@ def steadiest(
 
     Args:
         found: at least two arrays of the same shape.
-        size: of a change, which makes changes comparable.
+        size: size of a change, which makes changes comparable.
 
     Returns:
         The array, and its absolute change.

@@ -87,7 +87,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
 
     Args:
         design: any.
-        names: of the effects.
+        names: names of the effects.
 
     Returns:
         The design with more conditions, if the effects need them.
@@ -110,7 +110,7 @@ class CampaignPlan:
     """The rows of a design on a robot.
 
     Attributes:
-        rows: in the order of measurement.
+        rows: rows in the order of measurement.
         configuration: (rows,) number of each row's configuration.
         commands: (rows, m) as written to the file.
         columns: names of the m columns.
@@ -129,7 +129,7 @@ def plan_campaign(
 
     Args:
         robot: declared.
-        design: of the campaign.
+        design: design of the campaign.
         rng: of the draws.
 
     Returns:

@@ -136,7 +136,7 @@ class ReachableSet:
 
         Args:
             direction: (6,) weights of the screw's components.
-            method: of :func:`assembly.solvers.conic.minimise_energy`.
+            method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
         Returns:
             The height with the point that attains it; infinite where the platform
@@ -225,7 +225,7 @@ def reachable_screws(
     """Return the set of platform screws that an assumption of (27) leaves possible.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         energy_budget: eta of assumption ``"budget"``, >= 0.
 
@@ -370,7 +370,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     """Return the clearances whose constraint is active, by strict complementarity.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         joints: the virtual joints whose columns are judged.
 
     Returns:
