@@ -103,7 +103,7 @@ class LinkStiffness:
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Entries divided by sqrt(K_ii K_jj), so that rotations and translations compare.
+    """Return entries over sqrt(K_ii K_jj), to compare rotations with translations.
 
     Args:
         matrix: (6, 6) a stiffness, or a difference of two.
@@ -120,7 +120,7 @@ def check_definite(who: str, matrix: NDArray) -> None:
     """Refuse what is not a stiffness or a compliance.
 
     Args:
-        who: whose matrix it is, for the message.
+        who: owner of the matrix, for the error message.
         matrix: (6, 6).
 
     Raises:

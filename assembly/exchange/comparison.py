@@ -83,7 +83,7 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with what another program reads in its file.
 
     Args:
-        mechanism: as it was read or written.
+        mechanism: mechanism as it was read or written.
         path: path of the file.
 
     Returns:

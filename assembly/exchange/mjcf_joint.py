@@ -54,7 +54,7 @@ def one_freedom(
         name: name of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
-        angles: of the file.
+        angles: unit of angles in the file.
 
     Returns:
         The joint, without its bodies.

@@ -165,7 +165,7 @@ def body_of(
     Args:
         name: name of the body.
         written: [kg] and (3,) [m], None without ``inertial``.
-        shapes: the same of each shape.
+        shapes: [kg] and (3,) [m] of each shape.
         rules: rules of the file.
 
     Returns:

@@ -30,7 +30,7 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with MuJoCo's reading of its file, in this process.
 
     Args:
-        mechanism: as it was read or written.
+        mechanism: mechanism as it was read or written.
         path: path of a URDF or MJCF file.
 
     Returns:

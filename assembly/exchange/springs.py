@@ -29,7 +29,7 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
 
 
 def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return, in words, springs that are not converted.
+    """Return texts on springs that are not converted.
 
     Args:
         mechanism: mechanism at home.

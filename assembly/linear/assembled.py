@@ -261,7 +261,7 @@ class Assembly(Solution[N]):
         )
 
     def closure_residual(self) -> N:
-        """(...) largest closure error, of abs(rad) and of abs(m) / reference length."""
+        """Return (...) largest closure error: abs(rad), abs(m) / reference length."""
         return self._residual
 
     @cached_property
@@ -270,7 +270,7 @@ class Assembly(Solution[N]):
         return plain(residual.max(axis=-1, initial=0.0))
 
     def clearance_excess(self, compliant: Compliant = "elastic") -> N:
-        """(...) [-] largest excess of a clearance over its cone, relative to it."""
+        """Return (...) [-] largest relative excess of a clearance over its cone."""
         if compliant == "elastic" and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, compliant)
@@ -309,7 +309,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """(...) [J] certified bound of the energy above the least possible."""
+        """Return (...) [J] certified bound of the energy above the least possible."""
         return self._gap
 
     @cached_property
@@ -317,7 +317,7 @@ class Assembly(Solution[N]):
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> N:
-        """(...) [-] duality gap over energy, or over 1e-4 of that without clearance."""
+        """Return (...) [-] duality gap over energy, or 1e-4 of that at no clearance."""
         # inside an assembly zone the least energy is zero, so a floor replaces it
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))

@@ -106,7 +106,7 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
     Args:
         assembly: assembly of least energy.
-        bound: of its platform screw.
+        bound: bound of the platform screw's error.
 
     Returns:
         A sentence for each half whose error may exceed 1e-5 rad or m plus 1e-3 of it.

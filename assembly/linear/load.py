@@ -98,7 +98,7 @@ def loads_on_frames(
     """Return the loads on all small screws of a robot.
 
     Args:
-        posture: where it stands, of n frames; or many postures.  Leading dimensions, of
+        posture: configuration of a robot of n frames; or many.  Leading dimensions, of
             its transforms (..., n, 4, 4) and of all shapes here, are broadcast.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.

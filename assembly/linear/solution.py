@@ -137,7 +137,7 @@ class Solution(PointResults, Generic[N]):
         """Return many points with the columns of other virtual joints.
 
         Args:
-            joints: those of some of the points in ``apart``.
+            joints: virtual joints of some points in ``apart``.
 
         Returns:
             The same points; NaN for clearances and motions of all others.

@@ -23,7 +23,7 @@ class SolverLimits(NamedTuple):
     Attributes:
         relative: required gap, relative to |G u + h|^2 / 2 ..
         absolute: .. plus this.
-        first_sigma: of Newton's method, times the mean |G_k^T h|.
+        first_sigma: first sigma of Newton's method, times the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
 

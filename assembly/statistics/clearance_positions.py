@@ -52,7 +52,7 @@ def position_clearances(
         prepared: the posture.
         draws: k of them, by the posture's ``solve``.
         clearance_model: one of :data:`CLEARANCE_MODELS` except the worst.
-        generators: of random numbers, one for each draw; not used for "least".
+        generators: random number generators, one for each draw; not used for "least".
         contact_length: [m] of the contact model, see :func:`contact_length_of`.
 
     Returns:

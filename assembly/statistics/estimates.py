@@ -107,7 +107,7 @@ def most_probable(
     Args:
         values: (k,) a sample.
         level: level of confidence.
-        positive: of sizes: the kernel is reflected at zero.
+        positive: whether the samples are sizes; the kernel is then reflected at zero.
         seed: seed of the bootstrap.
 
     Returns:

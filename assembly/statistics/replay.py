@@ -28,7 +28,7 @@ class Replay:
     """Results stored so far.
 
     Attributes:
-        journal: of records :data:`RECORD`; None to store nothing.
+        journal: journal of records :data:`RECORD`; None to store nothing.
         asked: number of results requested.
     """
 

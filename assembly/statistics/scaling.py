@@ -32,7 +32,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 
     Args:
         requirement: limits at all postures.
-        stream: of random numbers.
+        stream: stream of random numbers.
         times: multiple of the plan's draws.
 
     Returns:

@@ -117,7 +117,7 @@ def verify_yield(
         t: (G,) [rad or m] tolerances.
         fresh: number of draws, used only here.
         progress: called with the name of a step, its progress and its total.
-        stream: of random numbers.
+        stream: stream of random numbers.
         level: level of confidence of the interval.
 
     Returns:

@@ -61,7 +61,7 @@ class StoredDataset(NamedTuple):
 
     Attributes:
         data_vars: variables by name, coordinates left out.
-        attrs: of the whole data set.
+        attrs: attributes of the whole data set.
     """
 
     data_vars: dict[str, Stored]

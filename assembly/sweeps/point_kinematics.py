@@ -32,7 +32,7 @@ def note_geometry(
         goals: (k, 6) or (k, n) of the k postures, as they were reached.
         postures: the postures reached.
         rows: indices of each posture's records.
-        records: of the points, to fill.
+        records: records of the points, to fill.
         near_singularity: by row, the names of nearby singularities, to fill.
 
     Returns:

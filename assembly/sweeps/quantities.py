@@ -87,7 +87,7 @@ class Variable:
     Attributes:
         dims: axes in addition to those of the points, with their labels.
         unit: unit of the numbers.
-        meaning: for ``long_name``.
+        meaning: text for ``long_name``.
     """
 
     dims: Mapping[str, tuple[str, ...]]

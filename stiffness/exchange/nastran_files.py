@@ -96,11 +96,11 @@ def _terms(
 ) -> list[tuple[Freedom, float]]:
     """Return rows and values of a column's terms.
 
-    A term is node, direction, real part, imaginary part.
+    A term has a node, direction, real part and imaginary part.
 
     Args:
         path: path of the file, for error messages.
-        fields: of one line, after those that name the column.
+        fields: fields of a line, after those that name the column.
         packed: whether fields are separated by blanks, so that no field is empty and
             there is no imaginary part.
 

@@ -22,7 +22,7 @@ class Campaign:
 
     Attributes:
         name: name of the campaign, that of its folder.
-        robot: as declared.
+        robot: robot as declared.
         ids: R labels, unique.
         coordinates: (R, n) [rad or m] of every joint, nominal closure solved.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.

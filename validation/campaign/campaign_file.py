@@ -158,7 +158,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     """Return the campaign of a declaration, with a robot.
 
     Args:
-        declared: what the file says.
+        declared: value in the file.
         robot: the robot for the commands.
         measured: whether every row must have a measurement.
 

@@ -80,7 +80,7 @@ def read_table(
 
     Args:
         path: a CSV file with a header.
-        robot: whose actuated joints may be columns.
+        robot: robot with actuated joints that may be columns.
         dialect: format of the table.
         points: names of further points measured.
 

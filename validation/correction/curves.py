@@ -234,7 +234,7 @@ def figure_of(curves: list[Curve]) -> "Figure":
     """Return a figure with each curve in a panel, with twice its standard deviation.
 
     Args:
-        curves: of :func:`curves_of`, at least one.
+        curves: result of :func:`curves_of`, at least one curve.
 
     Returns:
         The figure.

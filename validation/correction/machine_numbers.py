@@ -37,7 +37,7 @@ class MachineNumbers:
     """Numbers of a saved robot that do not belong to a session.
 
     Attributes:
-        robot: as saved.
+        robot: robot as saved.
         numbers: m of them.
         root: (m, r) factor of their covariance.
     """

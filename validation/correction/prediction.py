@@ -204,7 +204,7 @@ def reading_table(predicted: PredictedReadings) -> str:
     """Return predicted readings as a table: ``id`` and a campaign's reading columns.
 
     Args:
-        predicted: of any commands.
+        predicted: predicted readings of any commands.
 
     Returns:
         CSV; a cell is empty without a solution.  If the robot's file has uncertainties,

@@ -124,7 +124,7 @@ def session_unknowns(
     """Return the numbers to be fitted in a session.
 
     Args:
-        robot: as saved, with the values of its original session.
+        robot: robot as saved, with the values of its original session.
         fitted: names in :data:`OF_A_SESSION`.
         clock: whether the session's rows have a time.
 

@@ -22,9 +22,9 @@ class Pair:
 
     Attributes:
         scale: factor on errors and load.
-        linear: of the virtual-joint model.
-        simulated: of the simulation.
-        exact: of the virtual-joint model with finite rotations, None if there is none.
+        linear: result of the virtual-joint model.
+        simulated: result of the simulation.
+        exact: result of the virtual-joint model with finite rotations, or None.
         between: [J] energy of distributed weights in the simulation's beams, which the
             linear model does not contain.
         holding: the linear model with the springs of :func:`hold_free_motions`, to

@@ -70,7 +70,7 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values: ``passed`` if all reachable poses did, at least one."""
+    """Return plain values; ``passed`` is true if all of the reached poses passed."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}

@@ -41,7 +41,7 @@ class LackOfFit:
         repeats_freedom: [-] its degrees of freedom.
         against_repeats: probability of a residual as large by noise of the repeats'
             scatter.
-        common: whether noise that points of one measurement share was estimated from
+        common: whether the noise common to points of one measurement was estimated from
             the residual itself; repeats must then show it too.
     """
 

@@ -51,7 +51,8 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: of the best model, first the measuring frame if it is unknown.
+        hypotheses: hypotheses of the best model, first the measuring frame if it is
+            unknown.
         values: (k,) estimates of their unknowns, in the order of the hypotheses.
         functions: functions of the best model.
         small: geometric errors and springs in use.

@@ -79,7 +79,7 @@ class Stage:
     """A model of the sequence on the rows of one fold.
 
     Attributes:
-        unknowns: as in :class:`Step`.
+        unknowns: unknowns as in :class:`Step`.
         residual: (R, 6) [rad, m] of the fold's rows, NaN elsewhere.
     """
 

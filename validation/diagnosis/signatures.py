@@ -123,7 +123,7 @@ class Tangents:
 
     Attributes:
         campaign: campaign of R rows, N measured cells.
-        derivatives: of the readings in its rows.
+        derivatives: derivatives of the readings in its rows.
         declared: (N,) readings without effects, whitened.
     """
 

@@ -46,7 +46,7 @@ def match(
 
     Args:
         readings: readings in the order taken.
-        commands: in the order given.
+        commands: commands in the order given.
         targets: their names.
         window: [s] between a command and its readings.
 

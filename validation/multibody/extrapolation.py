@@ -23,7 +23,7 @@ def without_squares(
 
     Args:
         steps: k of them, falling.
-        differences: of the same shape, one for each step.
+        differences: values of the same shape, one for each step.
 
     Returns:
         k - 1 arrays, without the error of the step's square.

@@ -260,7 +260,7 @@ def simulated_frequencies(
         posture: as in :func:`simulate_assembly`; links with a section are beams with
             consistent masses, the others must be given by a matrix and have none.
         count: largest number.
-        elements: of each beam.
+        elements: number of elements of each beam.
 
     Returns:
         (k,) [Hz] lowest first; free motions are held by 1e-6 N m/rad or N/m.

@@ -31,8 +31,8 @@ class CampaignDesign:
             prismatic one this times ``size``.
         size: [m] length for ``reach``.
         load: [N] largest force on the platform.
-        levels: of the load: ``"many"`` sizes and directions; ``"one"``: always the
-            same force.
+        levels: levels of the load: ``"many"`` sizes and directions; ``"one"``: always
+            the same force.
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
         command: ``"joints"`` or ``"pose"``, the form of commands in the file.

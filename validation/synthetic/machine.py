@@ -36,7 +36,7 @@ class Hidden:
 
     Attributes:
         name: public name, or one that begins with an underscore.
-        parameters: as in the public formats.
+        parameters: parameters as in the public formats.
     """
 
     name: str

@@ -312,7 +312,7 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """[-] a threshold plus the rounding of the nominal closures."""
+        """Return [-] a threshold plus the rounding error of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
