@@ -1,29 +1,29 @@
-"""forcefit: forced assembly of parallel manipulators, and the proof of each number.
+"""forcefit: assembly of parallel manipulators by force, with independent checks.
 
-``import forcefit as ff; ff.load_robot("irsbot2")``: every public name, each imported
-when it is first asked for.  Files come in through :mod:`forcefit.inputs`; the commands
-are :mod:`forcefit.commands`.
+``import forcefit as ff; ff.load_robot("irsbot2")`` loads a robot.  Each public name is
+imported at its first use.  Files are read by :mod:`forcefit.inputs`; the commands are
+in :mod:`forcefit.commands`.
 """
 
 import os.path
 import sys
 
-TYPE_CHECKING = False  # importing typing takes longer than all that is done here
+TYPE_CHECKING = False  # importing typing takes longer than the rest of this module
 if TYPE_CHECKING:
     __version__: str
 
-_MARK = 'DISTRIBUTION = "forcefit"'  # in each package's __init__.py
+_MARK = 'DISTRIBUTION = "forcefit"'  # text in each package's __init__.py
 _BESIDE = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
 
 def _refuse_namesakes() -> None:
-    """Refuse to begin where one of the packages is another distribution's.
+    """Raise an error if one of the packages belongs to another distribution.
 
-    Their names are words that others use too: what is first on the path is imported,
-    and in one folder the last one installed has written over the first.
+    Other distributions use the same names of packages.  Python imports the first one on
+    the path; in one folder the last installation overwrites the first.
 
     Raises:
-        ImportError: it says where the other one is.
+        ImportError: names the file of the other distribution.
     """
     for name in ("stiffness", "assembly", "validation"):
         found = _place_of(name)
@@ -37,13 +37,14 @@ def _refuse_namesakes() -> None:
 
 
 def _place_of(name: str) -> str:
-    """First file of the package that would be imported, or ``"nothing"``.
+    """Return first file of the package that Python would import, or ``"nothing"``.
 
     Args:
-        name: of the package.
+        name: name of the package.
 
     Returns:
-        The path; ``importlib.util``, which could say it, takes long to import.
+        The path; the import of ``importlib.util``, which has such a function, takes
+        long.
     """
     for finder in sys.meta_path:
         spec = finder.find_spec(name, None)
@@ -53,14 +54,14 @@ def _place_of(name: str) -> str:
 
 
 def _is_ours(file: str) -> bool:
-    """Whether a package's first file is of forcefit."""
+    """Return whether a package's first file is of forcefit."""
     with open(file, encoding="utf-8", errors="replace") as text:
         return _MARK in text.read()
 
 
 _refuse_namesakes()
 
-# where each public name is defined: the whole of the interface
+# module and public names that it defines: the whole interface
 _OWNERS = {
     "forcefit.inputs.errors": ("BadInput",),
     "stiffness.beam.beam": ("beam_compliance",),
@@ -101,8 +102,8 @@ _OWNERS = {
     "validation.study.study": ("run_study",),
     "validation.study.study_file": ("read_study",),
 }  # fmt: skip
-# public names of the last release, which work in this one: the new public name; and
-# module and name of the object, where that is another
+# old public names of the last release, still valid: the new public name, or the module
+# and the name of the object in it
 _RENAMED = {
     "foretell": ("predict",), "load_deflection": ("deflection_curve",),
     "read_robot": ("load_robot",),
@@ -135,7 +136,7 @@ __all__ = [*sorted(_OWNER_OF), "__version__"]
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is first needed; an old one with a warning."""
+    """Import a public name at its first use; give a warning for an old name."""
     if name == "__version__":
         return _version()
     if name not in _OWNER_OF and name not in _RENAMED and name not in _MOVED_TO:
@@ -157,12 +158,12 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """The public names and nothing else."""
+    """Return the public names and nothing else."""
     return __all__
 
 
 def _version() -> str:
-    """Of the installed package: the last tag and the commits since, when installed."""
+    """Return version of the installed package: last tag and the commits since."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -1,7 +1,7 @@
 """Stiffness of a link: its 6 x 6 matrix K_E, from beams and from finite elements.
 
-Begin at ``link.py``, which defines a link's stiffness; then ``beam/beam.py`` and
+Begin with ``link.py``, which defines a link's stiffness; then ``beam/beam.py`` and
 ``fem/fea.py``, the two methods that compute it.
 """
 
-DISTRIBUTION = "forcefit"  # package name that `import forcefit` looks for
+DISTRIBUTION = "forcefit"  # text by which ``import forcefit`` recognises the package

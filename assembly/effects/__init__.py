@@ -59,7 +59,7 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
     """Return the conditions with effects added.
 
     Args:
-        conditions: without them.
+        conditions: conditions without them.
         effects: parameters by their public names, by effect.
 
     Returns:
@@ -81,8 +81,8 @@ def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
     """Return the conditions with all effects that a robot's file declares.
 
     Args:
-        conditions: of the robot without effects, R rows.
-        robot: with these effects.
+        conditions: conditions of the robot without effects, R rows.
+        robot: robot with these effects.
 
     Returns:
         Conditions with its effects, those of each session, and its functions.

@@ -22,7 +22,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
     Args:
         declared: parameters by their public names, by effect.
-        found: of effects that act after the declared ones, in the same form.
+        found: parameters of effects that act after the declared ones, likewise.
 
     Returns:
         Parameters of every effect that are equivalent to both in sequence.

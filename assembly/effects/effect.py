@@ -15,8 +15,9 @@ class Unknown:
     """An unknown of the fit, in a form in which the model is nearly linear.
 
     Attributes:
-        name: of a parameter, or of a part of one.  For an effect that acts at frames it
-            is appended to a frame's name (``""`` if the frame's name suffices).
+        name: name of a parameter, or of a part of one.  For an effect that acts at
+            frames it is appended to a frame's name (``""`` if the frame's name
+            suffices).
         scale: plausible size, in the unit of the parameter or of the part.
         lower: physical lower bound.
         upper: physical upper bound.
@@ -47,7 +48,7 @@ class Effect:
         name: as in the public format.
         apply: from conditions without the effect and parameters by their public names
             (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
-        unit: of a parameter, from the robot and the parameter's public name.
+        unit: unit of a parameter, from the robot and the parameter's public name.
         frames: function of a robot that returns the frames at which it can act; None if
             it acts at none.
         device_alone: whether it is an error of the measuring device.  A function with
@@ -56,7 +57,7 @@ class Effect:
         tried: frames at which it is searched; all possible ones if absent.
         components: public parameters at each frame (``""``: the frame's name itself),
             or of the effect as a whole.
-        unknowns: of the fit: at each frame, or of the effect as a whole.
+        unknowns: unknowns of the fit: at each frame, or of the effect as a whole.
         public: from unknowns by name (a frame's name, a dot, the unknown's name) to
             parameters by their public names.
         needs: covariates without which it can be neither applied nor identified.

@@ -37,7 +37,7 @@ def parse_formula(text: str) -> ast.expr:
     """Return the tree of a formula.
 
     Args:
-        text: such as ``"a*sin(3*q) + b"``.
+        text: text such as ``"a*sin(3*q) + b"``.
 
     Returns:
         The expression, of the grammar's nodes alone.
@@ -99,7 +99,7 @@ def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
     """Return the value of a formula.
 
     Args:
-        tree: of it.
+        tree: tree of the formula.
         known: numbers or arrays (R,) by name.
 
     Returns:
@@ -132,7 +132,7 @@ def parameter_units(
     """Return the units of a formula's parameters that make its units consistent.
 
     Args:
-        tree: of the formula.
+        tree: tree of the formula.
         variables: units of its variables by name.
         result: unit that the formula must have; a bare number counts as SI.
 

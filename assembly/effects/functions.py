@@ -40,7 +40,7 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
     """Return the covariates of a robot's functions, each with the title of one.
 
     Args:
-        robot: with its functions.
+        robot: robot with its functions.
         sessions: sessions that are considered.
 
     Returns:

@@ -21,8 +21,8 @@ class AppliedEffects:
     """A posture, load and gravity with the effects of the robot's file applied.
 
     Attributes:
-        posture: of the robot with the errors, springs, clearances and foundation that
-            the effects give it.
+        posture: posture of the robot with the errors, springs, clearances and
+            foundation that the effects give it.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, None without weight.
         conditions: one row with all of these, and the errors of the measuring device.
@@ -51,7 +51,7 @@ def apply_robot_effects(
     """Apply the effects of a robot's file at one posture.
 
     Args:
-        posture: of the robot as declared.
+        posture: posture of the robot as declared.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes, added to that of the effects.
         covariates: ``temperature`` [K] above calibration, ``time`` [s], ``approach``,
@@ -94,7 +94,7 @@ def check_covariates(
     """Refuse effects that cannot be applied under the covariates given.
 
     Args:
-        robot: with the effects of its file.
+        robot: robot with the effects of its file.
         given: covariates by name.
         finite: whether the exact model is used.
 

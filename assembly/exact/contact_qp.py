@@ -108,7 +108,7 @@ def clearance_step(
     Args:
         problem: the quadratic problem.
         near: whether the solution is near enough to try Newton's method.
-        method: of :func:`assembly.solvers.conic.minimise_energy`.
+        method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances

@@ -220,7 +220,7 @@ def advance(
         penalty: [N m] on the norm of the scaled residual; above the multipliers'.
         damping: [J/rad^2] of the last step.
         near: whether Newton's method is tried for the clearances.
-        method: of :func:`assembly.exact.contact_qp.clearance_step`.
+        method: method of :func:`assembly.exact.contact_qp.clearance_step`.
 
     Returns:
         The step.

@@ -113,11 +113,12 @@ class ExactAssembly:
         whole: the robot's nominal configuration, with uncut beams.
         cut: the robot with beams cut into pieces, and the map to its frames.
         linear: the linear model's solution, the start of the steps.
-        expansion: of the problem here, with the multipliers of the scaled closures.
+        expansion: expansion of the problem at the solution, with the multipliers of the
+            scaled closures.
         stationarity: [-] largest relative imbalance of an unknown.
         iterations: number of steps.
-        method: of all cone programmes: ``"compiled"``, with Clarabel in doubt; or
-            ``"reference"``, numpy and Clarabel alone.
+        method: method of all cone programmes: ``"compiled"``, with Clarabel in doubt;
+            or ``"reference"``, numpy and Clarabel alone.
     """
 
     whole: Posture
@@ -288,7 +289,7 @@ class ExactAssembly:
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
-        """Largest of abs(rad) and abs(m) / reference length left open in a closure."""
+        """Return largest of abs(rad), abs(m) / reference length open in a closure."""
         return float(np.abs(self.placement.residual).max(initial=0.0))
 
     def clearance_excess(self) -> float:
@@ -322,8 +323,8 @@ def solve_exact(
         point: (3,) [m] of the platform, in its axes; the force moves with it.
         near: an equilibrium of the same posture under another load, used as the start.
         progress: function called with the steps taken and their largest number.
-        method: of the linear solution and of every step: ``"compiled"``, with Clarabel
-            in doubt; or ``"reference"``, numpy and Clarabel alone.
+        method: method of the linear solution and of every step: ``"compiled"``, with
+            Clarabel in doubt; or ``"reference"``, numpy and Clarabel alone.
 
     Returns:
         The assembled manipulator: closed, stationary, within its cones.

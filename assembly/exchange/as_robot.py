@@ -53,7 +53,7 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
     """Return a mechanism with a ball joint in each loop that meets in a point.
 
     Args:
-        mechanism: of n joints.
+        mechanism: mechanism of n joints.
         home: (n,) [rad or m] coordinates at which its loops close.
 
     Returns:
@@ -89,7 +89,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     """Return the robot of a mechanism.
 
     Args:
-        mechanism: at home, with loops that constrain all six directions.
+        mechanism: mechanism at home, with loops that constrain all six directions.
 
     Returns:
         The robot, with the mechanism and the bodies' places.
@@ -221,7 +221,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
     """Return the mechanism of a robot: rigid, without clearance and errors.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         home: (n,) [rad or m] coordinates at home.
 
     Returns:

@@ -14,7 +14,7 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
     angle. The rotation at home therefore goes into the joint's placement.
 
     Args:
-        joints: at home.
+        joints: joints at home.
 
     Returns:
         The same joints in the same pose.  Only the coordinates of balls differ that a

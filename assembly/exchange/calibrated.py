@@ -19,7 +19,7 @@ def with_calibration(home: Posture) -> Robot:
     """Return the robot whose nominal geometry is the calibrated one.
 
     Args:
-        home: of the declared robot, with its geometric errors and effects.
+        home: home pose of the declared robot, with its geometric errors and effects.
 
     Returns:
         The robot with geometric errors and constant effects included in its frames, and

@@ -83,8 +83,8 @@ def compare(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with what another program reads in its file.
 
     Args:
-        mechanism: as it was read or written.
-        path: of the file.
+        mechanism: mechanism as it was read or written.
+        path: path of the file.
 
     Returns:
         The comparison, or the reason why none was made.

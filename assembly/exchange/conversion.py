@@ -14,7 +14,7 @@ class Conversion:
     """Result of the conversion of a robot.
 
     Attributes:
-        robot: as in the robot file that was written or read.
+        robot: robot of the robot file that was written or read.
         files: the files written.
         open_before: [rad, m] mismatch of the loops at the file's own home.
         open_after: [rad, m] mismatch of the loops at the home that was computed.

@@ -51,8 +51,8 @@ def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, .
     """Return the couplings sorted so that a leader's own coupling comes first.
 
     Args:
-        couplings: in any order.
-        file: for messages.
+        couplings: couplings in any order.
+        file: name of the file, for error messages.
 
     Returns:
         The couplings.

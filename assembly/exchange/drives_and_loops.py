@@ -23,7 +23,7 @@ def with_loops(
     """Return the mechanism with loops, drives, platform and home of a loops file.
 
     Args:
-        mechanism: as in its own file.
+        mechanism: mechanism of the file.
         loops: the loops file, None without one.
         parts: the file's joints, with the names of the joints made of each.
         driven: joints that the robot's own file declares as driven.
@@ -129,7 +129,7 @@ def _couplings_said(
 def _retyped(
     mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
 ) -> tuple[Mechanism, dict[str, list[str]]]:
-    """Return joints with their declared type that a CAD export wrote as a rotation."""
+    """Return joints with their declared types, which a CAD export had lost."""
     bodies, joints = dict(mechanism.bodies), list[Joint]()
     now = {name: list(several) for name, several in parts.items()}
     for joint in mechanism.joints:

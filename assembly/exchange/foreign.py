@@ -106,7 +106,7 @@ def _closed(
     """Return the mechanism with a home in which its loops close.
 
     Args:
-        mechanism: as it was read.
+        mechanism: mechanism as it was read.
         source: its file.
         beside: the loops file if its types may be generated defaults: its loops become
             points if they cannot close otherwise.  Else None.

@@ -40,8 +40,8 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
     random starts (always the same) follow, each farther away.
 
     Args:
-        mechanism: of n joints.
-        file: for messages.
+        mechanism: mechanism of n joints.
+        file: name of the file, for error messages.
 
     Returns:
         (n,) [rad or m] the coordinates, and whether the drives have the file's
@@ -80,7 +80,7 @@ def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, b
     """Return coordinates near the file's own with the least mismatch of the loops.
 
     Args:
-        mechanism: of n joints.
+        mechanism: mechanism of n joints.
         starts: number of random starts, in addition to the file's own coordinates.
 
     Returns:

@@ -111,7 +111,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
     """Return loops with some declared as points, independent of their type.
 
     Args:
-        loops: of a file.
+        loops: loops of a file.
         names: ``loop1`` for the first, or the name of either end; ``all``.
 
     Returns:

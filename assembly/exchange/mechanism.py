@@ -75,7 +75,7 @@ class Loop:
     """Two places on two bodies that coincide.
 
     Attributes:
-        name: of the loop.
+        name: name of the loop.
         first: name of the one body.
         second: name of the other.
         at_first: (4, 4) pose of the place in the first body.
@@ -96,9 +96,9 @@ class Mechanism:
     """A tree of bodies from its root, and loops.
 
     Attributes:
-        name: of the robot.
+        name: name of the robot.
         root: name of the fixed body.
-        bodies: by name; the root is one of them.
+        bodies: bodies by name; the root is one of them.
         joints: parents first.
         loops: pairs of places that meet.
         platform: name of a body, None if the file has none.
@@ -132,9 +132,9 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
     """Return the root of a tree, and its joints sorted so that parents come first.
 
     Args:
-        joints: in any order.
+        joints: joints in any order.
         bodies: all of them.
-        file: for messages.
+        file: name of the file, for error messages.
 
     Returns:
         Name of the root, and the joints.
@@ -184,7 +184,7 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
     """Return the poses of all bodies.
 
     Args:
-        mechanism: of n joints.
+        mechanism: mechanism of n joints.
         coordinates: (n,) [rad or m] of all joints, in their order.
 
     Returns:
@@ -212,7 +212,7 @@ def chain(
     """Return a joint of several freedoms as joints of one, with bodies without mass.
 
     Args:
-        name: of the whole joint; each part adds its own name to it.
+        name: name of the whole joint; each part adds its own name to it.
         parent: body it stands on.
         child: body it carries.
         placement: (4, 4) seen from the parent.

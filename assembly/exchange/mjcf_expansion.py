@@ -39,7 +39,7 @@ def expanded(root: Node, depth: int = 0) -> Node:
     """Return an MJCF file as one in which every body is written out.
 
     Args:
-        root: of the file, changed in place.
+        root: root of the file, changed in place.
         depth: number of files that include it.
 
     Returns:

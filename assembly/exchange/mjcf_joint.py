@@ -19,7 +19,7 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
 
     Args:
         given: the element, defaults filled in.
-        name: of the joint.
+        name: name of the joint.
         kind: ``"ball"`` or ``"free"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
 
@@ -51,10 +51,10 @@ def one_freedom(
 
     Args:
         given: the element, defaults filled in.
-        name: of the joint.
+        name: name of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
         offset: (4, 4) of the frame in which it is written, seen from the body.
-        angles: of the file.
+        angles: unit of angles in the file.
 
     Returns:
         The joint, without its bodies.
@@ -99,7 +99,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
 
     Args:
         key: the element.
-        joint: of one freedom, or the first of a ball or free joint.
+        joint: joint of one freedom, or the first of a ball or free joint.
         values: one number, a quaternion, or a position and a quaternion.
 
     Returns:

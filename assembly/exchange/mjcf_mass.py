@@ -99,7 +99,7 @@ def shape_mass(
     Args:
         geom: the element, defaults filled in.
         T: (4, 4) pose in its body.
-        rules: of the file.
+        rules: rules of the file.
 
     Returns:
         Mass and centre.
@@ -163,10 +163,10 @@ def body_of(
     """Return a body from its written mass and its shapes.
 
     Args:
-        name: of the body.
+        name: name of the body.
         written: [kg] and (3,) [m], None without ``inertial``.
-        shapes: the same of each shape.
-        rules: of the file.
+        shapes: [kg] and (3,) [m] of each shape.
+        rules: rules of the file.
 
     Returns:
         The body.

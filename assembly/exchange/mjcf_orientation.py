@@ -46,7 +46,7 @@ def orientation(node: Node, angles: Angles) -> NDArray:
     """Return the (3, 3) orientation of an element; the identity if it has none.
 
     Args:
-        node: with one of quat, axisangle, euler, xyaxes, zaxis.
+        node: node with one of quat, axisangle, euler, xyaxes, zaxis.
         angles: conventions of its file.
 
     Returns:
@@ -85,7 +85,7 @@ def site_pose(node: Node, angles: Angles) -> NDArray:
     """Return the (4, 4) pose of a site or shape, which two ends may define.
 
     Args:
-        node: with ``pos`` and an orientation, or ``fromto``.
+        node: node with ``pos`` and an orientation, or ``fromto``.
         angles: conventions of its file.
 
     Returns:

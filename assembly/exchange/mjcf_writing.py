@@ -16,7 +16,7 @@ def mjcf_text(mechanism: Mechanism) -> str:
     """Return the text of an MJCF file.
 
     Args:
-        mechanism: with children in their joints' own frames.
+        mechanism: mechanism with children in their joints' own frames.
 
     Returns:
         The text.  In MuJoCo a moving body needs a mass, so the compiler sets the

@@ -30,8 +30,8 @@ def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
     """Compare a mechanism with MuJoCo's reading of its file, in this process.
 
     Args:
-        mechanism: as it was read or written.
-        path: of a URDF or MJCF file.
+        mechanism: mechanism as it was read or written.
+        path: path of a URDF or MJCF file.
 
     Returns:
         The comparison, or the reason why none was made.

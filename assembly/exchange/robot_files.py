@@ -23,8 +23,8 @@ def load_robot(
     """Return a built-in robot by its name, or the robot of a file of any kind.
 
     Args:
-        name: such as ``"irsbot2"``, or the path of a robot file, a URDF (with its loops
-            next to it), MJCF or SDF file.
+        name: name such as ``"irsbot2"``, or the path of a robot file, a URDF (with its
+            loops next to it), MJCF or SDF file.
         close: function that makes the closures of a declared robot hold, as
             :mod:`assembly.kinematics.closing` does; none if absent.
         links: whether links given by a mesh or a library are solved or read now, which

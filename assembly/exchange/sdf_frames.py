@@ -31,7 +31,7 @@ class Named:
     """An element with a pose, and the prefix of names in its model.
 
     Attributes:
-        node: of a link, joint, frame or model.
+        node: node of a link, joint, frame or model.
         scope: prefix: empty in the outermost model, such as ``"arm::"`` in a nested
             one, ``"world::"`` in the world around it.
         old: whether axes are seen from the model, as in old versions of the format.
@@ -252,7 +252,7 @@ def word(node: Node, tag: str) -> str:
 
     Args:
         node: a joint.
-        tag: of the element.
+        tag: tag of the element.
 
     Returns:
         The name.

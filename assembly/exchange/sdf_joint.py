@@ -32,7 +32,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
     """Return links of a joint's parent and child, which may name attached frames.
 
     Args:
-        frames: of the model.
+        frames: frames of the model.
         named: the joint.
 
     Returns:
@@ -61,8 +61,8 @@ def joint_parts(
     """Return a joint as joints of one freedom, from child to parent if backwards.
 
     Args:
-        frames: of the model.
-        name: of the joint.
+        frames: frames of the model.
+        name: name of the joint.
         named: its element.
         ends: links of parent and child.
         carried: name of the body on it.
@@ -150,8 +150,8 @@ def joint_couplings(
     """Return the couplings of a joint's axes (``<mimic>``).
 
     Args:
-        frames: of the model.
-        name: of the joint.
+        frames: frames of the model.
+        name: name of the joint.
         named: its element.
         parts: names of the joints of one freedom by that of the whole.
 

@@ -27,8 +27,8 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
     """Return a link's body, and the assumption if the file has no mass.
 
     Args:
-        frames: of the model.
-        name: of the link.
+        frames: frames of the model.
+        name: name of the link.
         named: the link.
 
     Returns:

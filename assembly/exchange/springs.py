@@ -14,7 +14,7 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
     """Return stiffnesses of passive joints whose springs have no load at home.
 
     Args:
-        mechanism: at home.
+        mechanism: mechanism at home.
 
     Returns:
         (6, 6) [N m/rad .. N/m] by joint, rigid except along the joint's own motion.
@@ -29,10 +29,10 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
 
 
 def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return, in words, springs that are not converted.
+    """Return texts on springs that are not converted.
 
     Args:
-        mechanism: at home.
+        mechanism: mechanism at home.
 
     Returns:
         A line for springs at drives, and a line for springs under load at home.

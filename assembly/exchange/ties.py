@@ -41,7 +41,7 @@ def may_tie(node: Node, names: Container[str]) -> str:
 
     Args:
         node: an element that is not converted.
-        names: of joints and bodies.
+        names: names of joints and bodies.
 
     Returns:
         The words to be added to its name.

@@ -37,7 +37,7 @@ def with_closing_joints(
     """Return the mechanism with the loops of its own file.
 
     Args:
-        mechanism: of the file's links and joints.
+        mechanism: mechanism of the file's links and joints.
         root: the file's element.
         parts: names of the joints of one freedom by that of the whole joint; those of
             closing joints are added.

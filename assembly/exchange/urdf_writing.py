@@ -15,7 +15,7 @@ def urdf_text(mechanism: Mechanism) -> str:
     """Return the text of a URDF.
 
     Args:
-        mechanism: with children in their joints' own frames (``after`` is the
+        mechanism: mechanism with children in their joints' own frames (``after`` is the
             identity), as for robots of frames.
 
     Returns:

@@ -123,7 +123,7 @@ class Node:
         Args:
             key: its name; empty for the element's own text.
             count: number of values.
-            unit: for the message.
+            unit: unit for the error message.
             default: values of an absent attribute, which is an error without a default.
 
         Returns:

@@ -16,7 +16,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
     """Return a robot with the effects of its file.
 
     Args:
-        robot: of the same file, without them.
+        robot: robot of the same file, without them.
         tables: every ``[[effect]]``.
 
     Returns:

@@ -39,7 +39,7 @@ def read_function(table: Table, robot: Robot) -> Function:
 
     Args:
         table: an ``[[effect]]`` whose name is ``function``.
-        robot: of the same file.
+        robot: robot of the same file.
 
     Returns:
         The function, completely checked.

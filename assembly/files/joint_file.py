@@ -17,7 +17,7 @@ def read_clearance(table: Table) -> Clearance | None:
     """Return the ``clearance`` table, None if absent.
 
     Args:
-        table: of a ``[[frame]]``.
+        table: table of a ``[[frame]]``.
 
     Returns:
         The given bounds.
@@ -46,7 +46,7 @@ def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | Non
     """Return K_B as a full matrix; infinities only on its diagonal.
 
     Args:
-        table: of a ``[[frame]]``.
+        table: table of a ``[[frame]]``.
         free: row along which a passive joint moves; zeros in its row and column leave
             it free.  None if the joint is not passive.
 

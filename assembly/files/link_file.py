@@ -229,8 +229,8 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
     """Return the keys of a frame's table for its link.
 
     Args:
-        link: of a robot.
-        folder: of the file to be written; paths are made relative to it, or are
+        link: link of a robot.
+        folder: folder of the file to be written; paths are made relative to it, or are
             unchanged without it.
 
     Returns:

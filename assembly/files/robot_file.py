@@ -66,7 +66,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
 
     Args:
         root: the table; paths in it are relative to the folder of ``root.file``.
-        name: of the robot if the table has none.
+        name: name of the robot if the table has none.
         close: of :func:`read_robot`.
 
     Returns:
@@ -87,8 +87,8 @@ def declared_robot(root: Table, name: str) -> Robot:
     """Return the robot of a root table as written, without a check of its closures.
 
     Args:
-        root: of a robot file.
-        name: of the robot if the table has none.
+        root: root of a robot file.
+        name: name of the robot if the table has none.
 
     Returns:
         The robot; lengths of its beams may still be unknown.
@@ -328,7 +328,7 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
     Args:
         robot: to be written.
-        path: of the new file; relative paths of meshes and libraries are written
+        path: path of the new file; relative paths of meshes and libraries are written
             relative to its folder.
 
     Raises:
@@ -356,7 +356,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
     Args:
         robot: any.
-        folder: of the file to be written, to which paths are made relative.
+        folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
         Plain values; :func:`robot_of` reads them back to the same robot.
@@ -386,8 +386,8 @@ def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
     """Return the content of ``[[frame]]``, defaults left out.
 
     Args:
-        frame: of a robot.
-        folder: of the file to be written, to which paths are made relative.
+        frame: frame of a robot.
+        folder: folder of the file to be written, to which paths are made relative.
 
     Returns:
         Keys and plain values of the file format.

@@ -33,7 +33,7 @@ def solve_links(robot: Robot) -> Robot:
     """Compute the stiffness of every link that a mesh or a library gives.
 
     Args:
-        robot: as read, or made in Python.
+        robot: robot as read, or made in Python.
 
     Returns:
         The robot that solvers take; the same object if it has no such link.

@@ -65,7 +65,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
     Args:
         robot: its passive joints are moved as near to closing as possible, with drives
             at their ``position``.
-        name: of a frame in the loop that does not close.
+        name: name of a frame in the loop that does not close.
 
     Returns:
         The robot whose nominal geometry closes; with its errors it is the one given.
@@ -123,7 +123,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
     """Return a robot with drive coordinates that do not close, its drives preloaded.
 
     Args:
-        robot: with redundant drives that are elastic.
+        robot: robot with redundant drives that are elastic.
         joints: coordinates [rad or m] of drives by frame; others keep their
             ``position``.
 

@@ -29,7 +29,7 @@ def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArra
     """Return velocities of closures, drives and platform for unit joint rates.
 
     Args:
-        robot: of n frames, m of them mobile, a driven, with c closures.
+        robot: robot of n frames, m of them mobile, a driven, with c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
@@ -58,7 +58,7 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
     """Return velocities of closures for unit rates of the passive joints.
 
     Args:
-        robot: of n frames, p of them passive joints, with c closures.
+        robot: robot of n frames, p of them passive joints, with c closures.
         T: (k, n, 4, 4) frames seen from the base.
 
     Returns:
@@ -78,7 +78,7 @@ def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
     """Return the number of drives that the robot could lose and still be held.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
         left_open: [rad, m] closure error there: singular values of its size count as
             zero.

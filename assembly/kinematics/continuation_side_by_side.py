@@ -35,7 +35,7 @@ def follow_side_by_side(
     """Follow the robot to every target along its straight line.
 
     Args:
-        tree: of the robot.
+        tree: tree of the robot.
         start: (n,) coordinates at home.
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN where free; no rows if not given.
         held: (k, n) coordinates, NaN where free.

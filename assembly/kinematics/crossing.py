@@ -28,7 +28,7 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
     """Return which postures lie beyond a singularity, seen from home.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         target: k poses or joint coordinates that were reached from home.
         T: (k, n, 4, 4) frames there.
 

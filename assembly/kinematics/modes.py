@@ -26,7 +26,7 @@ def follow_in_mode(
     """Follow the closures from home to many targets, in a mode where modes meet.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         home: (n,) [rad or m] coordinates of the home pose.
         pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
         target: k poses or sets of coordinates.

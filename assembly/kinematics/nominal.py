@@ -60,7 +60,7 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
     """Return the screws of unit joint motions, read at the base origin.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         T: (..., n, 4, 4) frames.
 
     Returns:
@@ -104,7 +104,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
     """Follow the nominal closures from one configuration to many targets.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         start: (n,) coordinates that close.
         target: k poses or sets of held coordinates.
         guess: whether the start is a guess that need not close; then one step is made.

@@ -21,7 +21,7 @@ class CutRobot:
     """A robot whose beams are cut into pieces, each a frame.
 
     Attributes:
-        robot: of m frames, m >= n.
+        robot: robot of m frames, m >= n.
         owner: (m,) row of the frame, in the robot before the cut, to which each
             belongs.
         last: (n,) row of each original frame in the cut robot: the beam's last piece.
@@ -38,7 +38,8 @@ class CutRobot:
         """Return a posture with a frame for each piece; likewise of many postures.
 
         Args:
-            posture: of the robot before the cut, arrays (..., n) and (..., n, 4, 4).
+            posture: posture of the robot before the cut, arrays (..., n) and (..., n,
+                4, 4).
 
         Returns:
             Arrays (..., m) and (..., m, 4, 4).
@@ -63,7 +64,7 @@ def cut_beams(robot: Robot) -> CutRobot:
     """Return a robot with a frame for every piece of its beams.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         The cut robot; the same frames if no beam has several pieces.

@@ -369,7 +369,7 @@ def place_many_joints(
     """Return the postures of many sets of actuated coordinates together.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         coordinates: (k, n) [rad or m] of the joints held, NaN for those left free.
 
     Returns:

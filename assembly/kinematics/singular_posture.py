@@ -33,7 +33,7 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
     """Return whether the locked robot has more freedoms than at nearby postures.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
 
@@ -50,7 +50,7 @@ def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
     """Return the largest rank of the locked closures at a posture and near it.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates of all joints.
         T: (n, 4, 4) frames seen from the base.
 

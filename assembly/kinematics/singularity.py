@@ -112,7 +112,7 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
     """Return the distances to singularities at many postures.
 
     Args:
-        robot: of n frames; only its geometry matters.
+        robot: robot of n frames; only its geometry matters.
         transforms: (k, n, 4, 4) frames seen from the base.
 
     Returns:

@@ -27,7 +27,7 @@ def verdicts(
     """Return the status and reason of postures that were reached.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates where they were reached.
         T: (k, n, 4, 4) frames there.
@@ -68,7 +68,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
     """Describe the joints beyond their limits, by how much, and the limits.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         q: (n,) [rad or m] coordinates.
 
     Returns:
@@ -96,7 +96,7 @@ def posture_remarks(posture: Posture) -> list[str]:
     """Return remarks on a posture, a sentence each.
 
     Args:
-        posture: of a robot.
+        posture: posture of a robot.
 
     Returns:
         The operation mode where several meet at home, joints beyond their limits, and

@@ -262,7 +262,7 @@ class Assembly(Solution[N]):
         )
 
     def closure_residual(self) -> N:
-        """(...) largest closure error, of abs(rad) and of abs(m) / reference length."""
+        """Return (...) largest closure error: abs(rad), abs(m) / reference length."""
         return self._residual
 
     @cached_property
@@ -310,7 +310,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """(...) [J] certified bound of the energy above the least possible."""
+        """Return (...) [J] certified bound of the energy above the least possible."""
         return self._gap
 
     @cached_property
@@ -318,7 +318,7 @@ class Assembly(Solution[N]):
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> N:
-        """(...) [-] duality gap over energy, or over 1e-4 of that without clearance."""
+        """Return (...) [-] duality gap over energy, or 1e-4 of that at no clearance."""
         # inside an assembly zone the least energy is zero, so a floor replaces it
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))

@@ -71,7 +71,7 @@ def unproved(assembly: Assembly) -> str:
     1e-12 of the energy without clearance.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
 
     Returns:
         Sentences joined by semicolons; empty if all is proved.
@@ -105,8 +105,8 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
     Only parts of the screw that are unique are judged.
 
     Args:
-        assembly: of least energy.
-        bound: of its platform screw.
+        assembly: assembly of least energy.
+        bound: bound of the platform screw's error.
 
     Returns:
         A sentence for each half whose error may exceed 1e-5 rad or m plus 1e-3 of it.

@@ -44,7 +44,7 @@ class VirtualJoints:
     """Columns of small screws that may move in a robot, except its drives.
 
     Attributes:
-        robot: of n frames.
+        robot: robot of n frames.
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, columns that belong to links; the others are joints'.
         cones: (6n, nu) columns of bounded clearances, each the size of its bound.

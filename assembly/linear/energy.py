@@ -134,7 +134,7 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
     """Return the least energy if compliant joints turn freely about their own axis.
 
     Args:
-        assembly: of many points.
+        assembly: assembly of many points.
 
     Returns:
         The same points under the same loads, see ``own_axes_free`` of

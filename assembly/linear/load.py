@@ -98,7 +98,7 @@ def loads_on_frames(
     """Return the loads on all small screws of a robot.
 
     Args:
-        posture: where it stands, of n frames; or many postures.  Leading dimensions, of
+        posture: configuration of a robot of n frames; or many.  Leading dimensions, of
             its transforms (..., n, 4, 4) and of all shapes here, are broadcast.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] on each frame's body, at its origin, base axes.
@@ -268,7 +268,7 @@ def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDA
     """Return the wrenches at the starts of links under their own weight.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         tips: (..., n, 6) [N m, N] through each link's section at its tip.
         distributed: (..., n, 6) [N m, N] of :func:`weights_at_tips`.
 
@@ -335,7 +335,7 @@ def with_distributed(
     """Return the loads with the links' own weight recorded in ``distributed``.
 
     Args:
-        loads: with :func:`weights` among them.
+        loads: loads with :func:`weights` among them.
         posture: the robot's configuration, one or many.
         gravity: (..., 3) [m/s^2] base axes.
 

@@ -49,7 +49,7 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
     """Return the bounds of k points by the compiled search.
 
     Args:
-        assembly: of k points.
+        assembly: assembly of k points.
         asked: assumption, required widths and point.
 
     Returns:

@@ -50,10 +50,10 @@ def nearest_pose(
     """Return the assembly of the same energy whose pose deviates least.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         offset: (3,) [m] from the platform's origin to the point whose deviation is
             minimised, base axes.
-        method: of :func:`assembly.solvers.conic.minimise_energy`.
+        method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
     Returns:
         The assembly, its deviation (rotation vector [rad] and shift of the point [m])

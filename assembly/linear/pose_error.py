@@ -144,7 +144,7 @@ def bound_pose_error(
     """Bracket the largest rotation and translation error of the platform.
 
     Args:
-        assembly: of least energy, one or many, without a load for ``budget``.
+        assembly: assembly of least energy, one or many, without a load for ``budget``.
         assumption: see the head of this module.
         energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.

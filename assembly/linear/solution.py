@@ -138,7 +138,7 @@ class Solution(PointResults, Generic[N]):
         """Return many points with the columns of other virtual joints.
 
         Args:
-            joints: those of some of the points in ``apart``.
+            joints: virtual joints of some points in ``apart``.
 
         Returns:
             The same points; NaN for clearances and motions of all others.
@@ -168,7 +168,7 @@ class Solution(PointResults, Generic[N]):
 
         Args:
             rows: numbers of these, in order.
-            joints: with all such bounds as cones.
+            joints: joints with all such bounds as cones.
             parts: their ``clearances`` and ``motions`` in the columns of ``joints``.
 
         Returns:
@@ -206,7 +206,7 @@ def with_known(solution: One, known: Mapping[str, Any]) -> One:
     """Store values that are known already, so that they are not computed again.
 
     Args:
-        solution: of one point or of many.
+        solution: solution of one point or of many.
         known: values by :data:`KNOWN`; others are ignored.
 
     Returns:

@@ -72,7 +72,8 @@ class Conditions:
     """R rows of conditions of one robot; without effects, as its file declares it.
 
     Attributes:
-        robot: of n frames; its links, springs and clearances are those of all rows.
+        robot: robot of n frames; its links, springs and clearances are those of all
+            rows.
         coordinates: (R, n) [rad or m] commanded, of every joint.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.
         mismatch: (R,) [rad, m] nominal closure error left.

@@ -35,7 +35,7 @@ class History:
         """Return the side from which a variable came: -1, 1, or 0 if unknown.
 
         Args:
-            name: of the variable; ``"approach"`` is that column itself.
+            name: name of the variable; ``"approach"`` is that column itself.
 
         Returns:
             (H,) signs.  A variable at rest keeps its last direction.  Before its first
@@ -56,7 +56,7 @@ class History:
         """Return the position of a friction element that slips after a variable.
 
         Args:
-            name: of the variable.
+            name: name of the variable.
             depth: > 0 change of the variable, from the middle to an end.
 
         Returns:
@@ -80,7 +80,7 @@ class History:
         """Return a variable with a first-order lag that starts from zero at time 0.
 
         Args:
-            name: of the variable.
+            name: name of the variable.
             time_constant: [s] > 0.
             held: whether a value applies from the time of the row before, like a
                 load's; otherwise it changes linearly between rows, like a temperature.

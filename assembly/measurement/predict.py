@@ -277,7 +277,7 @@ def assemble_row(conditions: Conditions, row: int) -> Assembly | ExactAssembly:
     """Solve one row completely: every screw and wrench of the robot.
 
     Args:
-        conditions: of all rows.
+        conditions: conditions of all rows.
         row: index of the row.
 
     Returns:

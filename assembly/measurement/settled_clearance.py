@@ -92,7 +92,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
     """Return the clearance screws in units of their bounds.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         clearance_screws: (n, 6) [rad, m].
 
     Returns:

@@ -166,7 +166,7 @@ def responses_to(
 
     Args:
         flexible: at c postures.
-        columns: of (6n, s) screws, as bytes.
+        columns: columns of (6n, s) screws, as bytes.
         shape: (6n, s).
 
     Returns:
@@ -222,11 +222,11 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return the same function, cached."""
+    """Return the function of :func:`at_postures`, cached."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
-    place = np.empty_like(order)  # index of a row among those of its posture
+    place = np.empty_like(order)  # index of a row among the rows of its posture
     place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     most = int(count.max(initial=0))
 

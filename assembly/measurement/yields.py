@@ -161,7 +161,7 @@ def with_springs(conditions: Conditions, row: int) -> Conditions:
     """Return one row with its linear compliant places in series with their joints.
 
     Args:
-        conditions: of all rows.
+        conditions: conditions of all rows.
         row: its index.
 
     Returns:

@@ -104,7 +104,7 @@ class ErrorSources:
         Args:
             first: number of the first draw.
             count: number of draws.
-            seed: of all draws, below 2^64.
+            seed: seed of all draws, below 2^64.
             stream: number of the stream; streams are independent.
 
         Returns:
@@ -152,7 +152,7 @@ def draw_generator(seed: int, draw: int, stream: int) -> np.random.Generator:
     """Return the generator of the random numbers of one draw.
 
     Args:
-        seed: of all draws, below 2^64.
+        seed: seed of all draws, below 2^64.
         draw: its number.
         stream: other than those of :meth:`ErrorSources.uniforms`.
 
@@ -173,7 +173,7 @@ def tolerance_sources(
     """Return the sources within symmetric tolerances.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         tolerances: (6,) [rad, m] half widths by component, 0 for none.
         frames: names of the frames; if None, all at whose body the robot has errors or
             a link.

@@ -62,7 +62,7 @@ class Frame:
         geometric_error: (6,) [rad, m] delta l.
         tolerance: (6,) [rad, m] standard deviations of delta l about the given value, 0
             where it is exact; None if unknown.
-        clearance: of the joint, None if it has none.
+        clearance: clearance of the joint; None if it has none.
         joint_stiffness: (6, 6) K_B with ``inf`` on the diagonal where rigid, or None;
             0 along a passive joint's own motion (its row and column) leaves it free.
         link: elasticity of the body, None if rigid.

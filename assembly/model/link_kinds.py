@@ -88,7 +88,7 @@ class MeshLink:
         interface: ``"rigid"`` or ``"distributing"``.
         parts: parts of another material, as read by
             :func:`stiffness.fem.part_text.parse_part`.
-        solution: of its finite elements, None until
+        solution: solution of its finite elements, None until
             :func:`assembly.files.solved_links.solve_links`; it is not pickled.
     """
 

@@ -20,7 +20,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
     zero there, this differs from the frame's translation, and the length is stored.
 
     Args:
-        robot: as read.
+        robot: robot as read.
         home: (n,) [rad or m] joint coordinates in the home pose.
 
     Returns:

@@ -81,7 +81,7 @@ def peak_stresses(
     """Return the largest von Mises stress in every link of known stress.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         wrenches: (..., n, 6) [N m, N] of every link's spring, at its frame in its axes,
             as :attr:`assembly.linear.assembled.Assembly.wrenches`.
         at_tips: (..., n, 6) [N m, N] part of the wrenches due to the links' own weight,

@@ -23,7 +23,7 @@ def link_compliances(robot: Robot) -> NDArray:
     """Return the compliance of every body, K_E^-1 of eq. (6).
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes; zero where rigid.
@@ -69,7 +69,7 @@ def joint_compliances(robot: Robot) -> NDArray:
     """Return compliance of every joint, K_B^-1; zero where rigid, free or not given.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6, 6) [rad/(N m) .. m/N] at each frame, in its axes.

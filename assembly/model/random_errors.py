@@ -19,7 +19,7 @@ class ErrorDraw:
         frames: names of the frames that get an error, in the order of drawing.
         least: (6,) [rad, m] smallest size of each component.
         most: (6,) [rad, m] largest size.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
         signs: ``"literal"``, all positive as the paper's interval reads, or
             ``"signed"``, the same sizes with random signs.  The paper does not state
             which; the median energy differs five-fold.
@@ -39,7 +39,7 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
     from the same generator afterwards, so both conventions have equal sizes.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
         draw: frames, sizes, seed and signs.
 
     Returns:
@@ -66,7 +66,7 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
 
     Args:
         robot: any.
-        names: such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
+        names: names such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
 
     Returns:
         Full names in the robot's order.

@@ -47,7 +47,7 @@ class Robot:
     order.
 
     Attributes:
-        name: of the robot.
+        name: name of the robot.
         platform: name of the frame whose pose error is computed.
         frames: all frames.
         closures: pairs of frames that must coincide once assembled.
@@ -210,7 +210,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
     """Sort frames so that parents precede children, otherwise in the given order.
 
     Args:
-        frames: of one robot.
+        frames: frames of one robot.
 
     Returns:
         The same frames.

@@ -101,7 +101,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
     """Return an assembly over its frames and closures, with the platform's error.
 
     Args:
-        assembly: by the linear model or with finite motions.
+        assembly: assembly by the linear model or with finite motions.
 
     Returns:
         Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
@@ -196,7 +196,7 @@ def component_unit(unit: str, component: str) -> str:
     """Return the unit of one component of a variable that mixes angles and lengths.
 
     Args:
-        unit: of the variable, such as ``"rad, m"``.
+        unit: unit of the variable, such as ``"rad, m"``.
         component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
             are rotation and translation.
 

@@ -88,11 +88,12 @@ class _Path:
     """A path to be followed, and the definition of length on it.
 
     Attributes:
-        posture: of the robot without clearance, its beams cut.
-        component: of the load that changes.
+        posture: posture of the robot without clearance, its beams cut.
+        component: component of the load that changes.
         rest: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] or None.
-        weight: of squared motions, relative to squared loads over the largest load.
+        weight: weight of squared motions, relative to squared loads over the largest
+            load.
         range: [N or N m] the largest load.
         parts: owner of each spring.
         idle: number of motions without stiffness and load.
@@ -148,15 +149,15 @@ def follow_load(
     Args:
         posture: the robot's configuration, with its errors; its clearances are held at
             zero.
-        component: of the load that changes, 0 to 5.
+        component: component of the load that changes, 0 to 5.
         first: [N m or N] load at which the path begins.
         last: [N m or N] load at which it ends.
         load: (6,) [N m, N] the other components of the load.
         gravity: (3,) [m/s^2] base axes.
-        count: of steps of the first one's length from first to last load; steps grow to
-            twice that where the path is straight.
+        count: number of steps of the first one's length from first to last load; steps
+            grow to twice that where the path is straight.
         progress: function called with the points found and their largest number.
-        method: of the first equilibrium; the path from it is followed in numpy.
+        method: method of the first equilibrium; the path from it is followed in numpy.
 
     Returns:
         The curve; its events are ``"critical"`` loads, with the mode.

@@ -81,7 +81,7 @@ class DeflectionCurve:
 
     Attributes:
         posture: the robot's nominal configuration.
-        component: of the wrench and of the screw, 0 to 5.
+        component: component of the wrench and of the screw, 0 to 5.
         loads: (k,) [N m or N] values of that component, in the order of application.
         screws: (k, 6) [rad, m] of the platform at its origin, base axes.
         energies: (k,) [J] elastic.
@@ -89,7 +89,8 @@ class DeflectionCurve:
         pressed: (k,) names of the clearances that carry a force.
         open_: (k,) bool, True where clearances leave the pose undetermined.
         events: in the order of the curve.
-        method: of all equilibria, as requested: ``"compiled"`` or ``"reference"``.
+        method: method of all equilibria, as requested: ``"compiled"`` or
+            ``"reference"``.
     """
 
     posture: Posture
@@ -147,7 +148,7 @@ def deflection_curve(
         state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
         progress: function called at each load with the steps taken there and their
             largest number.
-        method: of :func:`assembly.linear.energy.solve_assembly` or
+        method: method of :func:`assembly.linear.energy.solve_assembly` or
             :func:`assembly.exact.exact.solve_exact`.
 
     Returns:

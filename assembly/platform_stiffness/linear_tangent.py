@@ -73,7 +73,7 @@ def active_tangent(assembly: Assembly, side: Side = "holding") -> PlatformStiffn
     """Return the tangent of an assembly as it is, even a small step off equilibrium.
 
     Args:
-        assembly: with clearances known to rounding.
+        assembly: assembly with clearances known to rounding.
         side: state of clearances at their bound without a force.
 
     Returns:

@@ -30,7 +30,7 @@ class Stiffnesses:
 
     Attributes:
         posture: the robot's nominal configuration, k postures.
-        state: as of :class:`PlatformStiffness`.
+        state: state, see :class:`PlatformStiffness`.
         point: (k, 3) [m] at which screws and wrenches are read, base axes.
         length: [m] characteristic length.
         springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under

@@ -98,7 +98,7 @@ class PlatformStiffness:
         springs: (m, k) [sqrt(2 J)].
         parts: (m,) owner of each spring.
         free: (6, f) [rad, m].
-        method: of the solution or of its equilibrium: ``"compiled"``, or
+        method: method of the solution or of its equilibrium: ``"compiled"``, or
             ``"reference"``, numpy and Clarabel.
     """
 
@@ -337,7 +337,7 @@ def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
     """Return a given number of finite numbers from an argument.
 
     Args:
-        name: of the argument, for the message.
+        name: name of the argument, for error messages.
         value: the argument.
         count: the expected number of entries.
         unit: their unit, for the message.

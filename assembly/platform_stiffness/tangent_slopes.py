@@ -74,7 +74,7 @@ class TangentState:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         at: (3,) [m] of the platform, in its axes.
-        side: of a change of contact.
+        side: side of a change of contact.
     """
 
     state: State = "nominal"
@@ -96,7 +96,7 @@ def compliance_slope(
         posture: the robot's configuration.
         ahead: the configuration with the number a step larger.
         back: the configuration with the number a step smaller.
-        step: of the number.
+        step: step of the number.
         asked: state of the tangent, and its point.
 
     Returns:

@@ -53,7 +53,7 @@ class NaturalModes:
             first; empty without elastic energy.
         idle: number of motions without resistance that leave the platform fixed, such
             as a rod's spin between two ball joints; they are not among the modes.
-        method: of their equilibrium: ``"compiled"`` or ``"reference"``.
+        method: method of their equilibrium: ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -85,7 +85,7 @@ def natural_modes(
         gravity: (3,) [m/s^2], only in the state ``"exact"``.
         state: ``"nominal"``, of the nominal robot with clearances held at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
-        method: of :func:`assembly.exact.exact.solve_exact`.
+        method: method of :func:`assembly.exact.exact.solve_exact`.
 
     Returns:
         The modes.

@@ -1,13 +1,12 @@
-"""The IRSBot-2 of the paper's section IV, a reconstruction.
+"""The IRSBot-2 of the paper's section IV, reconstructed.
 
-Two legs on the x axis, leg 2 being leg 1 turned by pi about z0.  Each is a
-parallelogram (proximal module) that carries an elbow body of constant orientation, and
-two parallel links between universal joints (distal module) that carry the platform.
-The figures that define the axes of the universal joints are not public.  This
-interpretation has the paper's mobility everywhere in the workspace; others tried do
-not.
+The two legs are on the x axis; leg 2 is leg 1 turned by pi about z0.  In each leg a
+parallelogram (proximal module) carries an elbow body of constant orientation. Two
+parallel links between universal joints (distal module) carry the platform.  The figures
+that define the axes of the universal joints are not public.  The axes used here give
+the paper's mobility everywhere in the workspace; other axes that were tried do not.
 
-Frames carry names; the paper's index is their place in :data:`NAMES`, counted from 1.
+Frames have names; the paper's index is their position in :data:`NAMES`, from 1.
 Errors act at the paper's frames :data:`ERROR_FRAMES`.
 
 ======  ===========================================================================
@@ -89,15 +88,16 @@ def irsbot2(
     """Return the robot with all its joints at zero in one home pose.
 
     Args:
-        parameters: the paper's if absent.
+        parameters: parameters of the robot; by default the paper's.
         x: [m] platform position in the home pose.
-        z: [m] likewise.
+        z: [m] platform position in the home pose.
 
     Returns:
-        42 frames, 5 closures; platform ``leg1.tip``, parallel to the base.
+        The robot with 42 frames and 5 closures; platform ``leg1.tip``, parallel to the
+        base.
 
     Raises:
-        BadInput: the home pose is out of reach.
+        BadInput: the robot does not reach the home pose.
     """
     parameters = parameters or IRSBot2Parameters()
     turned = transform(np.zeros(3), np.diag([-1.0, -1.0, 1.0]))
@@ -122,15 +122,15 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
     """Return the angle of leg 1's moving sides to the x axis, elbow outward.
 
     Args:
-        parameters: of the robot.
-        x: [m] platform position; minus it for leg 2.
+        parameters: parameters of the robot.
+        x: [m] platform position; for leg 2 its negative.
         z: [m] platform position.
 
     Returns:
         [rad] the angle q.
 
     Raises:
-        BadInput: out of reach.
+        BadInput: the leg does not reach the position.
     """
     P = parameters
     along = np.array([x - (P.b + P.f - P.p), z - P.e])
@@ -146,7 +146,7 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
 
 
 def _planar_length(P: IRSBot2Parameters) -> float:
-    """[m] the distal links seen along y."""
+    """Return [m] length of the distal links projected along y."""
     return math.sqrt(P.L2**2 - (P.g - P.a) ** 2)
 
 
@@ -158,7 +158,7 @@ def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
     A = np.array([P.b, 0.0, 0.0])
     C = A + P.L1 * arm
     platform = np.array([x, 0.0, z])
-    # revolute axes perpendicular to the x-z plane, x along the moving side
+    # revolute axes perpendicular to the x-z plane; x axes along the moving side
     swing = _axes(arm, np.array([0.0, -1.0, 0.0]))
     placed = {
         "drive": transform(A, swing), "elbow": transform(C, swing),
@@ -183,7 +183,7 @@ def _link(
     along = (far - near) / np.linalg.norm(far - near)
     level, rise = math.cos(P.alpha_d), math.sin(P.alpha_d)
     fixed = np.array([level * math.cos(P.beta), y * level * math.sin(P.beta), -rise])
-    own = y * np.cross(fixed, along)  # link B mirrors link A in y = 0
+    own = y * np.cross(fixed, along)  # link B is the mirror image of link A in y = 0
     own /= np.linalg.norm(own)
     up = np.array([0.0, 0.0, 1.0])
     end = "platform_a" if which == "a" else "link_b_tip"

@@ -23,7 +23,7 @@ class SolverLimits(NamedTuple):
     Attributes:
         relative: required gap, relative to |G u + h|^2 / 2 ..
         absolute: .. plus this.
-        first_sigma: of Newton's method, times the mean |G_k^T h|.
+        first_sigma: first sigma of Newton's method, times the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
 
@@ -60,7 +60,7 @@ def newton(
     Args:
         problem: as for :func:`interior_point`.
         starts: as for :func:`interior_point`.
-        limits: of the iteration.
+        limits: limits of the iteration.
         u: (nu,) first guess within the cones; overwritten with the solution.
         y: (r + p,) overwritten with the multipliers of G's rows, and of H's, whose
             values are a first guess.

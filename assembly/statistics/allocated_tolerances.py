@@ -43,7 +43,7 @@ class Allocation:
             bound, over all postures; NaN if not proven.
         proven_scale: factor on the tolerances, 1 or less, at which the upper bounds
             meet the limits too; NaN if not proven.
-        verification: by fresh draws: yields with their intervals.
+        verification: verification by fresh draws: yields with their intervals.
         perfect_parts: by limit on a pose error, the pose error [rad or m] due to
             clearances alone, and its posture.
     """

@@ -41,7 +41,7 @@ def allocate(
     """Find the cheapest tolerances that meet a plan over postures, and verify them.
 
     Args:
-        postures: of one robot, the workspace.
+        postures: postures of one robot, the workspace.
         plan: costs and limits.
         fresh: independent draws for the verification; 0 for none.
         progress: called with the name of a step, its progress and its total.

@@ -65,7 +65,7 @@ def bounded_position(
     """Return the platform screw of one draw at contact, or uniform over its set.
 
     Args:
-        draws: of one posture.
+        draws: draws of one posture.
         i: index of the draw.
         wrench: (6,) [N m, N] that displaces the platform to contact; None for the
             uniform distribution.

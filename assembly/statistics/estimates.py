@@ -18,9 +18,9 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     """Return the probability of success with its Clopper-Pearson interval.
 
     Args:
-        successes: of ``count`` independent trials.
+        successes: successes of ``count`` independent trials.
         count: > 0.
-        level: of confidence; the coverage is at least this.
+        level: level of confidence; the coverage is at least this.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -41,7 +41,7 @@ def bracketed(
         holds: certain successes of ``count`` independent trials.
         fails: certain failures.
         count: > 0.
-        level: of confidence, for any outcome of the undecided trials.
+        level: level of confidence, for any outcome of the undecided trials.
 
     Returns:
         ``probability`` of a certain success, ``lower``, ``upper``, number of
@@ -57,8 +57,8 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
     Args:
         values: (k,) a sample.
-        share: of the distribution below it, in (0, 1).
-        level: of confidence.
+        share: share of the distribution below it, in (0, 1).
+        level: level of confidence.
 
     Returns:
         ``value``, ``lower``, ``upper``; infinite where the sample is too small, or has
@@ -83,7 +83,7 @@ def mean(values: ArrayLike, level: float = 0.95) -> dict[str, float]:
 
     Args:
         values: (k,) a sample, k > 1.
-        level: of confidence.
+        level: level of confidence.
 
     Returns:
         ``value``, ``lower``, ``upper``, ``deviation`` of one draw.
@@ -106,9 +106,9 @@ def most_probable(
 
     Args:
         values: (k,) a sample.
-        level: of confidence.
-        positive: of sizes: the kernel is reflected at zero.
-        seed: of the bootstrap.
+        level: level of confidence.
+        positive: whether the samples are sizes; the kernel is then reflected at zero.
+        seed: seed of the bootstrap.
 
     Returns:
         ``value``, ``lower``, ``upper``.

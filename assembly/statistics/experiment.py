@@ -218,8 +218,8 @@ def precision_for(
     """Return the precision of pose errors that suffices to check limits on them.
 
     Args:
-        limits: by quantity.
-        share: of a limit.
+        limits: limits by quantity.
+        share: share of a limit.
 
     Returns:
         [rad, m] for an :class:`Experiment`.

@@ -92,7 +92,7 @@ def sobol_importance(
         sample: stream and count to (count, m) independent draws of the numbers.
         groups: name and columns of each group of numbers.
         count: base draws; (groups + 2) times as many are evaluated.
-        level: of confidence of the bootstrap intervals.
+        level: level of confidence of the bootstrap intervals.
 
     Returns:
         The indices; NaN for a result that does not vary.
@@ -108,9 +108,9 @@ def sobol_indices(
     """Return Sobol's indices from the results of a design.
 
     Args:
-        design: of k base draws and d groups.
+        design: design of k base draws and d groups.
         results: (k (d + 2), s) in the order of its rows; not finite without a solution.
-        level: of confidence of the bootstrap intervals.
+        level: level of confidence of the bootstrap intervals.
 
     Returns:
         The indices; NaN for a result that is constant, or that fails in too many draws.
@@ -175,7 +175,7 @@ def source_groups(sources: ErrorSources, by: str) -> list[tuple[str, NDArray]]:
     """Return the groups of sources: each by itself, by frame, or by kind of error.
 
     Args:
-        sources: of a robot.
+        sources: sources of a robot.
         by: ``"source"``; ``"frame"``; or ``"kind"``: the same component of the frame
             of the same name in every leg.
 

@@ -55,7 +55,7 @@ class ImportanceOptions:
     Attributes:
         draws: base draws; (groups + 2) times as many are solved.
         by: see :func:`assembly.statistics.importance.source_groups`.
-        level: of confidence of the intervals.
+        level: level of confidence of the intervals.
     """
 
     draws: int
@@ -119,9 +119,9 @@ def importance_dataset(
 
     Args:
         experiment: distributions and quantities.
-        design: of the draws.
-        rows: of the experiment's record type, of all rows of the design.
-        level: of confidence of the intervals.
+        design: design of the draws.
+        rows: rows of the experiment's record type, of all rows of the design.
+        level: level of confidence of the intervals.
 
     Returns:
         Data set ``first_index``, ``total_index`` over ``quantity``, ``group`` and
@@ -178,7 +178,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
     """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
-        data: with it, or merged with the draws.
+        data: data with it, or merged with the draws.
 
     Returns:
         Base draws, the indices of each quantity with the ranks that their intervals

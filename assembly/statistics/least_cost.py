@@ -42,7 +42,7 @@ def least_cost(
 
     Args:
         requirement: limits at all postures.
-        samples: of the errors, that must meet the limits.
+        samples: samples of the errors, that must meet the limits.
         t: (G,) [rad or m] proportions to start from.
         progress: called with the name of a step, its progress and its total.
 

@@ -62,7 +62,7 @@ def run_draws(
         path: NetCDF file to write; its journal is used and then removed.
         workers: threads.
         progress: called with the draws done and their number.
-        importance: of errors; not computed if None.
+        importance: importance of errors; None if not computed.
         held: context that keeps the journal until it is closed, as in
             :func:`assembly.sweeps.sweep.run_sweep`.
 
@@ -194,7 +194,7 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
     """Return the draws as a data set with units and provenance.
 
     Args:
-        experiment: of the draws.
+        experiment: experiment of the draws.
         rows: (k,) of its record type.
 
     Returns:

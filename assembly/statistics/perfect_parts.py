@@ -110,8 +110,8 @@ def limits_broken(
     """Return the limits that perfect parts break.
 
     Args:
-        parts: of :func:`perfect_parts`.
-        limits: by quantity.
+        parts: parts of :func:`perfect_parts`.
+        limits: limits by quantity.
 
     Returns:
         By quantity the value of perfect parts, its unit and the limit.

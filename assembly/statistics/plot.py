@@ -67,7 +67,7 @@ def histogram_figure(
     """Return the histograms with medians, 95 % quantiles and most probable values.
 
     Args:
-        data: of :func:`assembly.statistics.monte_carlo.run_draws`.
+        data: data of :func:`assembly.statistics.monte_carlo.run_draws`.
         quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
             with a limit if empty.
 
@@ -139,7 +139,7 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
     """Return the tornado plot of the importance, the largest on top, with intervals.
 
     Args:
-        data: with ``first_index`` and ``total_index``.
+        data: data with ``first_index`` and ``total_index``.
         most: largest number of bars in a panel.
 
     Returns:
@@ -186,7 +186,8 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
     """Draw a bar chart of the tolerances with upper bounds; angles and lengths apart.
 
     Args:
-        data: of :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
+        data: data of
+            :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
         A figure: wide bars are of least cost; narrow ones, where different, are those

@@ -70,7 +70,7 @@ class PostureMargins:
         """Return the slopes of margins with each error.
 
         Args:
-            zone: of k draws, by :meth:`solve`.
+            zone: zone of k draws, by :meth:`solve`.
 
         Returns:
             (k, n, 6) [1/rad, 1/m]; NaN where the reference solved it.

@@ -47,7 +47,7 @@ def parse_limit(text: str) -> tuple[str, float]:
         Both.
 
     Raises:
-        BadInput: not of that form.
+        BadInput: the text has another form.
     """
     name, _, number = (piece.strip() for piece in text.partition("="))
     names = limit_names()

@@ -51,7 +51,7 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
     """Return the names of contributors, with those of all legs joined to one.
 
     Args:
-        names: such as ``leg1.hinge.RX``, the contributors.
+        names: names such as ``leg1.hinge.RX``, the contributors.
         among: all names.
 
     Returns:

@@ -28,7 +28,7 @@ class Replay:
     """Results stored so far.
 
     Attributes:
-        journal: of records :data:`RECORD`; None to store nothing.
+        journal: journal of records :data:`RECORD`; None to store nothing.
         asked: number of results requested.
     """
 
@@ -73,7 +73,7 @@ def journalled(
     """Store results next to a file until it is written.
 
     Args:
-        path: of the file; None to store nothing.
+        path: path of the file; None to store nothing.
         whose: values that must be equal for two computations to share results.
 
     Yields:

@@ -35,7 +35,8 @@ def draws_page(
     """Return the page of an experiment.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`, with ``robot``.
+        summary: summary of :func:`assembly.statistics.summary.summarise`, with
+            ``robot``.
         data: the draws.
         provenance: command and files.
         robot: HTML of :func:`assembly.statistics.scenes.drawn_robot`.

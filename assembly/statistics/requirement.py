@@ -33,13 +33,13 @@ class Plan:
     Attributes:
         sources: m errors within tolerances of 1 [rad or m].
         group: (m,) class of each.
-        names: of the G classes.
+        names: names of the G classes.
         costs: (G,) > 0.
         least: (G,) [rad or m] tightest tolerances.
         most: (G,) [rad or m] loosest tolerances.
         cost: ``"reciprocal"`` or ``"logarithm"``.
-        limits: by quantity: margin, margin_free, energy [J], force [N], moment [N m],
-            stress [Pa], rotation [rad], translation [m].
+        limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
+            [N m], stress [Pa], rotation [rad], translation [m].
         asked_yield: 1 means always; else the share of robots that must meet every
             limit at every posture.
         draws: training draws at every posture.

@@ -32,7 +32,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 
     Args:
         requirement: limits at all postures.
-        stream: of random numbers.
+        stream: stream of random numbers.
         times: multiple of the plan's draws.
 
     Returns:
@@ -85,7 +85,7 @@ def scale_uniformly(
 
     Args:
         requirement: limits at all postures.
-        samples: of the errors.
+        samples: samples of the errors.
         t: (G,) [rad or m] proportions.
         precision: relative, of the largest utilisation, or of the factor.
 

@@ -50,7 +50,7 @@ def solution_slopes(
 
     Args:
         prepared: the posture.
-        draws: of :meth:`LinearResponse.solve`, k draws.
+        draws: draws of :meth:`LinearResponse.solve`, k draws.
         by_wrench: (k, n, 6) slopes of the function with the wrench through every body.
         by_screw: (k, 6) slopes with the platform's screw.
         by_clearance: (k, nu) slopes with the clearances, in units of their cones.

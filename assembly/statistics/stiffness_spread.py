@@ -72,8 +72,8 @@ def stiffness_report(
     Args:
         stiffnesses: (k, 6) of :func:`draw_stiffnesses`.
         motions: (k, 6, 6) of the same.
-        state: of the tangents.
-        level: of confidence.
+        state: state of the tangents.
+        level: level of confidence.
 
     Returns:
         By axis: the number of draws with a result, the share of draws with a free

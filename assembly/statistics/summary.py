@@ -53,9 +53,9 @@ def summarise(
 
     Args:
         data: the draws.
-        limits: by quantity; a draw meets them if none is exceeded.
+        limits: limits by quantity; a draw meets them if none is exceeded.
         strength: [Pa] yield strength of the links.
-        level: of confidence of all intervals.
+        level: level of confidence of all intervals.
 
     Returns:
         ``draws`` and the number of them that are ``assembled``; ``clearance``, its

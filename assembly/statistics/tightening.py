@@ -17,7 +17,7 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
     """Return the total shares of a quantity's variance by error, the largest first.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`.
+        summary: summary of :func:`assembly.statistics.summary.summarise`.
         key: the quantity.
 
     Returns:
@@ -35,7 +35,7 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     """Return tiles: values of perfect parts, the main contributor, what to tighten.
 
     Args:
-        summary: of :func:`assembly.statistics.summary.summarise`.
+        summary: summary of :func:`assembly.statistics.summary.summarise`.
 
     Returns:
         The tiles; without importance, no tiles of errors.

@@ -30,7 +30,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
     Args:
         robot: any.
-        grid: such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
+        grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
         The postures; and the number of those left out, by status: out of reach, and
@@ -96,7 +96,7 @@ def present_errors(
     """Assess the robot's own errors: largest margin over the postures, and its causes.
 
     Args:
-        postures: of a robot with errors.
+        postures: postures of a robot with errors.
         compliant: ``"free"`` or ``"rigid"``, about the own axis of compliant joints.
         progress: called with postures done and their number.
 

@@ -35,8 +35,8 @@ def tolerances_page(
     """Return the page of ``assembly tolerances``.
 
     Args:
-        results: with ``present``, ``allocation`` or both, number of ``postures`` and
-            their ``grid``.
+        results: results with ``present``, ``allocation`` or both, number of
+            ``postures`` and their ``grid``.
         provenance: command and files.
         pictures: HTML of :mod:`assembly.statistics.scenes`, of the errors present.
 

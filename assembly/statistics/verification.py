@@ -117,8 +117,8 @@ def verify_yield(
         t: (G,) [rad or m] tolerances.
         fresh: number of draws, used only here.
         progress: called with the name of a step, its progress and its total.
-        stream: of random numbers.
-        level: of confidence of the interval.
+        stream: stream of random numbers.
+        level: level of confidence of the interval.
 
     Returns:
         Plain values: the yield with its interval, that of every posture, the verdict.

@@ -215,7 +215,7 @@ def solve_task(
 
     Args:
         question: pickled.
-        digest: of the question on the client.
+        digest: digest of the question on the client.
         tasks: number and points of each block.
 
     Returns:

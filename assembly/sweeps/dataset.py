@@ -48,9 +48,9 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
     """Return the data set of a whole sweep in memory.
 
     Args:
-        sweep: of the results.
+        sweep: sweep of the results.
         records: (points,) rows of all points.
-        texts: by name, the text of points that have one.
+        texts: texts by name, the text of points that have one.
 
     Returns:
         The data set; units in the attribute ``units``.
@@ -77,9 +77,9 @@ def write_sweep(
     """Write the data set of a whole sweep as a NetCDF file, whole or not at all.
 
     Args:
-        sweep: of the results.
+        sweep: sweep of the results.
         read: rows and texts of a block.
-        path: of the new file; it replaces an old one only when it is complete.
+        path: path of the new file; it replaces an old one only when it is complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -141,7 +141,7 @@ def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice
     """Yield boxes that together hold the points ``first`` .. ``last - 1`` of an array.
 
     Args:
-        shape: of the array.
+        shape: shape of the array.
         first: point, counted in C order.
         last: the one after the last point.
 
@@ -220,7 +220,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
     Args:
         data: any.
-        path: of the new file; it replaces an old one only once it is complete.
+        path: path of the new file; it replaces an old one only once it is complete.
 
     Raises:
         BadInput: the file cannot be written.
@@ -235,7 +235,7 @@ def check_dataset(path: Path | str, what: str) -> None:
     """Refuse a NetCDF file that could not be written, before the work.
 
     Args:
-        path: of the file to be written later.
+        path: path of the file to be written later.
         what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
@@ -268,7 +268,7 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     """Return a data set from its file.
 
     Args:
-        path: of a NetCDF file.
+        path: path of a NetCDF file.
 
     Returns:
         The data set, all in memory.

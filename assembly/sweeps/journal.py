@@ -36,7 +36,7 @@ class Journal:
     """An open journal.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         record_type: of the rows.
         owner: check sum of the first line, which those of the records continue.
         places: offset and length of the content of each finished block's record.
@@ -55,7 +55,7 @@ class Journal:
         Args:
             block: its number.
             records: its rows.
-            texts: by name, the text of rows that have one.
+            texts: texts by name, the text of rows that have one.
 
         Raises:
             BadInput: the file cannot be written, as on a full disk.
@@ -125,7 +125,7 @@ def open_journal(
     """Open a new journal, or that of an interrupted sweep, until the block ends.
 
     Args:
-        path: of the file.
+        path: path of the file.
         whose: plain values that identify the sweep: all must be equal, except
             ``program``, whose version differs between commits of equal sources.
         record_type: of the rows.

@@ -28,7 +28,7 @@ def figure_of(
     """Return the maps of a sweep over two axes, or lines along one.
 
     Args:
-        data: of a sweep, as saved.
+        data: data of a sweep, as saved.
         at: values on other axes, by name; the nearest points are shown.  Unless a draw
             is chosen, the median of the draws is shown.
         quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
@@ -78,7 +78,7 @@ def part_of_sweep(
     """Return a part of a sweep: some axes at fixed values, draws by their median.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
         at: value by axis.
 
     Returns:
@@ -149,7 +149,7 @@ def map_figure(
     """Return the maps over a two-dimensional grid: margins, energy and platform error.
 
     Args:
-        data: of a sweep over two axes with more than one value each.
+        data: data of a sweep over two axes with more than one value each.
         panels: to be shown; the usual ones and the status if absent.
 
     Returns:
@@ -202,7 +202,7 @@ def path_figure(
     """Return the same quantities along one axis, or from posture to posture of a list.
 
     Args:
-        data: of a sweep over one axis.
+        data: data of a sweep over one axis.
         panels: to be shown; the usual ones and the condition if absent.
 
     Returns:

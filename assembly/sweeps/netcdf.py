@@ -22,7 +22,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
     """Write a NetCDF file.
 
     Args:
-        path: of the file; it appears when the block ends without an error.
+        path: path of the file; it appears when the block ends without an error.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -61,7 +61,7 @@ class StoredDataset(NamedTuple):
 
     Attributes:
         data_vars: variables by name, coordinates left out.
-        attrs: of the whole data set.
+        attrs: attributes of the whole data set.
     """
 
     data_vars: dict[str, Stored]
@@ -72,7 +72,7 @@ def stored_dataset(path: Path | str) -> StoredDataset:
     """Return a newly written data set, for its summary.
 
     Args:
-        path: of a NetCDF file of ours.
+        path: path of a NetCDF file written by forcefit.
 
     Returns:
         All of its variables except the coordinates.
@@ -111,7 +111,7 @@ def check_heaps(path: Path) -> None:
     """Refuse a file whose heaps of texts are damaged: HDF5 would read them endlessly.
 
     Args:
-        path: of an HDF5 file; other files pass.
+        path: path of an HDF5 file; other files pass.
 
     Raises:
         BadInput: an entry of a heap points outside it.

@@ -34,7 +34,7 @@ class Panel(NamedTuple):
     Attributes:
         key: name of the quantity.
         scale: factor on its numbers.
-        title: with the unit after the factor.
+        title: title with the unit after the factor.
         colours: colour map.
     """
 
@@ -69,7 +69,7 @@ def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
     """Return the panels of a sweep's figure if no quantity is named.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
 
     Returns:
         Those whose quantities are stored.
@@ -110,8 +110,8 @@ def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, .
     """Return panels of named quantities; a variable's name means all its components.
 
     Args:
-        data: of a sweep or of draws.
-        names: of the quantities.
+        data: data of a sweep or of draws.
+        names: names of the quantities.
 
     Returns:
         A panel for each component.
@@ -146,7 +146,7 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
     """Return a quantity over the points.
 
     Args:
-        data: of a sweep or of draws.
+        data: data of a sweep or of draws.
         key: its name; the size of a pose error is the certified upper bound, or
             otherwise half the platform screw.
 

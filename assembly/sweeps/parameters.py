@@ -44,7 +44,7 @@ class Design:
     Attributes:
         content: the root table, plain values.
         file: name of the file, for messages; paths in the table start in its folder.
-        name: of the robot if the table has none.
+        name: name of the robot if the table has none.
     """
 
     content: dict[str, Any]
@@ -87,7 +87,7 @@ class Design:
         """Return the root table with other numbers.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Returns:
             A new table.
@@ -106,7 +106,7 @@ class Design:
         """Return the robot with other numbers.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Returns:
             The robot, checked as if its file had been written so.
@@ -125,7 +125,7 @@ class Design:
         """Refuse numbers that break a rule of the format.
 
         Args:
-            values: by path.
+            values: values by path.
 
         Raises:
             BadInput: they do; whether the closures still hold is not checked.
@@ -142,7 +142,7 @@ def load_design(name: str | Path) -> Design:
     """Return a built-in robot, or a robot file, as a design.
 
     Args:
-        name: such as ``"irsbot2"``, or the path of a robot file.
+        name: name such as ``"irsbot2"``, or the path of a robot file.
 
     Returns:
         The design.

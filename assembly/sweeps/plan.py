@@ -25,9 +25,9 @@ class Sweep:
     Attributes:
         question: the quantities.
         targets: the postures.
-        values: of each varied parameter, in the order of ``question.varied``.
+        values: values of each varied parameter, in the order of ``question.varied``.
         draws: number of draws of errors; 0 for the robot's own.
-        command: of the command line, for provenance; empty without one.
+        command: command line, for provenance; empty without one.
         block_size: number of points solved and journalled together.
     """
 

@@ -32,8 +32,8 @@ def point_conditions(
     """Return the conditions at points of one design, effects applied.
 
     Args:
-        question: of the sweep: load, gravity and covariates.
-        robot: of the design.
+        question: question of the sweep: load, gravity and covariates.
+        robot: robot of the design.
         postures: k of them.
         errors: (k, n, 6) [rad, m] drawn; None for the robot's own.
 

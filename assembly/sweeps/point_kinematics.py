@@ -27,12 +27,12 @@ def note_geometry(
     """Record the geometry of postures; return which of them are not usable.
 
     Args:
-        question: of the sweep.
-        robot: of the design.
+        question: question of the sweep.
+        robot: robot of the design.
         goals: (k, 6) or (k, n) of the k postures, as they were reached.
         postures: the postures reached.
         rows: indices of each posture's records.
-        records: of the points, to fill.
+        records: records of the points, to fill.
         near_singularity: by row, the names of nearby singularities, to fill.
 
     Returns:

@@ -38,8 +38,8 @@ def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
     """Return the names of the compliant parts, such as ``"leg1.distal link"``.
 
     Args:
-        robot: of the sweep.
-        state: of :data:`STATES`.
+        robot: robot of the sweep.
+        state: state of :data:`STATES`.
 
     Returns:
         Links and joints; for a tangent also pressed clearances, or existing forces.
@@ -91,7 +91,7 @@ def tangent_stiffnesses(
     """Return the tangents of k points under their errors, loads and effects.
 
     Args:
-        conditions: of k rows.
+        conditions: conditions of k rows.
         state: ``"contact"`` or ``"exact"``.
 
     Returns:

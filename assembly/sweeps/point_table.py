@@ -27,7 +27,7 @@ def point_table(
     """Return a data set as a table, one row for each point, draw or tolerance.
 
     Args:
-        data: of a sweep, of draws or of tolerances; or the path of its file.
+        data: data of a sweep, of draws or of tolerances; or the path of its file.
         rows: axes whose points are the rows, such as ``["quantity", "group"]`` for the
             importance of errors; those of the sweep's points, the draws or the
             tolerances' classes if empty.
@@ -69,7 +69,7 @@ def write_point_table(
 
     Args:
         data: as for :func:`point_table`.
-        path: of the file.
+        path: path of the file.
         rows: as for :func:`point_table`.
 
     Raises:

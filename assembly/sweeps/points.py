@@ -81,7 +81,7 @@ class SolvedPoints:
 
     Attributes:
         records: (k,) of :func:`record_type`; NaN where there is no solution.
-        texts: by name in :data:`TEXTS`, the text of points that have one.
+        texts: texts by name in :data:`TEXTS`, the text of points that have one.
     """
 
     records: NDArray

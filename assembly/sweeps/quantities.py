@@ -27,14 +27,14 @@ _READING = ("registration", "drift")  # effects that change readings, not screws
 class Question:
     """The quantities requested at every point; sent to each worker once.
 
-    robot: with its errors, which are used if none are drawn.
+    robot: robot with its errors, which are used if none are drawn.
     design: its parameters, if some vary; otherwise None.
         design: its parameters, if some vary; else None.
         varied: paths of the varied parameters.
-        components: of the postures, see :mod:`assembly.sweeps.targets`.
-        sources: of drawn errors; None for the robot's own.
-        seed: of the draws.
-        assumption: of problem (27), or None to leave its bounds out.
+        components: components of the postures, see :mod:`assembly.sweeps.targets`.
+        sources: sources of drawn errors; None for the robot's own.
+        seed: seed of the draws.
+        assumption: assumption of problem (27), or None to leave its bounds out.
         clearance_only: bound (27) also for the robot without errors.
         wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -86,8 +86,8 @@ class Variable:
 
     Attributes:
         dims: axes in addition to those of the points, with their labels.
-        unit: of its numbers.
-        meaning: for ``long_name``.
+        unit: unit of the numbers.
+        meaning: text for ``long_name``.
     """
 
     dims: Mapping[str, tuple[str, ...]]
@@ -99,7 +99,7 @@ def variables(question: Question) -> dict[str, Variable]:
     """Return the numeric quantities that a sweep stores, by name.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.
@@ -112,7 +112,7 @@ def computed(question: Question) -> dict[str, Variable]:
     """Return the numeric quantities that are computed; some may not be stored.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.

@@ -73,7 +73,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
 
     Args:
         robot: a robot, a robot file, or a built-in name.
-        options: of the command.
+        options: options of the command.
 
     Returns:
         The sweep, with all its options checked.
@@ -266,7 +266,7 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
     """Return the summary of a sweep as plain values.
 
     Args:
-        data: of a sweep.
+        data: data of a sweep.
 
     Returns:
         Axes, the number of points of each status, and of each quantity the least,

@@ -52,15 +52,15 @@ def sweep(
 
     Args:
         robot: a robot, a robot file, or a built-in name.
-        grid: such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
+        grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``, or
         poses: a table of postures.
         vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``; of a
             robot file or a built-in name.
         errors: file with the distributions of the errors, see docs/statistics.md.
         draws: number of draws.
-        seed: of the draws.
-        assumption: of problem (27): ``"frozen"``, ``"free"``, ``"budget"``, or
-            ``"none"`` to leave its bounds out.
+        seed: seed of the draws.
+        assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
+            or ``"none"`` to leave its bounds out.
         quantities: names of the data variables to compute and store, with ``"default"``
             for those that are stored if none are named.  The bounds by clearances alone
             (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the

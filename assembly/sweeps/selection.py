@@ -26,7 +26,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
     """Restrict a question to named quantities.
 
     Args:
-        question: of the other options.
+        question: question of the other options.
         texts: names of data variables, between commas; ``"default"`` means those that
             are stored if none are named.
 

@@ -32,7 +32,8 @@ def stiffness_slopes(
 
     Args:
         design: the robot of the file, with its effects.
-        paths: of numbers; a frame's name without its leg changes all legs together.
+        paths: paths of numbers; a frame's name without its leg changes all legs
+            together.
         pose: nominal platform pose, which is kept.
         joints: actuated coordinates, which are kept in place of the pose.
         asked: state of the tangent, and its point; the nominal state if absent.

@@ -79,7 +79,8 @@ def run_sweep(
 
     Args:
         sweep: to be solved.
-        path: of the file; it appears when it is complete, and the journal is removed.
+        path: path of the file; it appears when it is complete, and the journal is
+            removed.
         progress: called at the start and after each block with the number of points
             that are in the journal, and of all.
         solve: function that solves blocks: :func:`solve_here`, or
@@ -153,12 +154,12 @@ def sweep_poses(
     """Solve (21) and (22), and (27) if requested, at every pose of a grid.
 
     Args:
-        robot: with its errors, clearances and stiffnesses.
+        robot: robot with its errors, clearances and stiffnesses.
         axes: values [m or rad] by pose component or ``q.<frame>``; components not named
             are free.
         progress: called after each block with the number of points done, and of all.
-        assumption: of problem (27): ``"frozen"``, ``"free"`` or ``"budget"``; None
-            leaves the bounds of the pose error out.
+        assumption: assumption of problem (27): ``"frozen"``, ``"free"`` or
+            ``"budget"``; None leaves the bounds of the pose error out.
 
     Returns:
         Data set over the axes: ``margin``, ``margin_free``, ``energy``,

@@ -25,10 +25,10 @@ class Targets:
     """Poses or joint coordinates, on the axes of a grid or in a list.
 
     Attributes:
-        names: of the components, ``tx`` .. or ``q.<frame>``.
-        values: for a grid the values on each component's axis, for a list those of
-            each posture [m or rad].
-        labels: of the postures of a list; None for a grid.
+        names: names of the components, ``tx`` .. or ``q.<frame>``.
+        values: for a grid, the values on each component's axis, for a list those
+            of each posture [m or rad].
+        labels: labels of the postures of a list; None for a grid.
     """
 
     names: tuple[str, ...]
@@ -60,8 +60,8 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
     """Return the poses or coordinates as :mod:`assembly.kinematics.posture` takes them.
 
     Args:
-        names: of the components, of one kind.
-        robot: of n frames.
+        names: names of the components, of one kind.
+        robot: robot of n frames.
         rows: (k, components) of :meth:`Targets.at`.
 
     Returns:
@@ -101,13 +101,14 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
     Args:
         text: for each component ``start:stop:step`` [m or rad], or one number.
             Both ends count when (stop - start)/step is whole within 1e-9.
-        robot: whose actuated joints may be named, as ``q.<frame>``; none if absent.
+        robot: robot with actuated joints ``q.<frame>`` that may be named; none if
+            absent.
 
     Returns:
         Values by component, in the order given.
 
     Raises:
-        BadInput: not of that form, or far too many points.
+        BadInput: the text has another form, or gives too many points.
     """
     axes: dict[str, NDArray] = {}
     for part in text.split(","):
@@ -152,7 +153,7 @@ def parse_values(whose: str, spec: str) -> NDArray:
         The values; both ends where the step fits within 1e-9.
 
     Raises:
-        BadInput: not of that form, or far too many.
+        BadInput: the text has another form, or gives too many points.
     """
     expected = "expected START:STOP:STEP or one number"
     try:
@@ -177,8 +178,8 @@ def read_targets(path: Path | str, robot: Robot) -> Targets:
 
     Args:
         path: CSV file with a header, one row a posture.
-        robot: whose actuated joints may be columns; those without one keep their
-            ``position``.
+        robot: robot with actuated joints that may be columns; joints without one keep
+            their ``position``.
 
     Returns:
         The postures in the order of the file.

@@ -130,7 +130,7 @@ def unit_vector(name: str, vector: ArrayLike) -> NDArray:
     """Return the unit vector of a vector given by the user.
 
     Args:
-        name: for the message.
+        name: name for error messages.
         vector: (3,) any length but zero.
 
     Returns:

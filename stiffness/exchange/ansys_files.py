@@ -35,8 +35,8 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
     with a D (SciPy 1.17).
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
 
     Returns:
         (n, n) with both halves.

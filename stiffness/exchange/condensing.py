@@ -103,7 +103,7 @@ def interface_rows(
     """Return the rows of an interface, and their motion for unit screws of it.
 
     Args:
-        matrix: with its degrees of freedom.
+        matrix: matrix with its degrees of freedom.
         asked: a node's number, or an interface as in ``stiffness fea``.
         option: name of the option, for messages.
         nodes: (3,) [m] positions by number, None if unknown.

@@ -56,7 +56,7 @@ def link_file(
         stiffness: (6, 6) K_E at the tip, SI, our order.
         base_from_tip: (3,) [m].
         to: one of ``FORMATS``.
-        unit: of lengths in the file; forces are in N, rotations in rad.
+        unit: unit of lengths in the file; forces are in N, rotations in rad.
 
     Returns:
         The content: translations first at each node; for ``exudyn``, ``adams``,

@@ -30,14 +30,15 @@ def import_link(
     """Return a link from a matrix of 6, 12 or more degrees of freedom.
 
     Args:
-        path: of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
+        path: path of the stiffness, see :mod:`stiffness.exchange.matrix_file`.
         mass: path of the mass matrix of the same degrees of freedom; None without one.
         nodes: path of the positions of nodes, needed for interfaces of many nodes;
             their order is that of rows which the matrix file does not name.
         base: node, or interface such as ``"z=0"`` [m], that is held.
         tip: node or interface at which the screw is read.
-        unit: of lengths in all files; forces are in N, rotations in rad.
-        order: of the six degrees of freedom of a node, if the file does not name them.
+        unit: unit of lengths in all files; forces are in N, rotations in rad.
+        order: order of the six degrees of freedom of a node, if the file does not name
+            them.
 
     Returns:
         The link, in the axes of the file.
@@ -111,7 +112,8 @@ def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
     """Return the matrix with translations in metres and work in joules.
 
     Args:
-        matrix: with forces in N, rotations in rad and translations in ``length``.
+        matrix: matrix with forces in N, rotations in rad and translations in
+            ``length``.
         length: [m] its unit of length.
 
     Returns:

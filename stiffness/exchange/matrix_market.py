@@ -29,8 +29,8 @@ def matrix_market(path: Path, text: str) -> csr_array:
     long as this reader.
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
 
     Returns:
         (n, n) with both halves of a symmetric one, and where Ansys wrote one half.

@@ -52,8 +52,8 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
     """Return the entries of the stiffness or mass matrix among those of a file.
 
     Args:
-        path: for messages.
-        text: of the file.
+        path: path of the file, for error messages.
+        text: text of the file.
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
@@ -96,11 +96,11 @@ def _terms(
 ) -> list[tuple[Freedom, float]]:
     """Return rows and values of a column's terms.
 
-    A term is node, direction, real part, imaginary part.
+    A term has a node, direction, real part and imaginary part.
 
     Args:
-        path: for messages.
-        fields: of one line, after those that name the column.
+        path: path of the file, for error messages.
+        fields: fields of a line, after those that name the column.
         packed: whether fields are separated by blanks, so that no field is empty and
             there is no imaginary part.
 

@@ -12,7 +12,7 @@ def real(path: Path | str, word: str) -> float:
     """Return a number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:
@@ -32,7 +32,7 @@ def whole(path: Path | str, word: str) -> int:
     """Return a whole number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:

@@ -152,7 +152,7 @@ def estimated_error(
     """Estimate the error of the last mesh's stiffness, indicator times effectivity.
 
     Args:
-        history: of each mesh, finest last, the totals of its :class:`Level`.
+        history: totals of the :class:`Level` of each mesh, finest last.
 
     Returns:
         (6, 6) estimate of K_h minus the exact stiffness, without the geometry's error,

@@ -30,7 +30,7 @@ class Condensed:
         stiffness: (6, 6) at the tip's centre, base held.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
         unknowns: size of the system that was solved.
-        kind: of the interfaces, one of ``KINDS``.
+        kind: kind of the interfaces, one of ``KINDS``.
     """
 
     stiffness: NDArray
@@ -53,7 +53,7 @@ def condense(
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         centers: (2, 3) [m] centres of base and tip.
-        kind: of the interfaces, one of ``KINDS``.
+        kind: kind of the interfaces, one of ``KINDS``.
 
     Returns:
         The stiffness and its fields.

@@ -47,7 +47,7 @@ class Elements:
     """A solid's isoparametric tetrahedra.
 
     Attributes:
-        order: of the polynomials, 2 or 3.
+        order: order of the polynomials, 2 or 3.
         nodes: (n, 3) [m] corners first; those of the boundary on the exact shapes.
         cells: (t, m) nodes of each tetrahedron.
         faces: (f, k) nodes of each boundary triangle.
@@ -92,7 +92,7 @@ def isoparametric(
 
     Args:
         solid: the straight tetrahedra.
-        order: of the polynomials, 2 or 3.
+        order: order of the polynomials, 2 or 3.
         parts: pieces of the tetrahedra, which become the elements.
 
     Returns:
@@ -247,7 +247,7 @@ def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
     """Return a quadrature on a triangle, exact for products of two shape functions.
 
     Args:
-        order: of the polynomials.
+        order: order of the polynomials.
 
     Returns:
         Shape functions (q, k), their gradients (q, k, 2) and weights (q,).

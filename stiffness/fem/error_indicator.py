@@ -142,12 +142,13 @@ def geometry_errors(
 
     Args:
         mesh: the tetrahedra.
-        shapes: of the patches.
+        shapes: shapes of the patches.
         fields: (n, 3, k) [m] displacements of the unit cases.
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
-        surface: for patches that meet others smoothly, since an element may lie across
-            their border; if absent, each face is compared with its own patch's shape.
+        surface: surface for patches that meet others smoothly, since an element may lie
+            across their border; if absent, each face is compared with its own patch's
+            shape.
 
     Returns:
         (f, k, k) [unit of the stiffness] share of each boundary triangle: the energy

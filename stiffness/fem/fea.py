@@ -130,9 +130,9 @@ def mesh_link(
         surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
         base: the held interface, in metres, in the surface's axes.
         tip: the interface that moves.
-        material: of the link; without a density mass and inertia are left out.
-        unit: of the surface file's coordinates.
-        options: of the solution.
+        material: material of the link; without a density mass and inertia are left out.
+        unit: unit of the surface file's coordinates.
+        options: options of the solution.
 
     Returns:
         The stiffness at the tip's centre, in the surface's axes; its ``mesh`` says
@@ -161,12 +161,12 @@ def solve_link(
     """Solve a link to a required accuracy.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
         materials: the first fills the link, later ones fill their regions; or one for
             each solid of a STEP file.
-        options: of the solution.
+        options: options of the solution.
         point_masses: added to mass, centre and inertia.
 
     Returns:
@@ -205,8 +205,8 @@ def solve_bar(
     Args:
         section: its lengths relative to the bar's, see
             :func:`stiffness.mesh.straight_bar.straight_bar`.
-        material: of the bar.
-        options: of the solution; no mesher runs.
+        material: material of the bar.
+        options: options of the solution; no mesher runs.
 
     Returns:
         The bar and its finest mesh; base at z = 0, tip at z = 1, its section's y and z
@@ -232,7 +232,7 @@ def _refined(
         first: the mesh to begin with.
         materials: the first fills the link, later ones fill their regions.
         centers: (2, 3) [m] of the base and the tip interface.
-        options: of the solution.
+        options: options of the solution.
         start: [s] time from which the budget's seconds count.
         pace: [-] present slowness of this machine, relative to an idle one.
 
@@ -284,8 +284,8 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     """Return the point at which an interface's screws are read.
 
     Args:
-        surface: of the link.
-        interface: of the link.
+        surface: surface of the link.
+        interface: interface of the link.
         name: base or tip, for messages.
 
     Returns:
@@ -316,7 +316,7 @@ def first_mesh(
     """Return a coarse mesh to refine from, fine enough for the part's walls.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the interface that moves.
         budget: its seconds limit the mesher.

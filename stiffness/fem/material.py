@@ -25,7 +25,7 @@ class Material:
         where: function that selects the points (n, 3) [m], in the mesh's axes, of this
             material; for an element, the last material that contains its centre
             applies.
-        faces: of its region; the mesh is cut along them.
+        faces: faces of its region; the mesh is cut along them.
         solid: name of the solid of a STEP file with this material, or ``one+other``, in
             place of ``where`` and ``faces``.
     """
@@ -110,7 +110,7 @@ def check_materials(materials: Sequence[Material]) -> None:
     """Refuse a link without a material.
 
     Args:
-        materials: of a link.
+        materials: materials of a link.
 
     Raises:
         BadInput: there is none.

@@ -22,7 +22,7 @@ def placed_materials(
     """Assign their regions to the materials of solids.
 
     Args:
-        surface: of the link, with its solids.
+        surface: surface of the link, with its solids.
         materials: the first fills the link, or each solid has one.
 
     Returns:

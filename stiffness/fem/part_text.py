@@ -25,7 +25,7 @@ def parse_part(option: str, text: str) -> Material:
     """Return a material inside a box, or of solids of a STEP file, from text.
 
     Args:
-        option: for the message.
+        option: name of the option, for the error message.
         text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where axes not
             named are unbounded, or ``solid=one+other/young=..``; the density may be
             left out.
@@ -92,7 +92,7 @@ def scaled_part(text: str, factor: float) -> str:
     """Scale the modulus of a part.
 
     Args:
-        text: of :func:`parse_part`.
+        text: text of :func:`parse_part`.
         factor: [1].
 
     Returns:
@@ -108,7 +108,7 @@ def parse_mass(option: str, text: str) -> PointMass:
     """Return a mass at a point, ``1.5/0,0,0.452``.
 
     Args:
-        option: for the message.
+        option: name of the option, for the error message.
         text: the text.
 
     Returns:

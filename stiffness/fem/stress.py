@@ -192,9 +192,9 @@ def peak_stress(
     """Return largest von Mises stress of a tip wrench, and that by the beam formula.
 
     Args:
-        solved: from :func:`stiffness.fem.fea.solve_link`.
+        solved: result of :func:`stiffness.fem.fea.solve_link`.
         wrench: (6,) [N m, N] at the tip, in the link's axes.
-        section: of a straight beam from base to tip, as for
+        section: section of a straight beam from base to tip, as for
             :func:`stiffness.beam.beam_stress.peak_beam_stress`.
         up: (3,) the section's z, in the link's axes.
         away: [m] distance from the interfaces; one interface radius if absent.
@@ -253,8 +253,8 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     """Return the stresses of the six unit tip wrenches of a solved link.
 
     Args:
-        solved: from :func:`stiffness.fem.fea.solve_link`; where two materials meet, a
-            node counts once for each.
+        solved: result of :func:`stiffness.fem.fea.solve_link`; where two materials
+            meet, a node counts once for each.
         away: [m] distance from the interfaces; one interface radius if absent.
 
     Returns:

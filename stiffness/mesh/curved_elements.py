@@ -58,7 +58,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements, 2 or 3.
+        order: order of the elements, 2 or 3.
 
     Returns:
         The elements; inverted ones are straightened in steps.
@@ -135,7 +135,7 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 
     Args:
         solid: straight tetrahedra.
-        order: of the elements to be made of them.
+        order: order of the elements to be made of them.
 
     Returns:
         The solid, finer where a wall is thin compared with its curvature.
@@ -165,7 +165,7 @@ def _cubic_edges(
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """(t, 4, 3) displacement of cubic faces' nodes by those (t, 20, 3) of edges."""
+    """Return (t, 4, 3) displacement of face nodes from those (t, 20, 3) of edges."""
     # along an edge it is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over the faces: at a
     # face's middle each of its edges adds c_0 / 9
     carried = np.zeros((len(moved), 4, 3))

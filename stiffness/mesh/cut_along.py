@@ -26,7 +26,7 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
     Args:
         solid: boundary corners near the surface, on its shapes or not yet.
-        outline: of an interface.
+        outline: outline of an interface.
 
     Returns:
         The solid; its triangles at the outline belong to the side on which they lie.

@@ -110,7 +110,7 @@ def graded_edges(
     Args:
         solid: any.
         held: patches that are clamped or loaded.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         (e, 2) corners.
@@ -127,7 +127,7 @@ def split_joining_edges(
     Args:
         solid: any.
         held: patches that are clamped or loaded.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         A solid whose tetrahedra have at most a corner or an edge on the singular
@@ -173,10 +173,10 @@ def layered(
     """Cut a layer of thin parts along the singular edges.
 
     Args:
-        solid: of :func:`split_joining_edges`.
+        solid: solid of :func:`split_joining_edges`.
         held: patches that are clamped or loaded.
-        share: of each edge, from its singular end: thickness of the layer.
-        regions: of the link.
+        share: share of each edge, from its singular end: thickness of the layer.
+        regions: regions of the link.
 
     Returns:
         The parts; tetrahedra that touch no singular edge stay whole.

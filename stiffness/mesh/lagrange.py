@@ -30,7 +30,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
     """Return the barycentric coordinates of a lattice, as multiples of 1 / degree.
 
     Args:
-        degree: of the polynomials, >= 1.
+        degree: degree of the polynomials, >= 1.
         corners: 4 for a tetrahedron, 3 for a triangle.
 
     Returns:
@@ -61,7 +61,7 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
     """Return polynomials that are 1 at one point of the lattice and 0 at the others.
 
     Args:
-        degree: of the polynomials.
+        degree: degree of the polynomials.
         L: (q, c) barycentric coordinates.
 
     Returns:
@@ -92,7 +92,7 @@ def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
 
     Args:
         corners: (t, 4) numbers of the corners, rising in each row.
-        degree: of the polynomials.
+        degree: degree of the polynomials.
 
     Returns:
         (t, m) numbers, the corners' own first, and their count.
@@ -123,7 +123,7 @@ def face_nodes(degree: int) -> NDArray:
     """Return the lattice points on the faces of a tetrahedron.
 
     Args:
-        degree: of the polynomials.
+        degree: degree of the polynomials.
 
     Returns:
         (4, k) one row for each of ``FACES``, in the order of a triangle's lattice.

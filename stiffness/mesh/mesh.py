@@ -53,7 +53,7 @@ def mesh_solid(
     """Return the tetrahedra of a surface, from the cache if meshed before.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
         edge: [m] wanted length of edges; a 20th of the diagonal if absent.

@@ -20,10 +20,10 @@ class _Rule(NamedTuple):
     """A quadrature rule, exact to a degree.
 
     Attributes:
-        degree: of the polynomials integrated exactly.
+        degree: degree of the polynomials integrated exactly.
         points: words, in the order in which they are summed.
         coordinates: a, b, c and so on.
-        weights: of the points with these letters.
+        weights: weights of the points with these letters.
     """
 
     degree: int
@@ -108,7 +108,7 @@ def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
     """Return a rule on the reference element, exact to at least a degree.
 
     Args:
-        degree: of polynomials, up to 6.
+        degree: degree of polynomials, up to 6.
         corners: 4 of a tetrahedron, 3 of a triangle.
 
     Returns:

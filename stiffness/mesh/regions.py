@@ -81,7 +81,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
     Args:
         solid: any.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         The solid, with the region of each tetrahedron and the triangles between them.
@@ -110,7 +110,7 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
     Args:
         solid: any.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         True if a region has no faces, or cutting along them failed.
@@ -129,7 +129,7 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
     Args:
         solid: any.
-        regions: of the link.
+        regions: regions of the link.
 
     Returns:
         (e, 2) corners.

@@ -33,7 +33,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
     """Return the mesh of a slender or thin-walled straight bar.
 
     Args:
-        surface: of the link.
+        surface: surface of the link.
         base: the held interface.
         tip: the loaded interface.
 

@@ -23,9 +23,9 @@ class Solid:
         cells: (t, 4) corners of tetrahedra, of positive volume.
         faces: (f, 3) corners of boundary triangles, outward.
         patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: of the patches; None leaves a patch's nodes unchanged.
-        walls: by pair of an interface and a patch that continues it smoothly, the wall
-            on their common line, see :mod:`stiffness.surface.smooth_outline`.
+        shapes: shapes of the patches; None leaves a patch's nodes unchanged.
+        walls: walls by pair of an interface and a patch that continues it smoothly, the
+            wall on their common line, see :mod:`stiffness.surface.smooth_outline`.
         surface: surface to be approximated; None if its patches' shapes suffice.
         inner: (k, 3) corners of triangles inside, between regions of the link.
         inner_patch: (k,) index of the shape of each of them.
@@ -188,9 +188,9 @@ def on_shapes(
     Args:
         points: (n, 3) [m].
         groups: points by their patches.
-        shapes: of the patches.
+        shapes: shapes of the patches.
         reach: [m] largest motion of a point.
-        walls: of a :class:`Solid`; none if absent.
+        walls: walls of a :class:`Solid`; none if absent.
 
     Returns:
         (n, 3) [m].

@@ -26,7 +26,7 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
 
     Raises:
         BadInput: an unknown name, a missing one, or one that is not > 0.
@@ -55,7 +55,7 @@ def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
 
     Returns:
         The surface; its facets' corners lie on the exact shape.
@@ -115,7 +115,7 @@ def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piec
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: by name [m].
+        lengths: lengths by name [m].
         nu: [-] Poisson's ratio, for the shear factors.
 
     Returns:

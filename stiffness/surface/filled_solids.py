@@ -12,7 +12,7 @@ class FilledSolids:
     """Touching solids, with the triangles around each.
 
     Attributes:
-        names: of the solids.
+        names: names of the solids.
         points: (n, 3) [m].
         triangles: (m, 3) indices of points; two solids that touch have the same ones.
         sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.

@@ -17,7 +17,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
     """Return the points and polygons of an OBJ file.
 
     Args:
-        path: of an existing file.
+        path: path of an existing file.
 
     Returns:
         (n, 3) points in the file's unit, and the corner indices of each polygon.

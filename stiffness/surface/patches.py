@@ -20,8 +20,8 @@ class Patches:
 
     Attributes:
         patch: (m,) number of each triangle's patch; 0 is the base interface, 1 the tip.
-        shapes: of each patch; lifted facets where no simpler one is known.
-        outlines: of the interfaces, where the surface continues smoothly.
+        shapes: shapes of each patch; lifted facets where no simpler one is known.
+        outlines: outlines of the interfaces, where the surface continues smoothly.
     """
 
     patch: NDArray

@@ -43,7 +43,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
     """Return the shapes of a smooth part.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         part: (k,) triangles between sharp edges.
 
     Returns:
@@ -89,7 +89,7 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
     """Return the simplest shape on which a part's corners lie as those of its facets.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         part: (k,) triangles.
         kinds: number of plane, cone, sphere and torus that are tried.
 
@@ -276,7 +276,7 @@ def ring(
     """Return a seed's flat face, grown by rings of faces that meet it smoothly.
 
     Args:
-        graph: of the surface.
+        graph: graph of the surface.
         inside: (m,) triangles that may be taken.
         flat: (m,) number of each triangle's flat face.
         seed: a triangle.

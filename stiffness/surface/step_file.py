@@ -25,7 +25,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
     """Read the names, volumes and bounding boxes of the solids of a STEP file.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
         Names; volumes [m^3]; lower and upper corner of each box [m].
@@ -75,7 +75,7 @@ class StepTriangles:
         points: (n, 3) [m].
         triangles: (m, 3) indices of points.
         sides: (m, 2) the solids on both sides, by their index in ``names``; -1 outside.
-        names: of the solids; none if the file's faces belong to no solid.
+        names: names of the solids; none if the file's faces belong to no solid.
         overlaps: pairs of solids that overlap, one line each.
     """
 
@@ -90,7 +90,7 @@ def read_step(path: Path, solid: str) -> StepTriangles:
     """Return fine triangles of solids of a STEP file, in metres by its own unit.
 
     Args:
-        path: of the file.
+        path: path of the file.
         solid: its name, ``one+other`` of several or ``*`` of all as one; may be empty
             where the file holds one.
 
@@ -144,7 +144,7 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
     Args:
         model: gmsh's, of the file.
-        path: for messages.
+        path: path of the file, for error messages.
         solid: as in :func:`read_step`; required if there are several.
 
     Returns:

@@ -24,7 +24,7 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
     """Return the points and triangles of an STL file; no points are merged.
 
     Args:
-        path: of an existing file.
+        path: path of an existing file.
 
     Returns:
         (3 m, 3) points in the file's unit and (m, 3) indices of them.

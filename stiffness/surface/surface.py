@@ -30,7 +30,7 @@ class Surface:
     Attributes:
         points: (n, 3) [m].
         triangles: (m, 3) indices of points.
-        name: of the file, for messages.
+        name: name of the file, for messages.
         repairs: the repairs made, in words.
         solids: solids of a STEP file that has several.
     """
@@ -116,8 +116,8 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
     Args:
         path: STL, OBJ, PLY, VTK, VTP, MSH, or STEP if gmsh is installed;
             ``part.step#name`` for one of several solids in a STEP file.
-        unit: of the file's coordinates: m, cm, mm, um or inch; a STEP file states its
-            own unit, which is used.
+        unit: unit of the file's coordinates: m, cm, mm, um or inch; a STEP file states
+            its own unit, which is used.
 
     Returns:
         The surface in metres, closed and outward.
@@ -161,7 +161,7 @@ def check_surface(
     Args:
         points: (n, 3) [m].
         triangles: (m, 3) indices.
-        name: for messages.
+        name: name for error messages.
         unit: the stated unit, for messages.
 
     Returns:

@@ -29,7 +29,7 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
     """Return a surface file, and the chosen solid of a STEP file.
 
     Args:
-        path: of a file, or ``part.step#name``; ``part.step#one+other`` or
+        path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
             ``part.step#*`` of several solids as one.
 
     Returns:
@@ -97,7 +97,7 @@ def step_solids(path: Path | str) -> list[StepSolid]:
     """List the solids of a STEP file.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
         The solids in the file's order, in metres by its own unit.

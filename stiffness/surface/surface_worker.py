@@ -24,7 +24,7 @@ def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
 
     Args:
         wanted: "triangles", or "solids" of a STEP file.
-        path: of an existing file.
+        path: path of an existing file.
         made: ``points`` (n, 3) and ``faces`` (m, 3), of STEP also ``sides`` (m, 2),
             ``names`` and ``overlaps``, see
             :class:`stiffness.surface.step_file.StepTriangles`; or ``names`` (n,),

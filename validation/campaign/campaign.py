@@ -21,8 +21,8 @@ class Campaign:
     reach every commanded configuration.
 
     Attributes:
-        name: of the campaign, that of its folder.
-        robot: as declared.
+        name: name of the campaign, that of its folder.
+        robot: robot as declared.
         ids: R labels, unique.
         coordinates: (R, n) [rad or m] of every joint, nominal closure solved.
         transforms: (R, n, 4, 4) frames seen from the base, without imperfections.

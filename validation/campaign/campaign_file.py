@@ -62,7 +62,7 @@ def read_campaign(folder: Path | str) -> Campaign:
     """Return the campaign of a folder.
 
     Args:
-        folder: with ``campaign.toml`` in it, or that file.
+        folder: folder with ``campaign.toml`` in it, or that file.
 
     Returns:
         The campaign, every configuration placed.
@@ -158,7 +158,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     """Return the campaign of a declaration, with a robot.
 
     Args:
-        declared: what the file says.
+        declared: value in the file.
         robot: the robot for the commands.
         measured: whether every row must have a measurement.
 

@@ -28,7 +28,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
 
     Args:
         table: the table as read.
-        robot: of the campaign.
+        robot: robot of the campaign.
 
     Raises:
         BadInput: the first such cell, with its likely meaning.

@@ -63,7 +63,8 @@ def read_dialect(root: Table) -> Dialect:
     """Return the format of the table from ``campaign.toml``.
 
     Args:
-        root: of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are read.
+        root: root of ``campaign.toml``; its optional ``[table]`` and ``[units]`` are
+            read.
 
     Returns:
         The format.

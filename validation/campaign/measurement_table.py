@@ -80,7 +80,7 @@ def read_table(
 
     Args:
         path: a CSV file with a header.
-        robot: whose actuated joints may be columns.
+        robot: robot with actuated joints that may be columns.
         dialect: format of the table.
         points: names of further points measured.
 
@@ -122,7 +122,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
     """Join tables of rows, each a session unless it says otherwise.
 
     Args:
-        tables: of one campaign, at least one.
+        tables: tables of one campaign, at least one.
 
     Returns:
         A single table unchanged; for several, labels begin with the file's name.

@@ -25,7 +25,7 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
     Args:
         carried: the robot in these sessions.
-        path: of the robot file; the covariance has the suffix ``.npz``.
+        path: path of the robot file; the covariance has the suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.

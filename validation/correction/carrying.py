@@ -42,17 +42,17 @@ class Carried:
     """One session: fitted values and errors.
 
     Attributes:
-        session: its name, None if the campaign has no sessions.
+        session: name of the session; None if the campaign has no sessions.
         unknowns: the k values that were fitted.
         values: (k,) [rad, m].
-        std: (k,) their standard deviations.
+        std: (k,) standard deviations of the values.
         rows: numbers of set-up rows and of others.
-        error: on the other rows.
-        declared: the same for the campaign's own robot, fitted in the same way.
+        error: error on the other rows.
+        declared: error of the campaign's own robot, fitted in the same way.
         uncertainty: [m] rms of the uncertainty of the other rows' points after the
             set-up rows.
         left: [m] rms residual of the set-up rows.
-        held: [m] the same with the robot's own numbers as saved.
+        held: [m] rms residual with the robot's own numbers as saved.
         open_: names of the most uncertain values, if the set-up rows do not suffice.
         left_behind: changes with time in the original session that are not fitted here,
             because their course is unknown without a clock.
@@ -90,7 +90,7 @@ class CarriedRobot:
     """A robot in its new sessions.
 
     Attributes:
-        fit: of the sessions' values and of the robot's own numbers.
+        fit: fit of the sessions' values and of the robot's own numbers.
         sessions: the sessions, judged on their other rows.
     """
 
@@ -112,7 +112,7 @@ def carry(
     """Fit a saved robot to the set-up rows of sessions, and judge it on the others.
 
     Args:
-        campaign: of the saved robot.
+        campaign: campaign of the saved robot.
         declared: the same rows with the campaign's own robot.
         setup: (R,) bool, the set-up rows.
         fitted: names in :data:`OF_A_SESSION`.

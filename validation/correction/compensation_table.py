@@ -16,7 +16,7 @@ def command_table(compensation: Compensation) -> str:
     """Return the corrected commands as a table with the columns of the targets.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
 
     Returns:
         CSV: ``id``, ``q.*`` or ``pose.*``, loads and covariates as given; it can be
@@ -45,7 +45,7 @@ def offset_table(compensation: Compensation) -> str:
     """Return the controller's offsets, and the error before and after, as a table.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
 
     Returns:
         CSV: ``id``, ``offset.<drive>`` [rad or m], ``before`` and ``after`` in position
@@ -80,7 +80,7 @@ def summary(
     """Return plain values: expected errors, and rows without a solution.
 
     Args:
-        compensation: of any targets.
+        compensation: compensation of any targets.
         diagnosed: ``position`` [m] and ``rotation`` [rad] rms of a reading on held-out
             rows, if not those of the robot's file.
 

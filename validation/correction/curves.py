@@ -45,7 +45,7 @@ class Curve:
         x: (k,) in the variable's unit.
         values: (k,) [rad, m, N m, N], or per wrench for a compliance.
         std: (k,) standard deviation, zero if the file gives none.
-        units: of x and of the values.
+        units: units of x and of the values.
     """
 
     function: Function
@@ -66,7 +66,7 @@ def curves_of(
     """Return all functions of a robot as curves.
 
     Args:
-        robot: with its functions.
+        robot: robot with its functions.
         over: least and largest value by variable; by default a full turn, the knots of
             a spline, or a typical range.
 
@@ -234,7 +234,7 @@ def figure_of(curves: list[Curve]) -> "Figure":
     """Return a figure with each curve in a panel, with twice its standard deviation.
 
     Args:
-        curves: of :func:`curves_of`, at least one.
+        curves: result of :func:`curves_of`, at least one curve.
 
     Returns:
         The figure.

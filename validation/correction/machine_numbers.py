@@ -37,7 +37,7 @@ class MachineNumbers:
     """Numbers of a saved robot that do not belong to a session.
 
     Attributes:
-        robot: as saved.
+        robot: robot as saved.
         numbers: m of them.
         root: (m, r) factor of their covariance.
     """
@@ -76,7 +76,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
     """Return the numbers of a saved robot that every session shares.
 
     Args:
-        robot: with its covariance, or ``tolerance`` and ``std``, in its file.
+        robot: robot with its covariance, or ``tolerance`` and ``std``, in its file.
 
     Returns:
         Those with a stated uncertainty, except numbers of one session and of a

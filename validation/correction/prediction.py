@@ -32,7 +32,7 @@ class PredictedReadings:
     Attributes:
         commands: the commands, R rows.
         prediction: the robot's readings.
-        error: of measured minus predicted; NaN where not measured.
+        error: error of measured minus predicted; NaN where not measured.
         spread: (R, 6) [rad, m] standard deviation of the prediction, by the uncertainty
             in the robot's file.
         noise: (R, 6) [rad, m] standard deviation of a reading about the machine's own
@@ -204,7 +204,7 @@ def reading_table(predicted: PredictedReadings) -> str:
     """Return predicted readings as a table: ``id`` and a campaign's reading columns.
 
     Args:
-        predicted: of any commands.
+        predicted: predicted readings of any commands.
 
     Returns:
         CSV; a cell is empty without a solution.  If the robot's file has uncertainties,

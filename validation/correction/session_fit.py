@@ -183,7 +183,7 @@ class SessionsFit:
         """Return the uncertainty of a session's readings due to that of x.
 
         Args:
-            number: of the session.
+            number: number of the session.
             cells: (R, 6) bool, which readings.
 
         Returns:
@@ -215,7 +215,7 @@ def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> Sessions
     """Fit the sessions' values and the machine's numbers to the set-up rows.
 
     Args:
-        sessions: of one robot.
+        sessions: sessions of one robot.
         machine: its own numbers.
 
     Returns:

@@ -68,7 +68,7 @@ class SessionUnknowns:
         prior: (k,) prior precisions, 1 / variance; zero without information.
         step: (k,) change that moves the readings by micrometres, for slopes.
         constant: [s] the drift's time constant, absent if no drift is fitted.
-        functions: of time, whose numbers are fitted.
+        functions: functions of time, whose numbers are fitted.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -124,7 +124,7 @@ def session_unknowns(
     """Return the numbers to be fitted in a session.
 
     Args:
-        robot: as saved, with the values of its original session.
+        robot: robot as saved, with the values of its original session.
         fitted: names in :data:`OF_A_SESSION`.
         clock: whether the session's rows have a time.
 

@@ -11,7 +11,7 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
     """Return the rows selected by ``--setup``.
 
     Args:
-        campaign: with rows in the order of the file.
+        campaign: campaign with rows in the order of the file.
         text: ``20`` for the first 20 of each session, numbers and ranges of rows such
             as ``1-20,31``, or labels.
 

@@ -34,7 +34,7 @@ def deviation_spread(
     """Return the standard deviation of the platform's deviation at the points measured.
 
     Args:
-        robot: with its effects.
+        robot: robot with its effects.
         conditions_for: function of a robot that returns R rows of conditions.
 
     Returns:
@@ -56,7 +56,7 @@ def number_slopes(
     """Return derivatives of the deviation by numbers of a robot's file.
 
     Args:
-        robot: with its effects.
+        robot: robot with its effects.
         conditions: R rows of it.
         numbers: k of its file.
         std: (k,) their standard deviations, which determine the steps.

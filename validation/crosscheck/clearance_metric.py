@@ -35,7 +35,7 @@ class ClearanceMetric:
     """Differences of the energy and of springs, and the optimality gap.
 
     Attributes:
-        robot: with its clearances.
+        robot: robot with its clearances.
         pairs: both solutions at each scale, largest first.
         springs: whether all links are springs in the simulation too.
     """

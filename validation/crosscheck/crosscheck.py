@@ -86,7 +86,7 @@ class Crosscheck:
     Attributes:
         posture: nominal.
         load: (6,) [N m, N] on the platform at scale 1, base axes.
-        links: how the simulation modelled links: ``"beam"``, ``"spring"``, ``"fem"``.
+        links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
         gravity: (3,) [m/s^2] at scale 1, base axes.
         pairs: one for each scale, largest first.
         asked: number of requested scales; smaller ones were added for a decision.

@@ -93,7 +93,7 @@ def limit_difference(
         scales: (k,) all different, largest first.
         ours: (k, ...) values that decrease as a power of the scale.
         theirs: (k, ...) values to compare.
-        power: of the scale.
+        power: power of the scale.
         floor: differences below it, in the values' unit, are noise.
         bound: on the relative difference.
         least_size: least reference of the difference, in the unit of the values at

@@ -22,9 +22,9 @@ class Pair:
 
     Attributes:
         scale: factor on errors and load.
-        linear: of the virtual-joint model.
-        simulated: of the simulation.
-        exact: of the virtual-joint model with finite rotations, None if there is none.
+        linear: result of the virtual-joint model.
+        simulated: result of the simulation.
+        exact: result of the virtual-joint model with finite rotations, or None.
         between: [J] energy of distributed weights in the simulation's beams, which the
             linear model does not contain.
         holding: the linear model with the springs of :func:`hold_free_motions`, to
@@ -120,7 +120,7 @@ def sprung(robot: Robot) -> NDArray:
     """Return the components with joint springs; rigid ones have no simulated wrench.
 
     Args:
-        robot: of n frames.
+        robot: robot of n frames.
 
     Returns:
         (n, 6) 1 where K_B is finite, else 0.
@@ -145,7 +145,7 @@ def hold_free_motions(posture: Posture) -> Posture:
     """Return the posture with the simulation's springs on free motions.
 
     Args:
-        posture: of a robot without clearances.
+        posture: posture of a robot without clearances.
 
     Returns:
         A posture of a robot whose passive joints without a spring of their own have one
@@ -168,7 +168,7 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
     """Return the energy in the springs that hold free motions, if there are any.
 
     Args:
-        robot: of the virtual-joint model, perhaps with such springs.
+        robot: robot of the virtual-joint model, perhaps with such springs.
         joint_screws: (n, 6) [rad, m] deformations of its joints.
 
     Returns:

@@ -16,7 +16,7 @@ def slope_figure(check: Crosscheck) -> "Figure":
     """Return the difference of simulation and linear model against the errors' scale.
 
     Args:
-        check: of :func:`validation.crosscheck.crosscheck.crosscheck`, without
+        check: result of :func:`validation.crosscheck.crosscheck.crosscheck`, without
             clearances.
 
     Returns:

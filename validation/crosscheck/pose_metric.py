@@ -49,7 +49,7 @@ class PoseMetric:
     """Differences of the platform's pose, of springs and energy.
 
     Attributes:
-        robot: without clearances.
+        robot: robot without clearances.
         pairs: both solutions at each scale, largest first.
         springs: whether all links are springs in the simulation too.
         gravity: whether there is gravity.

@@ -35,7 +35,7 @@ def check_poses(
     """Run a check at every reachable pose of a grid.
 
     Args:
-        robot: with its errors.
+        robot: robot with its errors.
         axes: values [m or rad] by pose component; components not named are free.
         check: function that runs at a posture.
         progress: function called after each pose with the number done and the total.
@@ -77,7 +77,7 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values: ``passed`` if all reachable poses did, at least one."""
+    """Return plain values; ``passed`` is true if all of the reached poses passed."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}

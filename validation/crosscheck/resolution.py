@@ -47,7 +47,7 @@ class Resolution:
     Attributes:
         name: frame and quantity, such as ``leg1.elbow.radial``.
         kind: link, joint stiffness, clearance or error.
-        value: of the number; 1 for a link, whose stiffness is scaled.
+        value: value of the number; 1 for a link, whose stiffness is scaled.
         smallest: relative change that is detected; inf if none is.
         by: the check that detects it first.
     """
@@ -71,7 +71,7 @@ def resolutions(
     """Return the smallest changes that the limits of a cross-check detect.
 
     Args:
-        posture: of the robot compared.
+        posture: posture of the robot compared.
         pairs: solutions at several scales, largest first.
         metric: the comparison.
         load: (6,) [N m, N] at scale 1.

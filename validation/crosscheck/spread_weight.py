@@ -24,7 +24,7 @@ class HeavyBeam:
     """A beam under its weight.
 
     Attributes:
-        index: of its frame.
+        index: index of its frame.
         link: its material.
         section: its section constants.
         length: [m].

@@ -43,7 +43,8 @@ class StiffnessCheck:
     Attributes:
         exact: the tangent of the exact equilibrium, without clearances.
         linear: the classical one, of the nominal robot.
-        simulated: that of the simulation, of small motions at the platform's origin.
+        simulated: stiffness in the simulation, for small motions at the platform's
+            origin.
         load: (6,) [N m, N] existing load.
         links: the simulation's model of the links.
         bent: whether springs are bent: by errors, a load or weight.

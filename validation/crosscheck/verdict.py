@@ -40,7 +40,7 @@ class Check:
     Attributes:
         value: best estimate, >= 0.
         bound: on it.
-        uncertainty: of the value.
+        uncertainty: uncertainty of the value.
         signal: whether the compared quantities are above the noise.
     """
 
@@ -84,7 +84,7 @@ def verdict(comparison: Judged) -> str:
     """Return the outcome of all checks on the scales solved.
 
     Args:
-        comparison: with its checks.
+        comparison: comparison with its checks.
 
     Returns:
         ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` if no check

@@ -27,7 +27,7 @@ class CandidatePart:
 
     Attributes:
         where: a frame, ``"base"`` or ``"reading"``.
-        components: of the screw there.
+        components: components of the screw there.
         variable: its public name.
         beside: public name of a second variable, if there are two.
     """

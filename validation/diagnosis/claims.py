@@ -69,7 +69,7 @@ class Parameter:
 
     Attributes:
         name: public name.
-        value: of the machine, with the declared value.
+        value: value of the machine, with the declared value.
         std: its standard deviation.
         declared: value in the robot's file; None if it has none.
         difference: the difference found.

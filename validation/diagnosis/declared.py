@@ -24,7 +24,7 @@ class Declared:
     """Predicted readings of a machine as declared; no measured reading is used.
 
     Attributes:
-        conditions: of all rows, before any registration.
+        conditions: conditions of all rows, before any registration.
         finite: whether motions of the declared model are finite.
     """
 
@@ -60,7 +60,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
     """Return the declared model of a campaign's rows.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         finite: whether motions of the declared model are finite; they also are if the
             file says so.
 

@@ -26,7 +26,7 @@ class Derivatives:
     """Readings of R rows near the declared model; each is computed once.
 
     Attributes:
-        conditions: as declared, with the registration if it was fitted.
+        conditions: declared conditions, with the registration if it was fitted.
     """
 
     def __init__(self, conditions: Conditions) -> None:

@@ -36,7 +36,8 @@ class Diagnosis:
         traced: result of the search.
         claimed: names of the claimed effects.
         effects: names of the effects of the machine found, claimed or not.
-        probability: of every effect of the library that the design can show.
+        probability: probability of every effect of the library that the design can
+            show.
         alternatives: sets of effects by name, with their probabilities, best first.
         lack: test whether the residual of the fitted rows is noise.
         before: errors of the declared model on the held-out rows without outliers.
@@ -53,7 +54,7 @@ class Diagnosis:
         sequence: models up to the machine found, with errors on the held-out rows.
         held: the rows that judge, and the method.
         outliers: (R,) bool, rows left out of all computations.
-        conditions: of the campaign, as declared and registered.
+        conditions: conditions of the campaign, as declared and registered.
         open: (R,) bool, rows in which clearances leave the pose undetermined, in the
             declared model or with the effects found; see
             :class:`assembly.measurement.predict.Prediction`.

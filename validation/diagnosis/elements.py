@@ -27,7 +27,7 @@ class Element:
     """An effect of the library at certain frames, or a function.
 
     Attributes:
-        name: of the effect; ``""`` for a function.
+        name: name of the effect; ``""`` for a function.
         columns: (N, m) whitened change of the readings per scaled unknown.
         scale: (m,) unknown per scaled unknown.
         offset: (N,) contribution at d = 0; None if zero.

@@ -101,8 +101,8 @@ def fit_machine(
     """Fit the unknown numbers of a robot to some rows of a campaign.
 
     Args:
-        campaign: of R rows, whose sigma and noise in common are used.
-        unknowns: of its robot.
+        campaign: campaign of R rows, whose sigma and noise in common are used.
+        unknowns: unknowns of its robot.
         rows: (R,) bool, rows to be fitted; readings of others are not used.
         start: (k,) start values; the prior's mean if absent.
 

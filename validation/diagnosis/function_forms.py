@@ -39,7 +39,7 @@ class CandidateShape:
 
     Attributes:
         form: a name of :data:`assembly.effects.forms.FORMS`.
-        names: of its columns.
+        names: names of the columns.
         given: shape parameters, in which it is not linear.
     """
 

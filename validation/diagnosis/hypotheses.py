@@ -30,7 +30,7 @@ class Slot:
     """One number to be fitted, which several unknowns of an effect may share.
 
     Attributes:
-        names: of the unknowns that it sets.
+        names: names of the unknowns that it sets.
         unknown: their scale and bounds.
         start: start value of a fit.
         shape: whether the model is strongly nonlinear in it; screening then holds it.

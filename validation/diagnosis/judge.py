@@ -66,7 +66,7 @@ def judge(
     """Return the errors on the held-out rows, and the verdict.
 
     Args:
-        campaign: of R rows, as measured.
+        campaign: campaign of R rows, as measured.
         traced: result of the search.
         fit: the machine that is saved.
         held: the rows that judge.

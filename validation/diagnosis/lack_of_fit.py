@@ -36,12 +36,12 @@ class LackOfFit:
 
     Attributes:
         rms: [-] of the whitened residual, with degrees of freedom.
-        probability: of a residual as large by noise of the stated sigma.
+        probability: probability of a residual as large by noise of the stated sigma.
         repeats: [-] rms scatter between repeats, whitened; NaN without repeats.
         repeats_freedom: [-] its degrees of freedom.
         against_repeats: probability of a residual as large by noise of the repeats'
             scatter.
-        common: whether noise that points of one measurement share was estimated from
+        common: whether the noise common to points of one measurement was estimated from
             the residual itself; repeats must then show it too.
     """
 
@@ -73,7 +73,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     """Test a residual.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened, independent in every cell if it is noise.
         unknowns: number of unknowns fitted.
 
@@ -117,7 +117,7 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     """Return the rows whose residuals are outliers.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened.
         most: largest number of outliers; one row in twenty if absent.
 
@@ -147,7 +147,7 @@ class Trend:
     Attributes:
         against: the variable in words.
         share: [-] of the squared whitened residual that it explains.
-        probability: of as large a share by noise, over all trends tried.
+        probability: probability of so large a share by noise, over all trends tried.
     """
 
     against: str
@@ -161,7 +161,7 @@ def trends(
     """Return variables with which a residual varies, the strongest first.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         conditions: its conditions.
         residual: (R, 6) [rad, m]; NaN where not measured.
 

@@ -42,7 +42,7 @@ class NextMeasurement:
         why: reason in words.
         configuration: commanded coordinates or pose by column name.
         load: (6,) [N m, N] at the reference point, base axes.
-        covariates: such as a temperature to be set.
+        covariates: covariates, such as a temperature to be set.
         power: [-] non-centrality of one such reading; 10 decides nearly always.
     """
 

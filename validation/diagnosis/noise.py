@@ -83,7 +83,7 @@ def findings(
     Args:
         tau: true over stated sigma.
         tau_std: its standard deviation.
-        repeats: of :func:`repeat_scatter`, from the residual.
+        repeats: result of :func:`repeat_scatter`, from the residual.
         memory: whether the model depends on earlier rows.
         common: [rad, m] noise that the points of a measurement share.
 

@@ -45,7 +45,7 @@ class NoiseInTime:
     Attributes:
         share: [-] of the variance that is correlated.
         constant: [s] correlation time.
-        probability: of as much correlation by white noise.
+        probability: probability of as much correlation by white noise.
     """
 
     share: float
@@ -57,7 +57,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     """Estimate the correlation of a residual in time.
 
     Args:
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         residual: (N,) whitened.
 
     Returns:
@@ -95,7 +95,7 @@ def widened(
         covariance: (k, k) by white noise.
         slopes: (N, k) of the estimates' weights: the estimates are the covariance times
             their products with the whitened readings.
-        campaign: of R rows, N measured cells.
+        campaign: campaign of R rows, N measured cells.
         noise: the correlated noise.
 
     Returns:

@@ -71,7 +71,7 @@ class Places:
         members: indices of the S single components of each place.
         equal: other components with the same response.
         most: largest plausible unknown of each place.
-        sizes: by number of components: places, members, and which are rotations.
+        sizes: for each number of components: places, members and rotations among them.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:

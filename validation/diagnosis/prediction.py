@@ -21,7 +21,7 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
     """Return the conditions of a campaign with finite motions, as of a real machine.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         rows: selection by numbers or a mask; their readings may depend on earlier rows.
 
     Returns:
@@ -42,7 +42,7 @@ def predicted(
     """Return the readings of a robot for the commands of a campaign.
 
     Args:
-        campaign: of R rows; its readings are not used.
+        campaign: campaign of R rows; its readings are not used.
         robot: other than the campaign's, of the same frames and closures.
         linear: whether motions are small, for a model without finite motions.
 

@@ -40,7 +40,7 @@ class Number:
         kind: one of the four kinds in the module's docstring.
         owner: the frame, the effect, or the index of the function in the file.
         name: the component, or the parameter.
-        session: of an effect that acts in one session alone.
+        session: session of an effect that acts in only one session.
     """
 
     kind: str

@@ -133,8 +133,8 @@ def save(diagnosis: Diagnosis, path: Path | str) -> None:
 
     Args:
         diagnosis: the diagnosis.
-        path: of the robot file; the covariance is written to the same name with the
-            suffix ``.npz``.
+        path: path of the robot file; the covariance is written to the same name with
+            the suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.

@@ -52,7 +52,7 @@ def select(
     """Find what the declared model lacks.
 
     Args:
-        columns: of all N measured cells.
+        columns: columns of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells; no other reading is used.
         update: function called with the stage, steps done, and steps in total.

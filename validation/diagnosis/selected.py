@@ -20,7 +20,7 @@ class Learned:
         candidate: places, variables and form.
         equivalent: other places and variables with the same predictions.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
-        probability: of all models with a function of these variables.
+        probability: probability of all models with a function of these variables.
         range_error: error in extrapolation; None if it cannot be estimated.
     """
 
@@ -51,14 +51,15 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: of the best model, first the measuring frame if it is unknown.
+        hypotheses: hypotheses of the best model, first the measuring frame if it is
+            unknown.
         values: (k,) estimates of their unknowns, in the order of the hypotheses.
-        functions: of the best model.
+        functions: functions of the best model.
         small: geometric errors and springs in use.
         noise: scale and findings.
         weights: (n,) probability that a cell is good.
-        models: by names, best first.
-        probability: of each effect of the library in any visited model.
+        models: models by names, best first.
+        probability: probability of each effect of the library in any visited model.
         unknowns: [-] number of well determined unknowns, with the measuring frame.
         states: the visited models, best first.
     """

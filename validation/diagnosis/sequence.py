@@ -79,7 +79,7 @@ class Stage:
     """A model of the sequence on the rows of one fold.
 
     Attributes:
-        unknowns: as in :class:`Step`.
+        unknowns: unknowns as in :class:`Step`.
         residual: (R, 6) [rad, m] of the fold's rows, NaN elsewhere.
     """
 
@@ -93,7 +93,7 @@ def stages(
     """Fit the models that lead to a fitted robot; judge each on held-out rows.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         fit: the last model of the sequence.
         rows: (R,) bool, rows that were fitted.
         held: (R,) bool, rows that judge.

@@ -49,7 +49,7 @@ class SetupBlunder:
     Attributes:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
             ``quaternion``.
-        columns: of the campaign's table, by name.
+        columns: columns of the campaign's table, by name.
         before: [sigma] residual without its correction, all others made.
         after: [sigma] residual with all corrections.
         sentence: advice on what to check.

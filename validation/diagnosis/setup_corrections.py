@@ -82,8 +82,8 @@ class Correction:
     """A correction of one blunder.
 
     Attributes:
-        kind: in one word.
-        columns: of the campaign's table that it changes.
+        kind: kind in one word.
+        columns: columns of the campaign's table that it changes.
         what: the correction in words, for a sentence.
         array: name of the array of :class:`SetUp` that it changes.
         change: function of that array, or of its deviation from the command.

@@ -64,7 +64,7 @@ def conditions_of(campaign: Campaign) -> Conditions:
     """Return the conditions of a campaign, as its robot's file declares the machine.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
 
     Returns:
         R conditions; a covariate that some sessions lack is NaN there.  Covariates
@@ -122,8 +122,8 @@ class Tangents:
     """First derivatives of a campaign's readings in every unknown of every effect.
 
     Attributes:
-        campaign: of R rows, N measured cells.
-        derivatives: of the readings in its rows.
+        campaign: campaign of R rows, N measured cells.
+        derivatives: derivatives of the readings in its rows.
         declared: (N,) readings without effects, whitened.
     """
 

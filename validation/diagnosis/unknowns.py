@@ -126,8 +126,8 @@ class Unknowns:
     """The unknown numbers x of a robot, with their prior.
 
     Attributes:
-        robot: as declared, with the effects of its file.
-        effects: of the library, including the registration.
+        robot: robot as declared, with the effects of its file.
+        effects: effects of the library, including the registration.
         small: geometric errors and joint compliances.
         functions: learned ones.
         sensitivities: with the normalisation of functions; None without functions.

@@ -39,10 +39,10 @@ def verdict(
 
     Args:
         selected: models with their probabilities.
-        names: of the library's effects of the fitted machine.
-        functions: whether it has functions.
-        small: whether it has geometric errors or springs.
-        more_than_noise: whether its residual is more than noise.
+        names: names of the library's effects of the fitted machine.
+        functions: whether the model has functions.
+        small: whether the model has geometric errors or springs.
+        more_than_noise: whether the model's residual is more than noise.
 
     Returns:
         ``"none_needed"``, ``"explained"``, ``"learned"``, ``"ambiguous"`` or

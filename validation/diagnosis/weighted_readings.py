@@ -18,7 +18,7 @@ class WeightedReadings:
     """Readings of the fitted cells, weighted; the device's frame is projected out.
 
     Attributes:
-        columns: of all N cells.
+        columns: columns of all N cells.
         given: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells.
         weights: (n,) relative precision, 1 for a good reading.

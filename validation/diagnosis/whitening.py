@@ -119,7 +119,7 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
     """Return the change of the readings by small motions of the platform.
 
     Args:
-        campaign: of R rows.
+        campaign: campaign of R rows.
         reading: (R, 6, 6) change of the readings per screw of the platform at its
             origin, base axes.
 

@@ -24,11 +24,11 @@ def columns_of(
 
     Args:
         commands: the commands.
-        rows: of the campaign.
+        rows: rows of the campaign.
         gaps: (R, T, 3) [m] deviation of each target; NaN if not read.
         turns: (R, 3) [rad] of the platform; NaN if not read.
         frame: pose of the device.
-        names: of the targets.
+        names: names of the targets.
 
     Returns:
         The columns by name.
@@ -59,9 +59,9 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
     """Return the standard deviations of readings along the base's axes.
 
     Args:
-        rows: of the campaign.
+        rows: rows of the campaign.
         frame: pose of the device.
-        names: of the targets.
+        names: names of the targets.
 
     Returns:
         (R, T, 3) [m], NaN if not stated.
@@ -79,7 +79,7 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
     Args:
         commands: the commands.
-        rows: of the campaign.
+        rows: rows of the campaign.
 
     Returns:
         A label for each.
@@ -105,7 +105,7 @@ def declaration(
 
     Args:
         declared: the targets file.
-        folder: of the campaign.
+        folder: folder of the campaign.
         spread: (..., 3) [m] stated with the readings, NaN if not.
         turned: whether orientations were read.
 

@@ -38,7 +38,7 @@ class Column:
         kind: ``"axis"``, ``"sigma"``, ``"U"``, ``"quaternion"``, ``"angle"``,
             ``"name"``, ``"time"``, or ``""`` for an ignored column.
         axis: x, y, z, or w of a quaternion.
-        unit: as stated in its name, or empty.
+        unit: unit stated in the column's name, or empty.
         target: the target of the column, or empty.
     """
 
@@ -52,7 +52,7 @@ def column_of(cell: str) -> Column:
     """Return the meaning of a column from its name alone.
 
     Args:
-        cell: of the header.
+        cell: cell of the header.
 
     Returns:
         Its meaning, without a target.
@@ -87,7 +87,7 @@ def unit_word(text: str) -> str:
     """Return the short name of a unit.
 
     Args:
-        text: such as Millimeters, inch, ° or mm.
+        text: text such as Millimeters, inch, ° or mm.
 
     Returns:
         The name, empty if it is no unit of length or angle.

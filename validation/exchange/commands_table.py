@@ -32,7 +32,7 @@ class Commands:
         ids: labels, unique.
         times: (C,) [s] of each command, NaN without one.
         columns: (C,) in SI by the name that a campaign has for it.
-        postures: of the declared robot, one for each command.
+        postures: postures of the declared robot, one for each command.
     """
 
     file: str

@@ -25,9 +25,9 @@ class Header:
 
     Attributes:
         first: index of the first row of data among the rows of the sheet.
-        cells: of the header as written; empty without one.
+        cells: cells of the header as written; empty without one.
         columns: their meaning.
-        unit: of lengths, as stated before the header, or empty.
+        unit: unit of lengths, as stated before the header, or empty.
         unit_line: line of the unit, for messages.
     """
 
@@ -44,7 +44,7 @@ def find_header(
     """Return the header of a table, after the lines before it.
 
     Args:
-        rows: of the sheet, by line.
+        rows: rows of the sheet, by line.
         targets: their names.
 
     Returns:
@@ -79,7 +79,7 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
     """Return the start of rows without header, and the unit stated before them.
 
     Args:
-        rows: of the sheet, by line.
+        rows: rows of the sheet, by line.
         decimal: the decimal mark.
 
     Returns:
@@ -101,7 +101,7 @@ def _by_target(
     groups of columns as targets, their order is used.
 
     Args:
-        cells: of the header.
+        cells: cells of the header.
         before: the rows above it.
         targets: their names.
 
@@ -217,7 +217,7 @@ def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
     """Return the columns of each target; without a target, under the empty name.
 
     Args:
-        columns: of a table.
+        columns: columns of a table.
 
     Returns:
         The columns by target, in the order in which targets are first named.

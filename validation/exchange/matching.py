@@ -17,8 +17,8 @@ class Match:
 
     Attributes:
         how: ``"name"``, ``"time"`` or ``"order"``: the method of the assignment.
-        rows: for each row of the campaign its command and its readings by target; a
-            target read again at a command makes a further row.
+        rows: for each row of the campaign its command and its readings by target;
+            a target read again at a command makes a further row.
         strangers: readings of other points, such as points on the ground.
         unmatched: readings of targets without a command.
         missing: readings without a position.
@@ -45,8 +45,8 @@ def match(
     """Assign readings to commands: by name, else by time, else by order.
 
     Args:
-        readings: in the order taken.
-        commands: in the order given.
+        readings: readings in the order taken.
+        commands: commands in the order given.
         targets: their names.
         window: [s] between a command and its readings.
 

@@ -40,7 +40,7 @@ def orientation_columns(
     """Return the columns of a target's orientation.
 
     Args:
-        columns: of the table.
+        columns: columns of the table.
         own: indices of the target's columns.
 
     Returns:
@@ -84,8 +84,8 @@ def from_angles(
 
     Args:
         place: file and line, for messages.
-        angles: by axis in the order of the columns.
-        order: as in the targets file, or None.
+        angles: angles by axis, in the order of the columns.
+        order: order in the targets file, or None.
 
     Returns:
         The rotation.

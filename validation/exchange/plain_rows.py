@@ -22,8 +22,8 @@ def read_plain_rows(
     """Return the readings of rows without a header.
 
     Args:
-        values: of the cells.
-        rows: by line; a name and x, y, z, or only numbers: of one point, or of all
+        values: values of the cells.
+        rows: rows by line; a name and x, y, z, or only numbers: of one point, or of all
             targets in their order.  Further cells are ignored.
         targets: (3,) [m] by name, platform axes.
 
@@ -55,7 +55,7 @@ def _first_column(
     the targets agree with the declared ones.
 
     Args:
-        rows: in cells.
+        rows: rows of cells.
         decimal: the decimal mark.
         targets: (3,) [m] each, platform axes.
 

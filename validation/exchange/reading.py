@@ -15,13 +15,13 @@ class Writing:
     """Format of an export, for what the export does not state itself.
 
     Attributes:
-        unit: of lengths, None if the header states it.
+        unit: unit of lengths, None if the header states it.
         decimal: the decimal mark of exports.
-        commands_decimal: of the table of commands.
+        commands_decimal: decimal separator of the table of commands.
         dates: ``"day_first"`` or ``"month_first"`` for dates with slashes, or None.
         coverage: ratio of an uncertainty (U95, U) to one standard deviation.
         orientation: order of three angles (:func:`.orientation.orders`), or None.
-        angle_unit: of angles whose header states none, or None.
+        angle_unit: unit of angles if the header states none, or None.
         oriented: whether orientations are read; otherwise they are ignored.
     """
 

@@ -26,7 +26,7 @@ class TargetsFile:
 
     Attributes:
         file: its path.
-        robot: as declared.
+        robot: robot as declared.
         robot_name: built-in name, or path from the targets file's folder.
         places: (3,) [m] of each target, platform axes.
         registration: ``"unknown"``: the device's pose is unknown, or ``"known"``: its
@@ -36,7 +36,7 @@ class TargetsFile:
         noise_rotation: [rad] the same for an orientation; None if none is read.
         rotations: (3,) [rad] rotation vector from the platform's axes to a target's, if
             declared; others are fitted.
-        writing: of the exports.
+        writing: notation of the exports.
     """
 
     file: Path

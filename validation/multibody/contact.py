@@ -32,7 +32,7 @@ class ClearanceCone:
     """A disc or an interval that bounds components of a screw.
 
     Attributes:
-        rows: of the screw, which it bounds together.
+        rows: rows of the screw, which it bounds together.
         size: [rad or m] > 0.
         stiffness: [N m/rad or N/m] of the contact.
         arm: [m] along z from the joint's middle to the contact; radial discs only.
@@ -84,7 +84,7 @@ def joint_clearance(
     """Return clearances of a frame's joint, and its own motion if it has no spring.
 
     Args:
-        frame: of a robot.
+        frame: frame of a robot.
         scale: factor on the clearances.
         bushes: whether a joint with both radial clearance and tilt is a pin in two
             bushes.  Each has that radial clearance, and their distance allows that

@@ -23,7 +23,7 @@ def without_squares(
 
     Args:
         steps: k of them, falling.
-        differences: of the same shape, one for each step.
+        differences: values of the same shape, one for each step.
 
     Returns:
         k - 1 arrays, without the error of the step's square.
@@ -40,7 +40,7 @@ def steadiest(
 
     Args:
         found: at least two arrays of the same shape.
-        size: of a change, which makes changes comparable.
+        size: size of a change, which makes changes comparable.
 
     Returns:
         The array, and its absolute change.

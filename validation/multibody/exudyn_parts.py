@@ -61,9 +61,9 @@ class Elastic:
         near: place on the inner body.
         far: place on the outer body.
         parts: Exudyn's numbers, of one connector or of the elements of a beam.
-        beam: whether it is a beam.
+        beam: whether the part is a beam.
         nodes: places along a beam, from base to tip, at equal distances.
-        modes: of a meshed body, which is a single part; None otherwise.
+        modes: modes of a meshed body, which is a single part; None otherwise.
     """
 
     near: Place

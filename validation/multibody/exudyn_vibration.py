@@ -45,7 +45,7 @@ def natural_frequencies(model: Model) -> NDArray:
     """Return the (k,) [Hz] natural frequencies of a solved model, lowest first.
 
     Args:
-        model: in its equilibrium.
+        model: model in its equilibrium.
 
     Returns:
         One for each inertia.

@@ -43,8 +43,8 @@ def stepped_compliance(
         model: solved.
         tree: its parts.
         platform: name of its frame.
-        loads: of :func:`add_step_loads`.
-        shift: of :func:`validation.multibody.exudyn_solver.solve`.
+        loads: loads of :func:`add_step_loads`.
+        shift: shift for :func:`validation.multibody.exudyn_solver.solve`.
         sizes: (6,) [rad or m per N m or N] approximate largest motion under unit loads.
 
     Returns:

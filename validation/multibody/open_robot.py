@@ -42,8 +42,9 @@ class Case:
     Attributes:
         posture: the robot and its joint coordinates.
         scale: factor on its geometric errors and clearances.
-        springs: by frame, K_E of links that are springs; see :func:`link_springs`.
-        meshes: by frame, links that are solids.
+        springs: by frame, K_E of links that are springs; see
+            :func:`link_springs`.
+        meshes: meshes by frame, links that are solids.
         elements: number of elements of each other link, a beam.
         clearances: whether joints have their clearances.
         bushes: whether pins have two bushes each.
@@ -114,7 +115,7 @@ class OpenTree:
         joints: joint springs by frame.
         idle: the springs of free motions by frame.
         contacts: joints with clearance by frame.
-        closures: in the robot's order.
+        closures: closures in the robot's order.
     """
 
     platform: NDArray

@@ -86,9 +86,10 @@ class SimulationModel:
     Attributes:
         links: ``"beam"``: links with a section are geometrically exact beams, the
             others 6 by 6 springs; ``"spring"``: all of them are springs.
-        stiffness: by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its axes, of
-            links that become springs and whose matrix the robot does not give.
-        meshes: by frame, links that are solids of finite elements in a floating frame.
+        stiffness: stiffness by frame, K_E (6, 6) [N m/rad .. N/m] at the frame, in its
+            axes, of links that become springs and whose matrix the robot does not give.
+        meshes: meshes by frame, links that are solids of finite elements in a floating
+            frame.
         elements: beam elements per link.
         clearances: whether joints have their clearances, scaled like the errors.
         bushes: whether joints with radial clearance and tilt are pins in two bushes,
@@ -259,7 +260,7 @@ def simulated_frequencies(
         posture: as in :func:`simulate_assembly`; links with a section are beams with
             consistent masses, the others must be given by a matrix and have none.
         count: largest number.
-        elements: of each beam.
+        elements: number of elements of each beam.
 
     Returns:
         (k,) [Hz] lowest first; free motions are held by 1e-6 N m/rad or N/m.

@@ -73,7 +73,7 @@ def simulated_tangent(
 
     Args:
         posture: the robot's configuration, with its errors.
-        model: of its links.  Clearances are included if they are in the model, in
+        model: model of its links.  Clearances are included if they are in the model, in
             smoothed contacts of 1e12 N/m; then there are no load steps.
         load: (6,) [N m, N] on the platform at its origin, base axes: a dead force, and
             a moment as a couple of dead forces.

@@ -1,4 +1,4 @@
-"""Problems (21) and (22) as the paper prints them, in cvxpy, against our solutions."""
+"""Problems (21) and (22) as the paper prints them, solved by cvxpy, for comparison."""
 
 import math
 from typing import Any
@@ -17,24 +17,24 @@ from assembly.model.statuses import (
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # relative, of energies and margins
-# what cvxpy's solver leaves open: [J], and [-] of a margin
+# tolerance of cvxpy's solver: [J], and [-] of a margin
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
 def compare_printed(
     posture: Posture, assembly: Assembly, zone: dict[str, Any]
 ) -> dict[str, Any]:
-    """Solve the printed problems, and compare energy and margins with ours.
+    """Solve the printed problems, and compare energy and margins with forcefit's.
 
     Args:
         posture: the robot's configuration.
-        assembly: ours, without loads.
-        zone: our ``margin`` and ``margin_free``.
+        assembly: forcefit's solution, without loads.
+        zone: forcefit's ``margin`` and ``margin_free``.
 
     Returns:
-        Their ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; by name
-        the ``relative_difference``, NaN where there is nothing to compare; ``checks``,
-        the verdict on each; ``verdict`` and ``passed``.  Where cvxpy has no solution,
+        cvxpy's ``energy``, ``platform_screw``, ``margin`` and ``margin_free``; the
+        ``relative_difference`` of each, NaN where nothing can be compared; ``checks``,
+        the verdict on each; ``verdict`` and ``passed``.  If cvxpy finds no solution,
         only the ``reason``.
     """
     from assembly.linear.reference.as_printed import (
@@ -71,7 +71,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Return Energies; inside an assembly zone they are zero but for rounding."""
+    """Return check of the energies; both are about zero in an assembly zone."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -81,7 +81,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Margins; nothing to compare where neither exists, or no clearance is needed."""
+    """Return check of margins; no verdict without margins or without need for one."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

@@ -32,7 +32,7 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 def unchecked_section(results: StudyResults) -> str:
-    """What could not be checked, and why."""
+    """Return section on checks that were not done, and the reasons."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
     return section("What could not be checked", table(["check", "why"], rows)) if (
         rows
@@ -59,7 +59,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """The shifts that clearances leave the platform; None where nothing bounds them."""
+    """Return translations free within the clearances; None if they are unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -141,7 +141,7 @@ def solution_section(results: StudyResults) -> str:
 
 
 def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
-    """What linear closures cost against finite motions."""
+    """Return rows on the error of linear closures, compared with finite motions."""
     if error["status"] != "ok":
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))

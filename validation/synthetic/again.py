@@ -33,7 +33,7 @@ def distances(
 
     Args:
         robot: declared.
-        effects: of the machine; those of the device alone have no effect.
+        effects: effects of the machine; those of the device alone have no effect.
         targets: commands at which the nominal robot would have the wanted poses.
         coordinates: (R, n) [rad or m] nominal coordinates of the commands.
         program: name of the simulation program.

@@ -16,7 +16,7 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
     """Return rows with lagged temperatures; between rows the recorded one is linear.
 
     Args:
-        rows: in the order of time.
+        rows: rows in the order of time.
         time_constants: [s] each.
 
     Returns:

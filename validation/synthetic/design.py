@@ -31,8 +31,8 @@ class CampaignDesign:
             prismatic one this times ``size``.
         size: [m] length for ``reach``.
         load: [N] largest force on the platform.
-        levels: of the load: ``"many"`` sizes and directions; ``"one"``: always the
-            same force.
+        levels: levels of the load: ``"many"`` sizes and directions; ``"one"``: always
+            the same force.
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
         command: ``"joints"`` or ``"pose"``, the form of commands in the file.
@@ -87,7 +87,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
 
     Args:
         design: any.
-        names: of the effects.
+        names: names of the effects.
 
     Returns:
         The design with more conditions, if the effects need them.
@@ -110,7 +110,7 @@ class CampaignPlan:
     """The rows of a design on a robot.
 
     Attributes:
-        rows: in the order of measurement.
+        rows: rows in the order of measurement.
         configuration: (rows,) number of each row's configuration.
         commands: (rows, m) as written to the file.
         columns: names of the m columns.
@@ -129,7 +129,7 @@ def plan_campaign(
 
     Args:
         robot: declared.
-        design: of the campaign.
+        design: design of the campaign.
         rng: of the draws.
 
     Returns:

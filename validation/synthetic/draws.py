@@ -27,7 +27,7 @@ def draw_effect(
     """Return an effect with plausible parameters, at one place or at all.
 
     Args:
-        name: of the effect.
+        name: name of the effect.
         robot: the robot with the effect.
         duration: [s] of the session.
         rng: of the draws.

@@ -51,8 +51,8 @@ class Machine:
     """The simulated machine of a row.
 
     Attributes:
-        robot: with the frames that effects have added; the load acts and the pose is
-            read at its platform.
+        robot: robot with the frames that effects have added; the load acts and the pose
+            is read at its platform.
         coordinates: [rad or m] of every joint, 0 where absent.
         load: (6,) [N m, N] applied.
         gravity: (3,) [m/s^2] base axes.

@@ -37,7 +37,7 @@ class Alternative:
     """A set of effects compared with the hidden ones.
 
     Attributes:
-        names: of the effects.
+        names: names of the effects.
         parameters: their number.
         residual: [-] chi square that they do not explain, without noise.
     """
@@ -51,8 +51,8 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
     """Return all small sets of public effects, best first.
 
     Args:
-        campaign: with its hidden effects.
-        size: of the largest sets.
+        campaign: campaign with its hidden effects.
+        size: size of the largest sets.
 
     Returns:
         Sets with their residuals of the contribution of the hidden effects.
@@ -88,7 +88,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
     """Return the whitened columns of every public effect that applies to the robot.
 
     Args:
-        campaign: with the design and the noise.
+        campaign: campaign with the design and the noise.
 
     Returns:
         By name ``(6 rows, parameters)``, drift by its time constant.

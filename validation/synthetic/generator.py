@@ -55,7 +55,7 @@ class Synthetic:
         exact: (rows, 6) [rad, m] the same without noise and blunders.
         added: (rows, 6) [rad, m] contribution of the hidden effects, without the frame.
         effects: hidden, with their parameters.
-        strength: by name, rms of each effect's own contribution, in sigmas.
+        strength: strength by name, rms of each effect's own contribution, in sigmas.
         outliers: rows with a blunder.
         hidden_base: (6,) screw of the measuring frame, None if known.
     """
@@ -122,9 +122,9 @@ def generate_campaign(
         robot: declared, its geometric errors known.
         wanted: effects by name, whose parameters are drawn, or effects with parameters;
             with the multiple of the noise for each alone.
-        design: of the campaign.
+        design: design of the campaign.
         noise: errors of the readings.
-        seed: of all draws.
+        seed: seed of all draws.
         program: ``"multibody"`` or, much faster, ``"springs"``.
         update: function called with a stage, the rows done and their total.
 
@@ -183,8 +183,8 @@ class _Shown:
     """Hidden effects that are visible in the readings.
 
     Attributes:
-        effects: with their parameters.
-        strength: of each alone, by name, in sigmas.
+        effects: effects with their parameters.
+        strength: strength of each alone, by name, in sigmas.
         declared: (rows, 6) [rad, m] readings without them.
         exact: (rows, 6) [rad, m] readings with all of them.
         sigma: (6,) [rad, m] noise.

@@ -36,7 +36,7 @@ class Hidden:
 
     Attributes:
         name: public name, or one that begins with an underscore.
-        parameters: as in the public formats.
+        parameters: parameters as in the public formats.
     """
 
     name: str
@@ -60,7 +60,7 @@ def simulate_readings(
         reference_point: (3,) [m] point at which the load acts and the pose is read,
             platform axes.
         rows: commanded configurations, loads and covariates.
-        effects: of the machine, which the declared model lacks.
+        effects: effects of the machine, which the declared model lacks.
         program: ``"multibody"``: Exudyn; ``"springs"``: much faster.
         update: called with the number of machines done and their total.
 

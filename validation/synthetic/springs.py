@@ -70,7 +70,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     """Return the equilibria of machines whose links are springs.
 
     Args:
-        machines: of one structure, without clearances.
+        machines: machines of one structure, without clearances.
 
     Returns:
         The equilibrium of each.

@@ -50,9 +50,9 @@ def truth_of(
     """Return the truth of a campaign.
 
     Args:
-        campaign: with its hidden effects.
-        verdict: of a correct diagnosis; if absent, that of a design that distinguishes
-            the effects.
+        campaign: campaign with its hidden effects.
+        verdict: verdict of a correct diagnosis; if absent, that of a design that
+            distinguishes the effects.
         accept: sets of effects that explain the data equally well.
         note: explanation.
 

@@ -135,7 +135,7 @@ class ReachableSet:
 
         Args:
             direction: (6,) weights of the screw's components.
-            method: of :func:`assembly.solvers.conic.minimise_energy`.
+            method: method of :func:`assembly.solvers.conic.minimise_energy`.
 
         Returns:
             The height with the point that attains it; infinite where the platform
@@ -224,7 +224,7 @@ def reachable_screws(
     """Return the set of platform screws that an assumption of (27) leaves possible.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         energy_budget: eta of assumption ``"budget"``, >= 0.
 
@@ -314,7 +314,7 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """[-] a threshold plus the rounding of the nominal closures."""
+        """Return [-] a threshold plus the rounding error of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
@@ -372,7 +372,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     """Return the clearances whose constraint is active, by strict complementarity.
 
     Args:
-        assembly: of least energy.
+        assembly: assembly of least energy.
         joints: the virtual joints whose columns are judged.
 
     Returns:
