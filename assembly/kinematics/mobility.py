@@ -12,13 +12,13 @@ from assembly.kinematics.ranks import rank_of
 
 @dataclass(frozen=True)
 class Mobility:
-    """Counts at one posture; every joint rigid but for its own motion.
+    """Degrees of freedom at one posture; every joint rigid except for its own motion.
 
     Attributes:
-        freedoms: joint motions that keep all closures.
-        locked_freedoms: the same with the actuated joints locked.
-        overconstraint: closure equations that the others already imply.
-        smallest_singular_value: [-] least one above zero of the constraint matrix,
+        freedoms: number of joint motions that keep all closures.
+        locked_freedoms: the same number with the actuated joints locked.
+        overconstraint: number of closure equations that the others imply.
+        smallest_singular_value: [-] least nonzero one of the constraint matrix,
             lengths divided by the robot's size: near zero is near a singularity.
     """
 
@@ -29,14 +29,14 @@ class Mobility:
 
 
 def mobility(posture: Posture, tolerance: float = 1e-8) -> Mobility:
-    """Mobility and overconstraint at a posture.
+    """Return the mobility and overconstraint at a posture.
 
     Args:
-        posture: where the robot stands.
+        posture: the robot's configuration.
         tolerance: relative size below which a singular value counts as zero.
 
     Returns:
-        The counts.
+        The numbers.
     """
     robot = posture.robot
     size = size_of(robot)

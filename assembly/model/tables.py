@@ -1,8 +1,8 @@
 """Results as labelled arrays (xarray) and tables (pandas).
 
 Names, dimensions and units are those of a sweep's NetCDF file: ``units`` and
-``long_name`` are attributes of every variable.  Neither package is imported before it
-is asked for.
+``long_name`` are attributes of every variable.  Both packages are imported on first
+use.
 """
 
 import math
@@ -34,7 +34,7 @@ class PlacedRobot(Protocol):
         """The manipulator."""
 
     def pose(self) -> dict[str, float]:
-        """Nominal platform pose by component."""
+        """Return the nominal platform pose by component."""
 
 
 class ForcedAssembly(Protocol):
@@ -42,7 +42,7 @@ class ForcedAssembly(Protocol):
 
     @property
     def posture(self) -> PlacedRobot:
-        """Where the robot stands nominally."""
+        """Nominal configuration of the robot."""
 
     @property
     def clearance_screws(self) -> NDArray:
@@ -70,10 +70,10 @@ class ForcedAssembly(Protocol):
 
 
 def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
-    """An assembly over its frames and closures, with the platform's error.
+    """Return an assembly over its frames and closures, with the platform's error.
 
     Args:
-        assembly: by the linear model or with finite motions.
+        assembly: assembly by the linear model or with finite motions.
 
     Returns:
         Data set with dimensions ``frame``, ``screw``, ``wrench_component`` and
@@ -107,7 +107,7 @@ def assembly_dataset(assembly: ForcedAssembly) -> "xarray.Dataset":
 
 
 def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
-    """Results of many points over ``point``.
+    """Return the results of many points over ``point``.
 
     Args:
         values: (k, ...) by the names of a sweep's variables.
@@ -120,11 +120,10 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
 
 
 def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
-    """The variables over some dimensions as a table, a column for each component.
+    """Return variables over some dimensions as a table, a column for each component.
 
     Args:
-        data: any, such as of this module; variables that lack one of the dimensions
-            are left out.
+        data: any data set; variables that lack one of the dimensions are left out.
         rows: the dimensions that become the index, a row for each of their points.
 
     Returns:
@@ -166,15 +165,15 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
 
 
 def component_unit(unit: str, component: str) -> str:
-    """Unit of one component of a variable that mixes angles and lengths.
+    """Return the unit of one component of a variable that mixes angles and lengths.
 
     Args:
-        unit: of the variable, such as ``"rad, m"``.
+        unit: unit of the variable, such as ``"rad, m"``.
         component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
             are rotation and translation.
 
     Returns:
-        The unit of that component; the variable's where that is one already.
+        The unit of that component; the variable's if it has only one.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:

@@ -66,7 +66,13 @@ def deflection_of(
             )  # fmt: skip
         else:
             curve = deflection_curve(
-                posture, component, loads, load, gravity, exact, progress
+                posture,
+                component,
+                loads,
+                load,
+                gravity,
+                "exact" if exact else "contact",
+                progress,
             )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}

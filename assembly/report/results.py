@@ -182,7 +182,7 @@ def exact_of(
     gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
-    """Results of ``assembly exact`` as plain values.
+    """Results of ``assembly solve --state exact`` as plain values.
 
     Args:
         posture: of the robot.

@@ -1,13 +1,13 @@
-"""The importance of errors as a data set, plain values and a table for people.
+"""The importance of errors as a data set, as plain values and as a text table.
 
-Two sizes are given beside the shares of the variance.  A group's *part* is the standard
-deviation of the platform's screw that involves the group, from the same sample.  The
-*gain* is a derivative, micrometres of the platform for each micrometre of error, and
-exact: see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's
-vector, so a platform that follows an error has a gain of 1.
+Two sizes are given in addition to the shares of the variance.  A group's *part* is the
+standard deviation of the platform's screw due to the group, from the same sample.  The
+*gain* is an exact derivative, micrometres of the platform for each micrometre of error:
+see :mod:`assembly.statistics.importance_slopes`.  Both are of the platform's vector, so
+a platform that follows an error has a gain of 1.
 
-Shares are estimates.  Groups whose intervals overlap are not distinguished by them, and
-have their possible ranks in common: see :mod:`assembly.statistics.ranking`.
+Shares are estimates.  Groups whose intervals overlap are not distinguished, and share
+their possible ranks: see :mod:`assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ class ImportanceOptions:
     Attributes:
         draws: base draws; (groups + 2) times as many are solved.
         by: see :func:`assembly.statistics.importance.source_groups`.
-        level: of confidence of the intervals.
+        level: level of confidence of the intervals.
     """
 
     draws: int
@@ -60,11 +60,11 @@ class ImportanceOptions:
 def importance_design(
     experiment: Experiment, asked: ImportanceOptions
 ) -> SaltelliDesign:
-    """The design for the importance of an experiment's errors.
+    """Return the design for the importance of an experiment's errors.
 
     Args:
         experiment: distributions and quantities.
-        asked: base draws and groups.
+        asked: number of base draws, and groups.
 
     Returns:
         The design.
@@ -77,10 +77,10 @@ def importance_design(
 def importance_rows(
     experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Records of some rows of a design.
+    """Return the records of some rows of a design.
 
-    Random clearance positions would add variance that is not due to the errors: they
-    are then those of the solution of (22).
+    Random clearance positions would add variance that is not due to the errors.  The
+    positions of the solution of (22) are used in their place.
 
     Args:
         experiment: the quantities.
@@ -92,7 +92,7 @@ def importance_rows(
         (count,) of the experiment's record type.
     """
     asked = replace(
-        experiment, clearance_model=importance_clearance_model(experiment), stiffness=""
+        experiment, clearance=importance_clearance_model(experiment), stiffness=""
     )
     evaluated = asked.evaluate(design.rows(first, count), range(count))
     rows = np.zeros(count, dtype=experiment.record_type)
@@ -102,20 +102,20 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Clearance model of the importance of an experiment's errors."""
-    return "worst" if experiment.clearance_model == "worst" else "least"
+    """Return the clearance model of the importance of an experiment's errors."""
+    return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Importance of the sources for the results of an experiment.
+    """Return the importance of the sources for the results of an experiment.
 
     Args:
         experiment: distributions and quantities.
-        design: of the draws.
-        rows: of the experiment's record type, of all rows of the design.
-        level: of confidence of the intervals.
+        design: design of the draws.
+        rows: rows of the experiment's record type, of all rows of the design.
+        level: level of confidence of the intervals.
 
     Returns:
         Data set ``first_index``, ``total_index`` over ``quantity``, ``group`` and
@@ -159,9 +159,9 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """(2, d) parts from the variance (6, d) of the screw due to groups."""
+    """Return the (2, d) parts from the variance (6, d) of the screw due to groups."""
     lost = np.isnan(variances).all(axis=0)
-    # a component that does not vary has no index, and adds nothing to the part
+    # a component that does not vary has no index and adds zero
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
@@ -169,15 +169,15 @@ def _parts(variances: NDArray) -> NDArray:
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """The data of :func:`importance_dataset` as plain values.
+    """Return the data of :func:`importance_dataset` as plain values.
 
     Args:
-        data: with it, or merged with the draws.
+        data: data with it, or merged with the draws.
 
     Returns:
         Base draws, the indices of each quantity with the ranks that their intervals
-        allow, and by group part and gain; the share
-        of draws discarded and, where there are no indices, a reason.
+        allow, and by group part and gain; the share of draws discarded and, without
+        indices, the reason.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -215,7 +215,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """The same as a table for people, the largest shares first."""
+    """Return the importance as a text table, the largest shares first."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
@@ -256,7 +256,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Part and exact slope of a group, in the table's columns."""
+    """Return the part and exact slope of a group, in the table's columns."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -268,6 +268,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """A share with its interval."""
+    """Return a share with its interval."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

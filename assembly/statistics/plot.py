@@ -32,10 +32,10 @@ NAMES = {name: one.words for name, one in _SHOWN.items()}
 def figure_of_draws(
     data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
 ) -> "Figure | None":
-    """The figure of a data set of draws or tolerances.
+    """Return the figure of a data set of draws or tolerances.
 
     Args:
-        data: as saved by ``statistics`` or ``tolerances``, or any other.
+        data: as saved by ``statistics`` or ``tolerances``, or another data set.
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
         quantities: of a histogram, by the names of :mod:`assembly.sweeps.panels`.
 
@@ -62,10 +62,10 @@ def figure_of_draws(
 def histogram_figure(
     data: "xarray.Dataset", quantities: Sequence[str] = ()
 ) -> "Figure":
-    """Histograms with medians, 95 % quantiles and most probable values.
+    """Return the histograms with medians, 95 % quantiles and most probable values.
 
     Args:
-        data: of :func:`assembly.statistics.monte_carlo.run_draws`.
+        data: data of :func:`assembly.statistics.monte_carlo.run_draws`.
         quantities: to be shown, by the names of :mod:`assembly.sweeps.panels`; those
             with a limit if empty.
 
@@ -109,7 +109,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """One panel; of a variable with components their largest."""
+    """Draw one panel; of a variable with components, the largest."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -129,16 +129,16 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
             panel.axvspan(
                 estimate["lower"], estimate["upper"], color=colour, alpha=0.25
             )
-    # the place with the least behind it takes seconds to find among many bars
+    # matplotlib's search for the emptiest place takes seconds with many bars
     panel.legend(fontsize=8, loc="upper right")
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Tornado plot of the importance, the largest on top, with intervals.
+    """Return the tornado plot of the importance, the largest on top, with intervals.
 
     Args:
-        data: with ``first_index`` and ``total_index``.
-        most: bars a panel.
+        data: data with ``first_index`` and ``total_index``.
+        most: largest number of bars in a panel.
 
     Returns:
         A panel for each quantity: the total share light, the share alone dark.
@@ -181,14 +181,15 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Bar chart of the tolerances, angles and lengths apart, with their upper bounds.
+    """Draw a bar chart of the tolerances with upper bounds; angles and lengths apart.
 
     Args:
-        data: of :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
+        data: data of
+            :func:`assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure: wide bars are of least cost; narrow ones, where different, those of
-        the convex programme, scaled uniformly.  The title has cost and verification.
+        A figure: wide bars are of least cost; narrow ones, where different, are those
+        of the convex programme, scaled uniformly.  The title has cost and verification.
 
     Raises:
         ValueError: the data set has no tolerances.

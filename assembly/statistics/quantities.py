@@ -19,12 +19,12 @@ _UNLIMITED = {"platform_screw", "duality_gap", "rotation_lower", "translation_lo
 
 
 def limit_names() -> tuple[str, ...]:
-    """Quantities that may be limited."""
+    """Return the quantities that may be limited."""
     return tuple(k for k in UNITS if k not in _UNLIMITED)
 
 
 def parse_limit(text: str) -> tuple[str, float]:
-    """Quantity and limit from text such as ``"energy=5"``.
+    """Return the quantity and limit from text such as ``"energy=5"``.
 
     Args:
         text: one of energy [J], margin, margin_free, rotation [rad], translation [m],
@@ -34,7 +34,7 @@ def parse_limit(text: str) -> tuple[str, float]:
         Both.
 
     Raises:
-        BadInput: not of that form.
+        BadInput: the text has another form.
     """
     name, _, number = (piece.strip() for piece in text.partition("="))
     names = limit_names()

@@ -1,4 +1,4 @@
-"""The quantities of a sweep: what may be asked at its points, and their table."""
+"""The quantities of a sweep: those that may be requested, and their table."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,16 +28,16 @@ _READING = ("registration", "drift")  # effects that change readings, not screws
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities asked for at every point; sent to each worker once.
+    """The quantities requested at every point; sent to each worker once.
 
-    Attributes:
-        robot: with its errors, which are used where none are drawn.
+    robot: robot with its errors, which are used if none are drawn.
+    design: its parameters, if some vary; otherwise None.
         design: its parameters, if some vary; else None.
         varied: paths of the varied parameters.
-        components: of the postures, see :mod:`assembly.sweeps.targets`.
-        sources: of drawn errors; None for the robot's own.
-        seed: of the draws.
-        assumption: of problem (27), or None to leave its bounds out.
+        components: components of the postures, see :mod:`assembly.sweeps.targets`.
+        sources: sources of drawn errors; None for the robot's own.
+        seed: seed of the draws.
+        assumption: assumption of problem (27), or None to leave its bounds out.
         clearance_only: bound (27) also for the robot without errors.
         wrenches: frames whose wrench is recorded.
         linearisation: compare each point with finite motions.
@@ -46,9 +46,9 @@ class Question:
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         under: covariates that the robot's effects depend on.
-        stiffness: also K_C and the shares of its parts, in a state of
-            :data:`assembly.sweeps.point_stiffness.STATES`; none if empty.
-        frequencies: how many natural frequencies, of the same K_C and declared masses.
+        stiffness: state of K_C, in :data:`assembly.sweeps.point_stiffness.STATES`, if
+            K_C and the shares of its parts are computed too; otherwise empty.
+        frequencies: number of natural frequencies, of the same K_C and declared masses.
         kept: names of the variables that are stored; all that are computed if empty.
     """
 
@@ -113,10 +113,10 @@ def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Vari
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that a sweep stores, by name.
+    """Return the numeric quantities that a sweep stores, by name.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.
@@ -126,10 +126,10 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """The numeric quantities that are computed, some perhaps not stored.
+    """Return the numeric quantities that are computed; some may not be stored.
 
     Args:
-        question: of a sweep.
+        question: question of a sweep.
 
     Returns:
         All but ``status`` and the texts.
@@ -167,7 +167,7 @@ def computed(question: Question) -> dict[str, Variable]:
 
 
 def _moving(robot: Robot) -> tuple[str, ...]:
-    """Names of the joints that are not fixed."""
+    """Return the names of the joints that are not fixed."""
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
@@ -184,12 +184,12 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Type of a point's record: what is stored, and ``status`` as a code."""
+    """Return type of a point's record: stored quantities, and ``status`` as a code."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Type of a record of some quantities, and ``status`` as a code."""
+    """Return the type of a record of some quantities, and ``status`` as a code."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

@@ -1,4 +1,4 @@
-"""Which quantities a sweep computes and stores, by the names of its data variables."""
+"""Selection of the quantities that a sweep computes and stores, by variable names."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,12 +27,12 @@ _NEEDED = (
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict a question to quantities that are named.
+    """Restrict a question to named quantities.
 
     Args:
-        question: of the other options.
-        texts: names of data variables, between commas; ``"default"`` stands for those
-            that are stored without names.
+        question: question of the other options.
+        texts: names of data variables, between commas; ``"default"`` means those that
+            are stored if none are named.
 
     Returns:
         The question; nothing is computed for variables that are not named.
@@ -56,7 +56,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """The question for every quantity whose options are given or have a default."""
+    """Return a question for all quantities whose options are given or have defaults."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -65,7 +65,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """The question for the variables kept and no others."""
+    """Return the question for exactly these variables."""
     every = _with_optional(question)
     return replace(
         question,
@@ -81,7 +81,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 
 def quantities_text() -> str:
-    """Every data variable of sweeps: name, unit, meaning, and the option it needs."""
+    """Return every data variable of sweeps: name, unit, meaning and needed option."""
     from assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()

@@ -16,6 +16,7 @@ import typer
 from forcefit.commands import assembly, report, stiffness, validation
 from forcefit.commands.convert import convert
 from forcefit.commands.example import example
+from forcefit.commands.help import Commands
 from forcefit.commands.old_names import with_new_names
 from forcefit.commands.options import JsonOption
 from forcefit.commands.progress import progress_bars, report_loading
@@ -24,7 +25,7 @@ from forcefit.inputs.errors import BadInput, one_line, quoted
 from forcefit.inputs.packages import naming_packages, need
 from forcefit.inputs.writing import write_json
 
-app = typer.Typer(
+app = Commands(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

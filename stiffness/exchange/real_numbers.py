@@ -9,10 +9,10 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """A number of a file.
+    """Return a number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:
@@ -29,10 +29,10 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """A whole number of a file.
+    """Return a whole number of a file.
 
     Args:
-        path: for messages.
+        path: path of the file, for error messages.
         word: the number, with blanks around it or none.
 
     Returns:

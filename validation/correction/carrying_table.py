@@ -1,4 +1,4 @@
-"""Sessions to which a robot was carried, for machines and people."""
+"""New sessions of a robot, as plain values and as text."""
 
 from dataclasses import asdict
 from typing import Any
@@ -8,7 +8,7 @@ from validation.correction.carrying import CarriedRobot
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
-    """For machines: every session, its values and its errors on the other rows."""
+    """Return plain values: every session, its values and its errors on other rows."""
     return {
         "machine": {
             "numbers": len(carried.fit.machine.numbers),
@@ -44,7 +44,7 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
 
 
 def text(carried: CarriedRobot) -> str:
-    """For people."""
+    """Return the sessions as text."""
     lines = []
     if carried.fit.machine.numbers:
         lines.append(

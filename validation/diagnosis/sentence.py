@@ -72,7 +72,7 @@ def titles(diagnosis: Diagnosis) -> list[str]:
 
 
 def calibration_text(tally: Calibration) -> str:
-    """How often the method is right on this design, in words."""
+    """Return how often the method is right on this design, in words."""
 
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
@@ -95,7 +95,7 @@ def open_text(open_: NDArray) -> str:
 
 
 def formula(function: Function) -> str:
-    """A function in words, by component: numbers times what they multiply."""
+    """Return a function in words, by component: numbers times what they multiply."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:

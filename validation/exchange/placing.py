@@ -1,4 +1,4 @@
-"""Readings in the base's axes: where the device stood, and what cannot be there."""
+"""Readings in the base's axes: pose of the device, and impossible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from validation.exchange.orientation import turns_of
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile
 
-_ASTRAY = 0.1  # of the spread of the commands: no machine is as wrong as that
+_ASTRAY = 0.1  # of the spread of the commands: larger than any machine's error
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target
@@ -35,15 +35,15 @@ class Placed:
     """Readings as deviations from the declared robot.
 
     Attributes:
-        frame: where the device stood.
+        frame: pose of the device.
         scatter: [m] of one component of all readings.
-        read: (R, T) whether a target was read where it can be.
-        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN where not read.
-        turns: (R, 3) [rad] of the platform, base axes; NaN where not read.
+        read: (R, T) whether a target has a possible reading.
+        gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not read.
+        turns: (R, 3) [rad] of the platform, base axes; NaN if not read.
         mounts: (3,) [rad] rotation vector from the platform's axes to those of each
             target whose orientation was read.
-        left_out: readings that cannot be where they were read, in words.
-        remarks: what else does not fit, in words.
+        left_out: impossible readings, in words.
+        remarks: other inconsistencies, in words.
     """
 
     frame: DeviceFrame
@@ -57,18 +57,18 @@ class Placed:
 
 
 def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
-    """Find where the device stood, and bring the readings into base axes.
+    """Estimate the pose of the device, and transform the readings to base axes.
 
     Args:
         declared: the targets file.
-        commands: what was commanded.
+        commands: the commands.
         rows: readings by command.
 
     Returns:
         The deviations.
 
     Raises:
-        BadInput: the readings do not say where the device stood, or fit far better in
+        BadInput: the readings do not determine the device's pose, or fit far better in
             another unit, mirrored, or with targets exchanged.
     """
     names = list(declared.places)
@@ -111,7 +111,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """A remark on readings that do not follow the commands, and the likely reason."""
+    """Return a remark on readings that do not follow the commands, with a reason."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
@@ -132,7 +132,7 @@ def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """(R, 3) mean of (R, T, 3) over the targets read; NaN where none was."""
+    """Return the (R, 3) mean of (R, T, 3) over the targets read; NaN without any."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -143,7 +143,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """(R, 3) [rad] deviations by a target's orientations, and its mount (3,) [rad]."""
+    """Return (R, 3) [rad] deviations by a target's orientations, and its mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -166,7 +166,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Targets of one command, read where they cannot stand, and why."""
+    """Return the targets of one command at impossible positions, and the reasons."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)
@@ -184,7 +184,7 @@ def _suspects(
 def _frame(
     declared: TargetsFile, measured: NDArray, nominal: NDArray, names: list[str]
 ) -> tuple[DeviceFrame, float]:
-    """Where the device stood, and the scatter about the declared robot."""
+    """Return the pose of the device, and the scatter about the declared robot."""
     read = np.isfinite(measured).all(axis=2)
     if declared.registration == "known":
         check_axes(declared.file, measured[read], nominal[read], known=True)

@@ -113,11 +113,13 @@ def answer(run, tmp_path, *words):
     return json.loads(file.read_text())
 
 
-@pytest.mark.parametrize("command", ["solve", "exact"])
-def test_functions_act_in_solve_and_exact(command, tmp_path, run):
+@pytest.mark.parametrize("state", ["contact", "exact"])
+def test_functions_act_in_every_state(state, tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA))
     turn = 1e-4 * sin(0.9) + 2e-5
-    screw = answer(run, tmp_path, command, path, "--joint", "drive=0.3")
+    screw = answer(
+        run, tmp_path, "solve", path, "--state", state, "--joint", "drive=0.3"
+    )
     expected = [0, 0, turn, -turn * L * sin(0.3), turn * L * cos(0.3), 0]
     assert screw["platform_screw"] == pytest.approx(expected, rel=1e-3, abs=1e-8)
 

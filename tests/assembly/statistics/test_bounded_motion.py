@@ -95,7 +95,7 @@ def test_no_clearance_model_exceeds_the_certified_worst_in_any_draw(seed):
     sources = tolerance_sources(robot, [1e-5] * 6, [f.name for f in robot.frames])
     rows = {
         model: Experiment(
-            home_posture(robot), sources, margins=False, clearance_model=model
+            home_posture(robot), sources, margins=False, clearance=model
         ).solve(0, 12)
         for model in ("worst", "uniform", "contact", "least")
     }

@@ -20,9 +20,9 @@ from tests.robots_for_tests import coaxial_beams
 STIFFNESS, PLAY = 1e6, 1e-4  # [N/m], [m]
 
 
-def springs(clearance=PLAY, **options):
+def springs(radial=PLAY, **options):
     """Two bars of 0.5 m that meet on the x axis, with play between them."""
-    play = Clearance(radial=clearance)
+    play = Clearance(radial=radial)
     robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
     sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
     return Experiment(home_posture(robot), sources, **options)
@@ -68,7 +68,7 @@ def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
 @pytest.mark.parametrize("axis", range(3))
 def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
     """Springs k of both ends, turned by d about an axis on their line: k d / 2."""
-    experiment = springs(margins=False, clearance_model="least")
+    experiment = springs(margins=False, clearance="least")
     widths = np.zeros(6)
     widths[axis] = 1e-3
     robot = experiment.posture.robot
@@ -97,7 +97,7 @@ def test_what_does_not_close_has_a_status_and_no_numbers():
 
 
 def test_later_draws_are_those_of_a_longer_run():
-    experiment = springs(clearance_model="contact", seed=4)
+    experiment = springs(clearance="contact", seed=4)
     whole, later = experiment.solve(0, 9), experiment.solve(5, 4)
     assert len(later) == 4
     for name in ("energy", "force", "translation", "platform_screw"):
@@ -107,7 +107,7 @@ def test_later_draws_are_those_of_a_longer_run():
 
 @pytest.mark.parametrize("model", ["least", "uniform", "contact"])
 def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
-    rows = arm(clearance_model=model).solve(0, 6)
+    rows = arm(clearance=model).solve(0, 6)
     screws = rows["platform_screw"]
     for part, name in ((slice(0, 3), "rotation"), (slice(3, 6), "translation")):
         size = np.sqrt((screws[:, part] ** 2).sum(axis=1))
@@ -141,7 +141,7 @@ def test_stress_is_that_of_the_links_alone_and_of_none_where_it_is_left_out(rng)
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])
-    experiment = Experiment(posture, sources, margins=False, clearance_model="least")
+    experiment = Experiment(posture, sources, margins=False, clearance="least")
     values = rng.uniform(-2e-3, 2e-3, size=(2, len(sources)))
     rows = experiment.evaluate(values, range(2))
     assert experiment.links == tuple(
@@ -207,7 +207,7 @@ def test_the_contact_length_is_named_with_the_pose_errors(contact_length):
     robot = Robot("arm", "tip", frames)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0], ("tip",))
     data = run_draws(
-        Experiment(home_posture(robot), sources, clearance_model="contact",
+        Experiment(home_posture(robot), sources, clearance="contact",
                    contact_length=contact_length), 20,
     )  # fmt: skip
     summary, length = summarise(data), contact_length or 0.4

@@ -213,7 +213,7 @@ def test_random_play_is_not_taken_for_importance():
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
     for play in CLEARANCE_MODELS:
         experiment = Experiment(
-            home_posture(robot), sources, clearance_model=play, margins=False
+            home_posture(robot), sources, clearance=play, margins=False
         )
         said = summarise(
             run_draws(experiment, 20, importance=ImportanceOptions(500, "source"))

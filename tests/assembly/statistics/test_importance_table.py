@@ -37,7 +37,7 @@ def arm(play=None, **options):
 
 def solved(by="source", draws=400, **options):
     """The data set of an arm without play, and its plain values."""
-    experiment = arm(clearance_model="least", **options)
+    experiment = arm(clearance="least", **options)
     design = importance_design(experiment, ImportanceOptions(draws, by))
     rows = importance_rows(experiment, design, 0, len(design))
     data = importance_dataset(experiment, design, rows)
@@ -87,7 +87,7 @@ def test_a_group_of_like_errors_gains_by_their_common_spread():
 
     Each moves it by as much as it is itself: the gain of both is 1.
     """
-    experiment = arm(clearance_model="least")
+    experiment = arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(400, "source"))
     design = replace(design, groups=[("turn", np.array([0])), ("xy", np.array([1, 2]))])
     rows = importance_rows(experiment, design, 0, len(design))
@@ -105,12 +105,12 @@ def test_rows_of_a_design_are_those_of_its_errors_without_random_play():
         ("contact", "least"),
         ("worst", "worst"),
     ):
-        experiment = arm(PLAY, clearance_model=model)
+        experiment = arm(PLAY, clearance=model)
         design = importance_design(experiment, ImportanceOptions(4, "source"))
         rows = importance_rows(experiment, design, 3, 9)
         assert importance_clearance_model(experiment) == taken
         assert rows.dtype == experiment.record_type
-        alone = replace(experiment, clearance_model=taken)
+        alone = replace(experiment, clearance=taken)
         expected = alone.evaluate(design.rows(3, 9), range(9))
         for name in ("translation", "rotation", "platform_screw"):
             np.testing.assert_allclose(
@@ -120,7 +120,7 @@ def test_rows_of_a_design_are_those_of_its_errors_without_random_play():
 
 def test_draws_without_an_answer_are_told_with_their_reason():
     """Less than a twentieth may be left out: beyond, the others are not independent."""
-    experiment = arm(clearance_model="least")
+    experiment = arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
     for lost, reason in ((4, None), (6, "6.0%")):
@@ -151,7 +151,7 @@ def test_draws_without_an_answer_are_told_with_their_reason():
 
 
 def test_margins_count_where_they_are_computed_and_stress_where_links_have_a_shape():
-    with_margins = replace(arm(clearance_model="least"), margins=True)
+    with_margins = replace(arm(clearance="least"), margins=True)
     design = importance_design(with_margins, ImportanceOptions(8, "source"))
     rows = importance_rows(with_margins, design, 0, len(design))
     data = importance_dataset(with_margins, design, rows, 0.5)

@@ -79,7 +79,7 @@ def test_a_draw_is_what_one_solve_says(experiment):
 
 @pytest.mark.parametrize("model", ["least", "contact"])
 def test_pose_errors_of_a_draw_are_the_sizes_of_its_screw(experiment, model):
-    data = run_draws(replace(experiment, clearance_model=model), 4)
+    data = run_draws(replace(experiment, clearance=model), 4)
     screw = data["platform_screw"].values
     for k, name in enumerate(("rotation", "translation")):
         sizes = np.sqrt((screw[:, 3 * k : 3 * k + 3] ** 2).sum(axis=1))

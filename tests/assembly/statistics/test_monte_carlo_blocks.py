@@ -57,9 +57,7 @@ def arm():
     )
     robot = Robot("arm", "tip", frames)
     sources = tolerance_sources(robot, [0, 0, 1e-3, 1e-4, 1e-4, 0], ("tip",))
-    return Experiment(
-        place_robot(robot), sources, clearance_model="least", margins=False
-    )
+    return Experiment(place_robot(robot), sources, clearance="least", margins=False)
 
 
 @pytest.mark.parametrize("held", [None, ExitStack()])
@@ -106,7 +104,7 @@ def test_importance_of_a_run_is_that_of_a_run_cut_at_other_places(arm, monkeypat
 def test_a_data_set_of_draws_says_what_was_solved(arm):
     """Units, meanings by clearance model, and everything that its numbers depend on."""
     asked = replace(
-        arm, clearance_model="worst", margins=True, seed=9, precision=(1e-6, np.inf)
+        arm, clearance="worst", margins=True, seed=9, precision=(1e-6, np.inf)
     )
     data = run_draws(asked, 3)
     units = {name: data[name].attrs["units"] for name in data.data_vars}
@@ -137,7 +135,7 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
     "change",
     [
         {"seed": 2}, {"margins": True}, {"stress": False}, {"load": (0.0,) * 6},
-        {"gravity": (0.0, 0.0, -9.81)}, {"clearance_model": "worst"},
+        {"gravity": (0.0, 0.0, -9.81)}, {"clearance": "worst"},
         {"precision": (1e-6, 1e-5)}, {"stiffness": "contact"},
     ],
 )  # fmt: skip
@@ -146,10 +144,9 @@ def test_runs_that_give_other_numbers_share_no_journal(arm, change):
     before, after = provenance(arm), provenance(replace(arm, **change))
     assert before == provenance(replace(arm))
     (name,) = change
-    named = "clearance" if name == "clearance_model" else name
     assert {
         k for k in before.keys() | after.keys() if before.get(k) != after.get(k)
-    } == {named}
+    } == {name}
 
 
 def test_runs_of_other_distributions_or_postures_share_no_journal(arm):

@@ -132,7 +132,7 @@ def test_allocations_share_results_only_where_everything_is_the_same():
         *(identity_of(postures, replace(plan, **change), 50) for change in (
             {"costs": plan.costs + 1}, {"most": plan.most / 2}, {"seed": 2},
             {"least": plan.least + 1e-9}, {"limits": {"energy": 2.0}}, {"draws": 7},
-            {"cost": "logarithm"}, {"asked_yield": 0.5}, {"clearance_model": "least"},
+            {"cost": "logarithm"}, {"asked_yield": 0.5}, {"clearance": "least"},
             {"group": plan.group[::-1]},
             {"sources": plan_for(robot, links[::-1], [1, 2], {}).sources},
         )),

@@ -120,7 +120,7 @@ def test_the_robot_of_the_page_is_a_draw_solved_alone():
     """Its platform is where its own assembly, outside the experiment, puts it."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(
-        posture, read_sources(ERRORS, posture.robot), seed=3, clearance_model="least"
+        posture, read_sources(ERRORS, posture.robot), seed=3, clearance="least"
     )
     data = run_draws(experiment, 40)
     (scene,) = parse(drawn_robot(experiment, data)).figures

@@ -94,10 +94,10 @@ def test_draws_of_random_play_are_the_same_in_one_batch_and_in_several():
     """The play of draw 515 is its own, whatever is solved with it."""
     posture = home_posture(tip())
     plan = plan_for(posture.robot, [("tip", 3)], [1], {"translation": 1e-3},
-                    clearance_model="contact")  # fmt: skip
+                    clearance="contact")  # fmt: skip
     values = np.linspace(-1e-3, 1e-3, 516)[:, None]
     _, found = Requirement([posture], plan).utilisations(values)
-    rows = Experiment(posture, plan.sources, clearance_model="contact").evaluate(
+    rows = Experiment(posture, plan.sources, clearance="contact").evaluate(
         values, range(516)
     )
     np.testing.assert_allclose(found[0], rows["translation"] / 1e-3, rtol=1e-9)
@@ -123,12 +123,12 @@ def test_bounds_of_the_largest_pose_error_are_as_near_as_their_limit_asks(rng):
     assert 1e-9 < (upper - lower).max() <= 1.01e-4
     (experiment,) = requirement.experiments
     assert experiment.precision == pytest.approx((np.inf, 1e-4 * limit))
-    assert experiment.clearance_model == "worst"
+    assert experiment.clearance == "worst"
     assert not experiment.margins
     assert not experiment.links
     # without a limit on it the play is left as it was solved
     others = Requirement([posture], replace(plan, limits={"energy": 1.0}))
-    assert others.experiments[0].clearance_model == "least"
+    assert others.experiments[0].clearance == "least"
 
 
 def test_the_stress_of_a_limit_is_that_of_the_most_stressed_link(rng):
@@ -167,7 +167,7 @@ def test_a_limit_within_the_play_of_perfect_parts_is_refused(
     """Of two postures the one of more play is named; only where all play counts."""
     postures = [home_posture(tip(0.5 * PLAY)), home_posture(tip())]
     plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
-                    clearance_model="worst" if worst_play else "least")  # fmt: skip
+                    clearance="worst" if worst_play else "least")  # fmt: skip
     requirement = Requirement(postures, plan)
     if not refused:
         reached = requirement.perfect_parts()

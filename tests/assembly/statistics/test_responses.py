@@ -114,9 +114,9 @@ def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
     """Draw by draw; the slopes are the direction of the platform's error."""
     posture, sources = arm()
     values = sources.draw(0, 12, seed=1)
-    rows = Experiment(
-        posture, sources, seed=1, clearance_model=play, margins=False
-    ).evaluate(values, range(12))
+    rows = Experiment(posture, sources, seed=1, clearance=play, margins=False).evaluate(
+        values, range(12)
+    )
     size, slopes = respond(linear_response(posture), sources, values, key, play)
     np.testing.assert_allclose(size, rows[key], rtol=1e-9)
     expected = rows["platform_screw"] / size[:, None]

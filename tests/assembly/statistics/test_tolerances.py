@@ -231,7 +231,7 @@ def several(paper):
               "margin_free": 4.0}  # fmt: skip
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
                 np.zeros(2), np.array([0.05, 0.005]), limits, asked_yield=0.9,
-                draws=100, clearance_model="least")  # fmt: skip
+                draws=100, clearance="least")  # fmt: skip
     return postures, plan, allocate(postures, plan, fresh=300)
 
 
@@ -288,7 +288,7 @@ def test_a_limit_below_the_play_of_perfect_parts_is_refused(paper):
                 draws=200)  # fmt: skip
     with pytest.raises(BadInput, match="even perfect parts reach 0.0003877 m by clear"):
         allocate([posture], plan, fresh=0)
-    at_rest = allocate([posture], replace(plan, clearance_model="least"), fresh=0)
+    at_rest = allocate([posture], replace(plan, clearance="least"), fresh=0)
     assert at_rest.tolerances.min() > 0
 
 

@@ -75,9 +75,7 @@ def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
     robot = Robot("arm", "tip", frames)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
     for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):
-        found = allocate(
-            [place_robot(robot)], replace(plan, clearance_model=play), fresh=100
-        )
+        found = allocate([place_robot(robot)], replace(plan, clearance=play), fresh=100)
         assert found.tolerances[0] == pytest.approx(tolerance, rel=1e-3)
         said = allocation_text(allocation_of(found))
         assert f"pose errors: clearance {play}" in said

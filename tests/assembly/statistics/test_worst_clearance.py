@@ -112,7 +112,7 @@ def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
 def test_no_other_play_is_worse_in_any_draw(share, play):
     """Inside the zone, at its edge and outside; 1e-9: two solutions of (22)."""
-    worst, other = papers(share), papers(share, clearance_model=play)
+    worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
     bound, found = (e.evaluate(values, range(60)) for e in (worst, other))
     for name in ("rotation", "translation"):
@@ -156,7 +156,7 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(
-            papers(0.025, clearance_model=play, precision=precision_for(limits)), 120
+            papers(0.025, clearance=play, precision=precision_for(limits)), 120
         )
         said = summarise(data, limits)
         share[play] = said["within_limits"]["probability"]
@@ -243,4 +243,4 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
 
 def test_an_unknown_play_is_refused():
     with pytest.raises(ValueError, match="clearance is 'most', expected one of"):
-        papers(0.1, clearance_model="most")
+        papers(0.1, clearance="most")

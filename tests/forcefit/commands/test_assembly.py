@@ -62,7 +62,7 @@ def test_what_is_no_point_or_direction_is_refused(run, option, message):
 
 def test_exact_under_gravity_and_the_linearisation_error_of_a_weight(run):
     gravity = ["--gravity", "z=-9.81", "--json", "-"]
-    _, out, _ = run("assembly", "exact", "arm6", *gravity)
+    _, out, _ = run("assembly", "solve", "arm6", "--state", "exact", *gravity)
     exact = json.loads(out)
     here = solve_exact(home_posture(load_robot("arm6")), gravity=[0, 0, -9.81])
     assert exact["platform_screw"] == pytest.approx(here.platform_screw.tolist())
@@ -150,12 +150,14 @@ def test_each_reading_and_each_half_has_its_own_answer(run, tmp_path):
     [
         (["solve", "--load", "fx=1e300"],
          "--load fx: found 1e+300, expected a number of size at most 1e+40"),
-        (["exact", "--load", "mz=-1e300"], "--load mz: found -1e+300"),
+        (["solve", "--state", "exact", "--load", "mz=-1e300"],
+         "--load mz: found -1e+300"),
         (["error", "--load", "fx=1e300"], "--load fx: found 1e+300"),
         (["solve", "--gravity", "z=1e300"],
          "--gravity z: found 1e+300, expected a number of size at most 1e+06"),
         (["solve", "--pose", "tx=1e300"], "--pose tx: found 1e+300"),
-        (["zone", "--pose", "rz=1e160"], "--pose rz: found 1e+160"),
+        (["solve", "--quantities", "margin", "--pose", "rz=1e160"],
+         "--pose rz: found 1e+160"),
         (["solve", "--joint", "left.drive=1e300"], "--joint left.drive: found 1e+300"),
         (["solve", "--under", "temperature=1e300"], "--under temperature: found"),
         (["error", "--at", "x=1e300"], "--at x: found 1e+300"),
@@ -226,7 +228,8 @@ most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
 @pytest.mark.parametrize(
     "words",
     [("statistics", "--errors", "errors.toml", "--draws", "20"),
-     ("tolerances", "--grid", "tx=0,ty=0,tz=0.45"), ("error",), ("zone",),
+     ("tolerances", "--grid", "tx=0,ty=0,tz=0.45"), ("error",),
+     ("solve", "--quantities", "margin"),
      ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
 )  # fmt: skip
 def test_no_command_has_a_first_order_verdict_at_a_singular_posture(
@@ -253,7 +256,8 @@ def with_a_limit(path):
 
 @pytest.mark.parametrize(
     "words",
-    [("zone",), ("error", "--tolerance-translation", "1e-5"), ("exact",),
+    [("solve", "--quantities", "margin"), ("error", "--tolerance-translation", "1e-5"),
+     ("solve", "--state", "exact"),
      ("stiffness",), ("deflection", "--along", "fz=0:-10:10"),
      ("solve", "--load", "fz=-10")],
 )  # fmt: skip

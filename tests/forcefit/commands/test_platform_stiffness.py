@@ -64,7 +64,7 @@ def test_a_free_motion_is_null_and_exit_status_1(run, tmp_path):
     [
         ["stiffness", "--state", "exact", "--load", "fz=5"],
         ["deflection", "--along", "fz=0:5:5"],
-        ["deflection", "--along", "fz=0:5:5", "--exact"],
+        ["deflection", "--along", "fz=0:5:5", "--state", "exact"],
         ["deflection", "--along", "fz=0:5:5", "--follow"],
         ["frequencies", "--state", "exact", "--load", "fz=5"],
     ],

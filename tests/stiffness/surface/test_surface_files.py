@@ -1,5 +1,6 @@
 """Surfaces from MSH and STEP, and readers in a process of their own."""
 
+import json
 import subprocess
 import sys
 
@@ -151,7 +152,7 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_of_several_solids_one_is_read_by_its_name(tmp_path):
+def test_of_several_solids_one_is_read_by_its_name(tmp_path, run):
     """A cylinder of 20 x 100 mm beside a box of 10 x 20 x 30 mm; facets cost 0.3 %."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "two.step"
@@ -168,6 +169,11 @@ def test_of_several_solids_one_is_read_by_its_name(tmp_path):
     assert volumes == pytest.approx(exact, rel=4e-3)
     with pytest.raises(BadInput, match='no solid "screw"'):
         read_surface(f"{path}#screw")
+    status, out, _ = run("stiffness", "fea", path, "--part", "list", "--json", "-")
+    solids = json.loads(out)["solids"]
+    assert status == 0
+    assert [solid["name"] for solid in solids] == names
+    assert [solid["volume"] for solid in solids] == pytest.approx(exact, rel=1e-6)
 
 
 TOUCHING = """

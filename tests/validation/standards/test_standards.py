@@ -88,7 +88,9 @@ def test_a_campaign_s_figures(run, tmp_path):
             for side in (1, -1)
         )
     ]
-    status, out, _ = run("validation", "iso", campaign(tmp_path, rows), "--json", "-")
+    status, out, _ = run(
+        "validation", "inspect", campaign(tmp_path, rows), "--iso", "--json", "-"
+    )
     table = json.loads(out)
     assert status == 0
     poses = {pose["label"]: pose for pose in table["iso_9283"]["poses"]}
@@ -111,7 +113,7 @@ def test_a_campaign_s_figures(run, tmp_path):
 
 def test_figures_need_repeats(run, tmp_path):
     folder = campaign(tmp_path, ["a,0,0,0,0,0,0,1", "b,0.1,0,0,0,0,1,1"])
-    status, _, err = run("validation", "iso", folder)
+    status, _, err = run("validation", "inspect", "--iso", folder)
     assert status == 2
     assert "found no command that was measured twice" in err
 
