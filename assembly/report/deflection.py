@@ -1,7 +1,7 @@
 """A load-deflection curve for machines and for people."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +33,7 @@ def deflection_of(
     loads: Sequence[float],
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
-    exact: bool = False,
+    state: Literal["contact", "exact"] = "contact",
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def deflection_of(
         loads: [N m or N] its values in the order in which they act.
         load: (6,) [N m, N] the rest of the load.
         gravity: (3,) [m/s^2] base axes.
-        exact: whether with finite motions.
+        state: ``"exact"`` with finite motions.
         follow: whether past limit points, by arc length, from the first to the last
             load; finite motions, clearances held at zero.
         progress: called with what is done, how often, and how often at most.
@@ -55,7 +55,7 @@ def deflection_of(
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
-        "along": WRENCH[component].lower(), "exact": exact or follow,
+        "along": WRENCH[component].lower(), "state": "exact" if follow else state,
         "followed": follow,
     }  # fmt: skip
     try:
@@ -66,13 +66,7 @@ def deflection_of(
             )  # fmt: skip
         else:
             curve = deflection_curve(
-                posture,
-                component,
-                loads,
-                load,
-                gravity,
-                "exact" if exact else "contact",
-                progress,
+                posture, component, loads, load, gravity, state, progress
             )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
@@ -95,7 +89,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 def deflection_text(results: dict[str, Any]) -> str:
     """A curve for people: a table and what happens on the way."""
-    head = listing(results["robot"], lines_of(results, "pose status reason"))
+    head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head
     component = [name.lower() for name in WRENCH].index(results["along"])

@@ -112,7 +112,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
         (Axis(name, "m" if name.startswith("t") else "rad"), v)
         for name, v in ticks.items()
     ]
-    title = f"zone margin, eq. (21), compliant joints {present['compliant']}"
+    title = f"{NAMES[present['quantity']]}, eq. (21)"
     layer = Layer("margin", title, "", margins)
     caption = "Up to 1 it goes together by its clearances alone."
     return value_map(axes, [layer], states.astype(str), caption)

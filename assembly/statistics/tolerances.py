@@ -125,7 +125,7 @@ def present_errors(
     order = np.argsort(-np.nan_to_num(effect))
     return {
         "postures": len(postures),
-        "compliant": compliant,
+        "quantity": "margin_free" if compliant == "free" else "margin",
         "largest_margin": margin,
         "margins": values,
         "at": posture.pose(),

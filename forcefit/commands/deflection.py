@@ -83,8 +83,8 @@ def deflection(
     )  # fmt: skip
     with one_thread(), progress_lines() as update:
         results = deflection_of(
-            applied.posture, component, loads, applied.load, applied.gravity, exact,
-            follow, update,
+            applied.posture, component, loads, applied.load, applied.gravity,
+            "exact" if exact else "contact", follow, update,
         )  # fmt: skip
     write_json(results, json)
     if json != "-":

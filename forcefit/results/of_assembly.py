@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from forcefit.results.quantities import count, flag, number, text
-from forcefit.results.records import Content, Each, Listed, Record, record
+from forcefit.results.records import Content, Each, Either, Listed, Record, record
 
 _SHARE = number("share")
 _AXIS = ("axis",)
@@ -92,7 +92,7 @@ PLATFORM_STIFFNESS = record(
 )  # fmt: skip
 _DEFLECTION = record(
     "state?", _POSTURE,
-    along=text("component of the load"), exact_=flag("with finite motions"),
+    along=text("component of the load"),
     followed=flag("past limit points"),
     loads_=number("load", "N m or N", "point"),
     deflection_=number("deflection", "rad or m", "point"),
@@ -197,7 +197,7 @@ _ALLOCATION = record(
     ),
 )  # fmt: skip
 _PRESENT = record(
-    "postures", compliant=text("compliant joints"),
+    "postures", quantity=text("margin judged"),
     largest_margin=number("largest margin"),
     margins=number("margins", "1", "posture"), at=POSE,
     factor_on_errors=number("factor on all errors at which it assembles everywhere"),
@@ -225,9 +225,7 @@ _SWEEP = Record(
     closed=False,
 )  # fmt: skip
 ASSEMBLY: Mapping[str, Content] = {
-    "assembly solve": SOLUTION,
-    "assembly zone": record("robot", zone=ZONE),
-    "assembly exact": _EXACT,
+    "assembly solve": Either((SOLUTION, _EXACT, record("robot", zone=ZONE))),
     "assembly error": _ERROR,
     "assembly stiffness": PLATFORM_STIFFNESS,
     "assembly deflection": _DEFLECTION,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from forcefit.results.quantities import count, flag, number, text
-from forcefit.results.records import Content, Each, Listed, Record, record
+from forcefit.results.records import Content, Each, Either, Listed, Record, record
 
 _ERROR_UNIT = record(position=text("unit"), rotation=text("unit"))
 _ERRORS = record("position rotation normalised")
@@ -182,6 +182,17 @@ _AXIS = record(
         )
     }
 )  # fmt: skip
+_ISO = record(
+    "campaign registration",
+    iso_9283=record(
+        poses=Listed(_POSE_FIGURES),
+        distances=Listed(
+            record("accuracy repeatability", labels=text("rows", "row"),
+                   commanded=number("commanded distance", "m"))
+        ),
+    ),
+    iso_230_2=Each(_AXIS),
+)  # fmt: skip
 _SESSION = record(
     session=text("session"), setup_rows=count("set-up rows"),
     other_rows=count("other rows"), suffices=flag("set-up rows suffice"),
@@ -205,7 +216,7 @@ _CURVE = record(
 MEASUREMENT: Mapping[str, Content] = {
     "validation diagnose": _DIAGNOSIS,
     "validation generate": record("rows", folder=text("folder")),
-    "validation inspect": _INSPECTION,
+    "validation inspect": Either((_INSPECTION, _ISO)),
     "validation plan": record(
         "rows", configurations=count("configurations"),
         pairs=Listed(
@@ -220,17 +231,6 @@ MEASUREMENT: Mapping[str, Content] = {
         device=record(rotation=number("rotation", "1", "row", "column"),
                       shift=number("position", "m", "axis")),
         mounts=Each(number("axes on the platform", "rad", "axis")),
-    ),
-    "validation iso": record(
-        "campaign registration",
-        iso_9283=record(
-            poses=Listed(_POSE_FIGURES),
-            distances=Listed(
-                record("accuracy repeatability", labels=text("rows", "row"),
-                       commanded=number("commanded distance", "m"))
-            ),
-        ),
-        iso_230_2=Each(_AXIS),
     ),
     "validation carry": record(
         machine=record(numbers=count("fitted parameters of the robot"),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from forcefit.results.quantities import count, flag, number, text
-from forcefit.results.records import Content, Each, Listed, Record, record
+from forcefit.results.records import Content, Each, Either, Listed, Record, record
 
 _MESH = record(
     "nodes? elements? volume? area? unknowns? meshes? seconds?",
@@ -37,32 +37,35 @@ _ENTRY = Record(
     ).content,
     frozenset(("mass", "center_of_mass", "inertia")), closed=False,
 )  # fmt: skip
+_SOLIDS = record(
+    solids=Listed(
+        record("name volume", low=number("least corner", "m", "axis"),
+               high=number("largest corner", "m", "axis"))
+    )
+)  # fmt: skip
+_COMPARISON = record(
+    "difference length slenderness", beam=LINK, fea=LINK,
+    end_effect=number("end effect, times r / L", "1", "component"),
+    axes_turned=number("turn of the axes that fits better", "rad"),
+    explanation=text("explanation"),
+)  # fmt: skip
+_OVER_SLENDERNESS = record(
+    size=number("size r of the section", "m"),
+    slenderness=number("L / r", "1", "length"), beam=_MATRICES, fea=_MATRICES,
+    difference=_OVER_LENGTHS,
+    relative_error_estimate=number("estimated error of the mesh", "1", "length"),
+    end_effect=_END_EFFECT, end_effect_error=_END_EFFECT,
+    second=number("second-order coefficient", "1", "row", "column"),
+    residual=_OVER_LENGTHS, explanation=text("explanation"),
+)  # fmt: skip
+_LOOKED_UP = record(
+    "stiffness relative_error_estimate", parameters=Each(number("parameter", ""))
+)
 STIFFNESS: Mapping[str, Content] = {
     "stiffness beam": LINK,
-    "stiffness curve": LINK,
-    "stiffness fea": LINK,
+    "stiffness fea": Either((LINK, _SOLIDS)),
     "stiffness import": LINK,
-    "stiffness solids": record(
-        solids=Listed(
-            record("name volume", low=number("least corner", "m", "axis"),
-                   high=number("largest corner", "m", "axis"))
-        )
-    ),
-    "stiffness compare": record(
-        "difference length slenderness", beam=LINK, fea=LINK,
-        end_effect=number("end effect, times r / L", "1", "component"),
-        axes_turned=number("turn of the axes that fits better", "rad"),
-        explanation=text("explanation"),
-    ),
-    "stiffness slenderness": record(
-        size=number("size r of the section", "m"),
-        slenderness=number("L / r", "1", "length"), beam=_MATRICES, fea=_MATRICES,
-        difference=_OVER_LENGTHS,
-        relative_error_estimate=number("estimated error of the mesh", "1", "length"),
-        end_effect=_END_EFFECT, end_effect_error=_END_EFFECT,
-        second=number("second-order coefficient", "1", "row", "column"),
-        residual=_OVER_LENGTHS, explanation=text("explanation"),
-    ),
+    "stiffness compare": Either((_COMPARISON, _OVER_SLENDERNESS)),
     "stiffness stress": record(
         "wrench", _STRESS, error=number("estimated error", "Pa"),
         region=text("region"), away=number("distance from the interfaces", "m"),
@@ -74,8 +77,5 @@ STIFFNESS: Mapping[str, Content] = {
     "stiffness library build": record(
         library=text("folder"), keys=text("keys of the entries", "entry")
     ),
-    "stiffness library list": record(entries=Listed(_ENTRY)),
-    "stiffness library look-up": record(
-        "stiffness relative_error_estimate", parameters=Each(number("parameter", ""))
-    ),
+    "stiffness library read": Either((record(entries=Listed(_ENTRY)), _LOOKED_UP)),
 }  # fmt: skip

@@ -45,7 +45,7 @@ def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_play():
     postures = [bars(4 * PLAY, ERRORS), bars(PLAY, ERRORS), bars(2 * PLAY, {})]
     found = present_errors(postures, "rigid", lambda *step: seen.append(step))
     assert seen == [(1, 3), (2, 3), (3, 3)]
-    assert (found["postures"], found["compliant"]) == (3, "rigid")
+    assert (found["postures"], found["quantity"]) == (3, "margin")
     np.testing.assert_allclose(found["margins"], [3.5 / 4, 3.5, 0.0], atol=1e-6)
     assert found["largest_margin"] == pytest.approx(3.5)
     assert found["factor_on_errors"] == pytest.approx(1 / 3.5)

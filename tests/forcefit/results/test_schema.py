@@ -108,7 +108,7 @@ def test_names_are_listed_and_an_unknown_one_is_refused_with_the_nearest(run):
     assert run("schema", "assembly", "sovle")[::2] == (
         2, 'forcefit: schema: no "assembly sovle"; did you mean "assembly solve"?\n'
     )  # fmt: skip
-    described = json.loads(run("schema", "assembly", "solve")[1])["properties"]
+    described = json.loads(run("schema", "assembly", "error")[1])["properties"]
     assert described["energy"]["description"].endswith("[J]")
 
 
