@@ -80,7 +80,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is that of a column, with so many variables."""
+        """Return whether a name is a column's in a form of so many variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")

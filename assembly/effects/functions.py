@@ -255,7 +255,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Refuse a function without a finite value in a row where it acts."""
+    """Reject a function without a finite value in a row where it acts."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)

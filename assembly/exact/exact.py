@@ -371,7 +371,7 @@ def solve_exact(
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Refuse to start the reference's steps from a compiled solution."""
+    """Reject to start the reference's steps from a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near is a compiled answer, expected one of method "

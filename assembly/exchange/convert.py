@@ -104,7 +104,7 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Refuse a file that could not be written, before the computation.
+    """Reject a file that could not be written, before the computation.
 
     Args:
         target: path of the file; for a URDF a YAML is written next to it.

@@ -12,14 +12,14 @@ _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sen
 
 
 def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
-    """Refuse an unknown element that names two bodies, which it may connect.
+    """Reject an unknown element that names two bodies, which it may connect.
 
     Args:
         node: an element that is not converted.
         owners: bodies by their names and by those of frames on them.
 
     Raises:
-        BadInput: it names two bodies, and is of no harmless kind.
+        BadInput: the element names two bodies, and its kind may connect them.
     """
     if _is_harmless(node):
         return

@@ -295,7 +295,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Refuse a name that is not that of a frame."""
+    """Reject a name that is not that of a frame."""
     if name == BASE:
         message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
         raise table.bad(key, message)

@@ -347,7 +347,7 @@ def with_distributed(
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
-    """Refuse numbers that are not finite or too large."""
+    """Reject numbers that are not finite or too large."""
     if given is None:
         return
     values = np.asarray(given, dtype=float)

@@ -124,7 +124,7 @@ def natural_modes(
 
 
 def check_masses(robot: Robot) -> None:
-    """Refuse a robot without any mass.
+    """Reject a robot without any mass.
 
     Raises:
         BadInput: no body has a mass.

@@ -133,7 +133,7 @@ class Experiment:
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
-        """Refuse limits on quantities that are not computed.
+        """Reject limits on quantities that are not computed.
 
         Raises:
             BadInput: margins were left out, or no link's stress can be computed.

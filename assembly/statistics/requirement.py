@@ -276,7 +276,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Refuse the limit that clearances alone exceed the most."""
+        """Reject the limit that clearances alone exceed the most."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -289,7 +289,7 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Refuse errors that neither clearances nor springs take up at some posture.
+        """Reject errors that neither clearances nor springs take up at some posture.
 
         Raises:
             BadInput: there is one; the message names it.

@@ -246,7 +246,7 @@ def _hollow(
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # the right side of a section rotated by so many quarter turns
+        # the right side of a section rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])

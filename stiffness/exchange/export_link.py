@@ -27,7 +27,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         (6, 6) and (3,) [m].
 
     Raises:
-        BadInput: it is no such file.
+        BadInput: the file is not of this kind.
     """
     try:
         content = json.loads(read_text(path))

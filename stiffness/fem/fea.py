@@ -381,7 +381,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Refuse a first mesh whose solution the budget does not allow."""
+    """Reject a first mesh whose solution the budget does not allow."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:

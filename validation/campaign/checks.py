@@ -24,7 +24,7 @@ _UNITS = "; if it is in other units say so in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
-    """Refuse impossible commands, loads and covariates.
+    """Reject impossible commands, loads and covariates.
 
     Args:
         table: the table as read.
@@ -71,7 +71,7 @@ def _check_covariates(table: MeasurementTable) -> None:
 
 
 def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
-    """Refuse a row without any measurement.
+    """Reject a row without any measurement.
 
     Args:
         table: the table as read.
@@ -89,7 +89,7 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
 def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
                    registration: str, extent: float) -> None:  # fmt: skip
-    """Refuse deviations larger than the robot, and invalid sigma.
+    """Reject deviations larger than the robot, and invalid sigma.
 
     Args:
         table: the table as read.
@@ -152,7 +152,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Refuse the first value whose size exceeds the largest valid one."""
+    """Reject the first value whose size exceeds the largest valid one."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -81,7 +81,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the same without some unknowns, by their numbers."""
+        """Return the unknowns without some of them, by number."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],

@@ -54,7 +54,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Return the same for some rows, by number; forms are normalised over all."""
+        """Return the sensitivities for some rows, with forms normalised over all."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -62,7 +62,7 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """Return the same for conditions that effects have changed.
+        """Return the sensitivities for conditions changed by effects.
 
         Forms are normalised as before.
         """

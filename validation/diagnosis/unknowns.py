@@ -242,7 +242,7 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Return the same without one of its effects."""
+        """Return the unknowns without those of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 

@@ -33,7 +33,7 @@ _MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a rotation makes them equal
 def check_axes(
     file: Path, measured: NDArray, nominal: NDArray, known: bool
 ) -> None:  # fmt: skip
-    """Refuse lengths in another unit, mirrored axes, and exchanged axes.
+    """Reject lengths in another unit, mirrored axes, and exchanged axes.
 
     Args:
         file: the targets file, for messages.
@@ -143,7 +143,7 @@ def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
 def _check_known_axes(
     file: Path, measured: NDArray, nominal: NDArray, scatter: float
 ) -> None:
-    """Refuse device axes that are exchanged or reversed axes of the base."""
+    """Reject device axes that are exchanged or reversed axes of the base."""
     best, found = scatter, ""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         tried = _scatter(measured[:, list(order)] * signs, nominal, known=True)

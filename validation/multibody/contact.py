@@ -66,7 +66,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Return the same with the stiffness of its contacts times a factor."""
+        """Return the clearance with the stiffness of its contacts times a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 

@@ -198,7 +198,7 @@ def simulate_assembly(
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
     """
     started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
