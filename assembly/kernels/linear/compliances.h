@@ -14,9 +14,10 @@
 namespace LANE_SPACE {
 
 enum { COMPLIANT, LOOSE, UNCLEAR };
-constexpr double STILL = 1e-9;  // of a unit wrench's work on a free motion: none
+// share of a unit wrench's work on a free motion that counts as zero
+constexpr double STILL = 1e-9;
 
-// Blocks of points of one robot, one after the other.
+// Blocks of points of one robot, in sequence.
 class Compliance : public Reduction {
 public:
     using Reduction::Reduction;
