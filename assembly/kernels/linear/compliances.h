@@ -1,4 +1,4 @@
-// The classical compliance at several postures side by side.  For a unit wrench e on the
+// The classical compliance at several postures in parallel.  For a unit wrench e on the
 // platform the closures carry lambda = lambda_e + Z^T mu: the first lets no free motion
 // work, the second makes the springs' energy
 //
