@@ -55,7 +55,7 @@ class Form:
     """One form.
 
     Attributes:
-        name: as in robot files.
+        name: name in robot files.
         summary: one line of description.
         most: largest number of variables.
         shapes: names of numbers in which it is not linear, and whether each is

@@ -126,7 +126,7 @@ def write_converted(robot: Robot, target: Path) -> Conversion:
     """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
 
     Args:
-        robot: any.
+        robot: any robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
 
     Returns:

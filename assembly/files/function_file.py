@@ -228,7 +228,7 @@ def function_table(function: Function) -> dict[str, Any]:
     """Return the table of a function for a robot file.
 
     Args:
-        function: of a robot.
+        function: function of a robot.
 
     Returns:
         Keys and plain values; :func:`read_function` reads them back to the same

@@ -39,7 +39,8 @@ from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero
-_PERTURBATIONS = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, for ranks
+# [rad or lengths] motions of the drives, to compute ranks
+_PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
 @dataclass(frozen=True, eq=False)

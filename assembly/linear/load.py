@@ -220,7 +220,7 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
     """Return a remark if gravity acts on nothing, or not on a link given by a mesh.
 
     Args:
-        robot: any.
+        robot: any robot.
         gravity: (3,) [m/s^2] or None.
 
     Returns:

@@ -72,9 +72,9 @@ def structure_of(
     """Return the screws that may move, as columns and as arrays.
 
     Args:
-        robot: any.
-        compliant: as for :func:`assembly.linear.closure.virtual_joints`.
-        bounded_motion: as for the same function.
+        robot: any robot.
+        compliant: see :func:`assembly.linear.closure.virtual_joints`.
+        bounded_motion: see the same function.
 
     Returns:
         The columns; the same data as arrays.

@@ -27,7 +27,8 @@ from assembly.statistics.worst_clearance import PRECISION, bound_worst_errors
 from forcefit.inputs.display import html_table, short_repr
 from forcefit.inputs.table import BadInput
 
-_PRECISION = 1e-3  # of a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

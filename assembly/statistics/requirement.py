@@ -21,7 +21,8 @@ from forcefit.inputs.table import BadInput
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-_PRECISION = 1e-4  # of a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-4
 _BATCH = 512  # draws solved and stored together
 TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 

@@ -56,7 +56,7 @@ def worst_corner(
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
         key: the quantity, see :func:`assembly.statistics.responses.respond`.
-        clearance_model: as of the same function.
+        clearance_model: see the same function.
         contact_length: [m] as of the same function.
 
     Returns:

@@ -219,7 +219,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     """Write a data set as NetCDF, whole or not at all.
 
     Args:
-        data: any.
+        data: any data.
         path: path of the new file; it replaces an old one only once it is complete.
 
     Raises:

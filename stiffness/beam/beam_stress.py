@@ -152,7 +152,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
     """Return fibres of a section and the stresses that moments and forces cause there.
 
     Args:
-        section: as in :func:`peak_beam_stress`.
+        section: see :func:`peak_beam_stress`.
 
     Returns:
         (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along

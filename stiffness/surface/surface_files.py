@@ -81,7 +81,7 @@ class StepSolid:
     """A solid of a STEP file.
 
     Attributes:
-        name: as in ``part.step#name``.
+        name: name after ``#``, as in ``part.step#name``.
         volume: [m^3].
         low: (3,) [m] the bounding box's lower corner.
         high: (3,) [m] its upper one.

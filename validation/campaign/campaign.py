@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.model.robot import Robot
 from forcefit.inputs.display import Figures, html_table, short_repr
 
-READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, in a screw's order
+# components of a deviation, in a screw's order
+READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 

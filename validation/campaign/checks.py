@@ -16,7 +16,8 @@ from validation.campaign.measurement_table import MeasurementTable
 
 _TURNS = 8 * np.pi  # [rad] largest command of a joint; 25 or more is in degrees
 _FORCE = 1e7  # [N], [N m] larger than any platform's load
-_WARMEST = 250.0  # [K] from calibration; 293 is an absolute temperature
+# [K] largest difference from calibration; 293 is an absolute temperature
+_WARMEST = 250.0
 _LATEST = 3e8  # [s] ten years; larger is a date
 _ROOM = 1000.0  # [m] largest distance of a measuring device
 _FINEST = 1e-15  # [rad, m] finer than any device

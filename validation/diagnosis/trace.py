@@ -44,8 +44,8 @@ from validation.diagnosis.weighted_readings import NONE
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _SEARCHED = 2000  # rows by which models are chosen; all are fitted
-_TURNS = 6  # of the search, without gross blunders
-_BENDS = 1  # of them, with what finite geometric errors add
+_TURNS = 6  # most repetitions of the search without gross blunders
+_BENDS = 1  # repetitions with second-order terms of geometric errors
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on

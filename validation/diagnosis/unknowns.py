@@ -29,7 +29,7 @@ from validation.diagnosis.signatures import conditions_of
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
 _BEND = 0.5  # standard deviation of a function's shape parameter; and its bound
 _HELD = 1e-12  # plausible sizes: standard deviation of an unknown with a declared value
-STEP = 1e-4  # of a number's size: step for its derivative
+STEP = 1e-4  # relative to a number's size: step for its derivative
 
 
 @dataclass(frozen=True, eq=False)

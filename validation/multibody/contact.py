@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 from assembly.model.robot import Clearance, Frame
 
-TURN_STIFFNESS = 1e9  # [N m/rad] of the contact
-SHIFT_STIFFNESS = 1e12  # [N/m] of the contact
+TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
+SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
 # [-] first and last width of the smoothing, in sizes of the cone
 WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
