@@ -260,7 +260,7 @@ def simulated_frequencies(
     Args:
         posture: see :func:`simulate_assembly`; links with a section are beams with
             consistent masses, the others must be given by a matrix and have none.
-        count: largest number.
+        count: largest number of frequencies.
         elements: number of elements of each beam.
 
     Returns:
