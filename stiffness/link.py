@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.display import Figures, html_table, numbers, short_repr
 from forcefit.inputs.table import BadInput
 
-# eigenvalues of a scaled 6 by 6 matrix are known to its size times this
+# rounding error of a scaled 6 by 6 matrix's eigenvalues, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 

@@ -212,7 +212,7 @@ def _room(
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # an interval leaves the share at its end; a disc, the width of a cap of that height
+    # range in an interval: the distance from its end; in a disc: the width of a cap
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]

@@ -87,7 +87,7 @@ class Plan:
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Return the (count, m) errors within tolerances of 1."""
+        """Return (count, m) drawn errors, as factors on the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 

@@ -90,7 +90,7 @@ class Journal:
             block: its number.
 
         Returns:
-            Both, as they were added.
+            The rows and texts, as they were added.
 
         Raises:
             BadInput: the file was changed in between, or cannot be read.

@@ -83,8 +83,8 @@ class StepSolid:
     Attributes:
         name: name after ``#``, as in ``part.step#name``.
         volume: [m^3].
-        low: (3,) [m] the bounding box's lower corner.
-        high: (3,) [m] its upper one.
+        low: (3,) [m] lower corner of the bounding box.
+        high: (3,) [m] upper corner of the bounding box.
     """
 
     name: str

@@ -50,7 +50,7 @@ def rest_poses(
     """Return the equilibria of machines of one structure under their loads.
 
     Args:
-        machines: with all their effects.
+        machines: machines with all their effects.
         program: one of :data:`PROGRAMS`.
         update: called with the number of machines at rest and their total.
 
