@@ -236,7 +236,7 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding of angles and of positions in reference lengths, times the forces there
+    # rounding errors of angles and positions, times the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
         # a refused Newton step is repeated by the conic solver before the step is

@@ -388,7 +388,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate from a guess to the end, its imbalance and the number of steps."""
+    """Iterate from a guess; return the last expansion, imbalance, number of steps."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))

@@ -5,8 +5,8 @@ from collections.abc import Container, Mapping
 from assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
-# words in names of elements that refer to bodies but do not constrain or move them; a
-# plugin is a program, which the report names
+# words in names of elements that refer to bodies without constraining or moving them;
+# the report names plugins, which are programs
 _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
              "plugin", "gripper", "visual", "group", "state")  # fmt: skip
 

@@ -213,7 +213,7 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return serial and parallel distances of motions, their rates, a screw."""
+    """Return serial and parallel distances, their motions' joint rates, a screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]

@@ -79,7 +79,7 @@ def farthest_points(
         starts: (cones + 1,) first column of each cone, and nu.
         directions: (k, nu) d, of length 1.
         right: (k, p).
-        tolerance: (k,) of d.u.
+        tolerance: (k,) accepted gap of d.u.
 
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate: d.u <=

@@ -169,7 +169,7 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Return Cowper's shear factor of a thin box, for a force along ``along``."""
+    """Return Cowper's shear factor of a thin box, for a force along one side."""
     m = n = across / along  # flange over web area is the same ratio for equal walls
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3

@@ -100,7 +100,7 @@ def step_solids(path: Path | str) -> list[StepSolid]:
         path: path of the file.
 
     Returns:
-        The solids in the file's order, in metres by its own unit.
+        The solids in the file's order, converted to metres.
 
     Raises:
         BadInput: the file cannot be read, holds no solid, or gmsh is not installed.
