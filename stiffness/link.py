@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# eigenvalues of a scaled 6 by 6 matrix are known to its size times this
+# rounding error of a scaled 6 by 6 matrix's eigenvalues, relative to its size
 _ROUNDING = 6 * np.finfo(float).eps
 
 
@@ -117,15 +117,15 @@ def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
 
 
 def check_definite(who: str, matrix: NDArray) -> None:
-    """Refuse what is not a stiffness or a compliance.
+    """Reject a matrix that is neither a stiffness nor a compliance.
 
     Args:
         who: owner of the matrix, for the error message.
         matrix: (6, 6).
 
     Raises:
-        BadInput: it is not symmetric to 1e-6 of its scale, or not positive definite by
-            more than rounding.
+        BadInput: the matrix is not symmetric to 1e-6 of its scale, or not positive
+            definite by more than rounding.
     """
     if not np.all(np.diag(matrix) > 0):
         raise BadInput(f"{who} is not positive definite: its diagonal has a value <= 0")

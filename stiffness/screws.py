@@ -39,7 +39,7 @@ def skew(vector: ArrayLike) -> NDArray:
 
 
 def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
-    """Return the matrix that re-reads a screw at another point, in other axes.
+    """Return the matrix that transforms a screw to another point and other axes.
 
     A body moves by the small screw ``s``, read at point ``q`` in the axes of a frame
     there.  The same motion, read at point ``p``, is ``screw_map(q - p, R) @ s``: the

@@ -55,7 +55,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
     """Return a robot on an elastic foundation: one more frame between base and ground.
 
     Args:
-        robot: any.
+        robot: any robot.
         values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; rigid if absent.
 
     Returns:

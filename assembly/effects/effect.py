@@ -45,7 +45,7 @@ class Effect:
     """One effect of the library.
 
     Attributes:
-        name: as in the public format.
+        name: name in the public format.
         apply: from conditions without the effect and parameters by their public names
             (``<frame>``, ``<frame>.<component>`` or plain) to conditions with it.
         unit: unit of a parameter, from the robot and the parameter's public name.

@@ -55,7 +55,7 @@ class Form:
     """One form.
 
     Attributes:
-        name: as in robot files.
+        name: name in robot files.
         summary: one line of description.
         most: largest number of variables.
         shapes: names of numbers in which it is not linear, and whether each is
@@ -80,7 +80,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is that of a column, with so many variables."""
+        """Return whether a name is a column's in a form of so many variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")

@@ -61,7 +61,7 @@ def parse_formula(text: str) -> ast.expr:
 
 
 def _check(node: ast.AST, depth: int) -> None:
-    """Refuse parts that are not in the grammar."""
+    """Reject parts that are not in the grammar."""
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")

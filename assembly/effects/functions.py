@@ -111,7 +111,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
 
     Args:
         conditions: R rows.
-        function: any.
+        function: any function.
 
     Returns:
         (R, k): its variables, NaN for wrenches; for a form with memory, the first
@@ -157,7 +157,7 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
     """Return a function's value.
 
     Args:
-        function: any.
+        function: any function.
         component: one of its components.
         inputs: (R,) each, from :func:`inputs_of`.
 
@@ -255,7 +255,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Refuse a function without a finite value in a row where it acts."""
+    """Reject a function without a finite value in a row where it acts."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)

@@ -91,7 +91,7 @@ def apply_robot_effects(
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
-    """Refuse effects that cannot be applied under the covariates given.
+    """Reject effects that cannot be applied under the covariates given.
 
     Args:
         robot: robot with the effects of its file.

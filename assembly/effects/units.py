@@ -52,7 +52,7 @@ def units_of(robot: Robot, function: Function) -> dict[str, str]:
 
     Args:
         robot: the robot on which it acts.
-        function: any.
+        function: any function.
 
     Returns:
         By parameter, such as ``"rad/K"``.

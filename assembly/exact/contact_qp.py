@@ -38,7 +38,8 @@ from assembly.solvers.method import Method
 AT_BOUNDARY = 1e-5  # [-] distance from size 1 within which a cone may be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
 _STILL = 1e-6  # [-] largest last step of a solution, in sizes of the cones
-_ZERO_MULTIPLIER = 1e-11  # of the largest: above minus this a cone stays active
+# relative to the largest: above minus this a cone stays active
+_ZERO_MULTIPLIER = 1e-11
 _LONGEST = 0.3  # [-] longest step along a boundary, which is curved
 _SHIFTS = (
     0.0,
@@ -48,7 +49,8 @@ _SHIFTS = (
     1e-6,
     1e-5,
 )  # of the largest curvature: tried
-_LEAST_CURVATURE = 1e-10  # of the largest curvature: smaller ones are replaced by it
+# relative to the largest curvature: smaller ones are replaced by it
+_LEAST_CURVATURE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,8 +51,9 @@ from forcefit.results.display import numbers
 CLOSED = 1e-12  # [rad, reference lengths] residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change of a step
 _SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] its wrenches are small
-_LEAST_DAMPING = 1e-9  # of the largest closure wrench: least damping
-_FIRST_DAMPING = 1e-8  # of the largest closure wrench: first damping of a refused step
+_LEAST_DAMPING = 1e-9  # relative to the largest closure wrench: least damping
+# relative to the largest closure wrench: first damping of a refused step
+_FIRST_DAMPING = 1e-8
 _ATTEMPTS = 40  # largest number of attempts at a step, each damped eight times as much
 _RESTORATIONS = 4  # corrections of a step back onto the closures
 
@@ -235,7 +236,7 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding of angles and of positions in reference lengths, times the forces there
+    # rounding errors of angles and positions, times the forces on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
         # a refused Newton step is repeated by the conic solver before the step is

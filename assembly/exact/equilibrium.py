@@ -12,7 +12,7 @@ from assembly.exact.dead_load import load_magnitudes
 from assembly.exact.descent import Expansion
 from assembly.solvers.cones import cone_sizes
 
-_ANGLE_ROUNDING = 1e-5  # of a small residual: rounding of an angle
+_ANGLE_ROUNDING = 1e-5  # relative to a small residual: rounding of an angle
 
 
 def imbalance(local: Expansion) -> float:

@@ -377,7 +377,7 @@ def solve_exact(
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Refuse to start the reference's steps from a compiled solution."""
+    """Reject to start the reference's steps from a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near is a compiled answer, expected one of method "
@@ -394,7 +394,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate from a guess to the end, its imbalance and the number of steps."""
+    """Iterate from a guess; return the last expansion, imbalance, number of steps."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))

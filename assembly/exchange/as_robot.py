@@ -165,7 +165,7 @@ def guess_platform(mechanism: Mechanism) -> str:
     """Return the body at the end of the longest chain that is not only part of a loop.
 
     Args:
-        mechanism: any.
+        mechanism: any mechanism.
 
     Returns:
         The name of a body that carries none; the first of equally long chains.

@@ -27,7 +27,7 @@ _WORKER = "from assembly.exchange.mujoco_reading import main; main()"
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Comparison of what another program and this one read in a file.
+    """Comparison of a file's content as read by another program and by forcefit.
 
     Attributes:
         reader: its name and version.

@@ -104,7 +104,7 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Refuse a file that could not be written, before the computation.
+    """Reject a file that could not be written, before the computation.
 
     Args:
         target: path of the file; for a URDF a YAML is written next to it.
@@ -126,7 +126,7 @@ def write_converted(robot: Robot, target: Path) -> Conversion:
     """Write a robot to a robot file, a URDF or an MJCF file, and read it back.
 
     Args:
-        robot: any.
+        robot: any robot.
         target: a ``.toml``, ``.urdf`` or ``.xml`` file.
 
     Returns:

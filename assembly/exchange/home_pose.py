@@ -64,7 +64,7 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Refuse a loop that does not close even if the others are open."""
+    """Reject a loop that does not close even without the other loops."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:

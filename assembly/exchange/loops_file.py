@@ -79,7 +79,7 @@ def read_loops(path: Path | str) -> LoopsFile:
         The content of the file.
 
     Raises:
-        BadInput: it is not YAML, or a key has an invalid value.
+        BadInput: the file is not YAML, or a key has an invalid value.
     """
     table = Table(_yaml(path), str(path), "")
     given = _list(table, "closed_loop")

@@ -213,7 +213,7 @@ def chain(
 
     Args:
         name: name of the whole joint; each part adds its own name to it.
-        parent: body it stands on.
+        parent: parent body.
         child: body it carries.
         placement: (4, 4) seen from the parent.
         after: (4, 4) of the child, seen from the last part after its motion.

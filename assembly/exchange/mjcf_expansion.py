@@ -46,8 +46,8 @@ def expanded(root: Node, depth: int = 0) -> Node:
         The root.
 
     Raises:
-        BadInput: a file is missing or is no MJCF, files stand too deep, copies are too
-            many, or a model or body to be attached is not there.
+        BadInput: a file is missing or is no MJCF, files are nested too deep, copies are
+            too many, or a model or body to be attached is not there.
     """
     if depth > _DEEPEST:
         raise BadInput(f"{root.file}: found models more than {_DEEPEST} deep")

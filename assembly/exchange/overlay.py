@@ -12,7 +12,7 @@ from typing import Any
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
 
-# keys that only the robot's own file has
+# keys that are valid only in the robot's own file
 _PLACED = ("parent", "translation", "rotation", "dh", "joint")
 _WHOLE = ("name", "description", "platform", "effect", "frame")
 

@@ -258,7 +258,7 @@ def word(node: Node, tag: str) -> str:
         The name.
 
     Raises:
-        BadInput: it is missing or empty.
+        BadInput: the attribute is missing or empty.
     """
     inner = node.child(tag)
     if inner is None or not inner.content:

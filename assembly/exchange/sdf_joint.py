@@ -159,7 +159,7 @@ def joint_couplings(
         A coupling for each axis that follows another.
 
     Raises:
-        BadInput: it follows a joint or an axis that does not exist.
+        BadInput: the joint follows a joint or an axis that does not exist.
     """
     couplings = []
     for tag in ("axis", "axis2"):

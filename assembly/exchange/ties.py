@@ -5,21 +5,21 @@ from collections.abc import Container, Mapping
 from assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
-# words in names of elements that refer to bodies but do not constrain or move them; a
-# plugin is a program, which the report names
+# words in names of elements that refer to bodies without constraining or moving them;
+# the report names plugins, which are programs
 _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
              "plugin", "gripper", "visual", "group", "state")  # fmt: skip
 
 
 def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
-    """Refuse an unknown element that names two bodies, which it may connect.
+    """Reject an unknown element that names two bodies, which it may connect.
 
     Args:
         node: an element that is not converted.
         owners: bodies by their names and by those of frames on them.
 
     Raises:
-        BadInput: it names two bodies, and is of no harmless kind.
+        BadInput: the element names two bodies, and its kind may connect them.
     """
     if _is_harmless(node):
         return

@@ -28,7 +28,7 @@ class Node:
     """An element of an XML file, with its position for messages.
 
     Attributes:
-        element: of :mod:`xml.etree.ElementTree`.
+        element: element of :mod:`xml.etree.ElementTree`.
         file: its file's name.
     """
 

@@ -78,7 +78,7 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
     """Return the tables of a robot's effects for a robot file.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         One table each; :func:`with_effects` reads them back to the same effects.
@@ -102,7 +102,7 @@ def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
     """Return the public names of all parameters that an effect may have on a robot.
 
     Args:
-        robot: any.
+        robot: any robot.
         effect: a name of the library.
 
     Returns:

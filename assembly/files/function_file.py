@@ -108,7 +108,7 @@ def _numbers(
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Refuse a variable that conditions do not have."""
+    """Reject a variable that conditions do not have."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -131,7 +131,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Refuse parameters that the form does not have, and missing ones."""
+    """Reject parameters that the form does not have, and missing ones."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
@@ -228,7 +228,7 @@ def function_table(function: Function) -> dict[str, Any]:
     """Return the table of a function for a robot file.
 
     Args:
-        function: of a robot.
+        function: function of a robot.
 
     Returns:
         Keys and plain values; :func:`read_function` reads them back to the same

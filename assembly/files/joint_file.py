@@ -112,7 +112,7 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         (n, n) the same matrix, exactly symmetric.
 
     Raises:
-        BadInput: it is not; the message has an entry that shows it, counted from 1.
+        BadInput: the matrix is not positive definite; the message names an entry.
     """
     if not K.size:
         return K

@@ -19,7 +19,7 @@ from forcefit.inputs.writing import path_from
 from stiffness.surface.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] shorter than any machine's
-_MOST_PIECES = 100  # of a beam; with 8 the error is 1e-4 of a quarter turn
+_MOST_PIECES = 100  # most pieces of a beam; with 8 the error is 1e-4 of a quarter turn
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
     '"area", "I_y", "I_z", "J", "shear_y", "shear_z"'

@@ -40,7 +40,7 @@ from stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # largest number of characters
-MOST_FRAMES = 2000  # of a robot; more closures would take minutes
+MOST_FRAMES = 2000  # most frames of a robot; more closures would take minutes
 
 
 def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
@@ -67,7 +67,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     Args:
         root: the table; paths in it are relative to the folder of ``root.file``.
         name: name of the robot if the table has none.
-        close: of :func:`read_robot`.
+        close: see :func:`read_robot`.
 
     Returns:
         The robot; its nominal closures hold in its home pose.
@@ -295,7 +295,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Refuse a name that is not that of a frame."""
+    """Reject a name that is not that of a frame."""
     if name == BASE:
         message = 'found "base"; expected a frame (add a fixed one whose parent is it)'
         raise table.bad(key, message)
@@ -355,7 +355,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
     """Return the content of a robot file.
 
     Args:
-        robot: any.
+        robot: any robot.
         folder: folder of the file to be written, to which paths are made relative.
 
     Returns:

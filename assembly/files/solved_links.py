@@ -160,7 +160,7 @@ def _digest(path: Path) -> str:
 
 
 def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
-    """Refuse interfaces whose distance differs from that of their origins."""
+    """Reject interfaces whose distance differs from that of their origins."""
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:

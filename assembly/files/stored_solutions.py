@@ -67,7 +67,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
     """Return the solution of a key: from the disk, or solved and stored.
 
     Args:
-        key: of :func:`solution_key`.
+        key: result of :func:`solution_key`.
         solve: function called if no solution is stored; other processes that need this
             key wait until it is done.
 

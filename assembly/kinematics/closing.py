@@ -34,7 +34,7 @@ def closing_of(
     Args:
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
-        joints: coordinates of drives for the latter.
+        joints: coordinates of drives for ``mismatch``.
         own_errors: whether the robot keeps its errors; otherwise it has only those of
             its closures, as if drawn errors replace its own.
 
@@ -42,7 +42,7 @@ def closing_of(
         A function of the robot as declared; None if neither is given.
 
     Raises:
-        BadInput: another mismatch than spring.
+        BadInput: ``mismatch`` is not ``"spring"``.
     """
     if mismatch not in {None, "spring"}:
         raise BadInput(f'--mismatch: found "{str(mismatch)[:60]}", expected spring')

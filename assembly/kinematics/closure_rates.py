@@ -11,7 +11,7 @@ from assembly.model.robot import Robot
 # relative size below which a singular value of closures counts as zero: closures hold
 # to 1e-10, and near a singularity a posture is known only to a root of that
 SINGULAR = 1e-6
-_NOISE = 30.0  # of singular values, times the closure error
+_NOISE = 30.0  # noise of singular values over the closure error
 
 
 @lru_cache(maxsize=64)

@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the same with bases carried along the paths from home; the least alike."""
+    """Return signs and least overlaps of bases carried along the paths from home."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):

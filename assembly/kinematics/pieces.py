@@ -35,7 +35,7 @@ class CutRobot:
     back: NDArray
 
     def cut(self, posture: Posture) -> Posture:
-        """Return a posture with a frame for each piece; likewise of many postures.
+        """Return one posture or many with a frame for each piece.
 
         Args:
             posture: posture of the robot before the cut, arrays (..., n) and (..., n,

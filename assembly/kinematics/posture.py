@@ -35,7 +35,8 @@ from stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
 _HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded robot files
-_SMALL = 1e-5  # of the reference length: the same for robots smaller than 100 mm
+# relative to the reference length: the same for robots smaller than 100 mm
+_SMALL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +186,7 @@ def content_of(
 
     Args:
         postures: one, or many in one; the key has their transforms and frames' parents.
-        arrays: of numbers.
+        arrays: arrays of numbers.
         names: anything else on which it depends, by its ``repr``.
 
     Returns:
@@ -208,7 +209,7 @@ def home_posture(robot: Robot) -> Posture:
     """Return the home pose: actuated joints at ``position``, passive ones solved.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The posture.
@@ -284,7 +285,7 @@ def place_robot(
     the components that are not given, if possible, its rotation first.
 
     Args:
-        robot: any.
+        robot: any robot.
         pose: any of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
             and rotation vector in base axes; components not given are free.
         joints: coordinates [rad or m] of actuated joints by frame; the others keep
@@ -350,7 +351,7 @@ def place_many(
     """Return the postures of many nominal platform poses together.
 
     Args:
-        robot: any.
+        robot: any robot.
         poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN where a component is free.
 
     Returns:

@@ -39,7 +39,8 @@ from stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value counts as zero
-_PERTURBATIONS = (0.0, 0.013, -0.021)  # [rad or lengths] of the drives, for ranks
+# [rad or lengths] motions of the drives, to compute ranks
+_PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +213,7 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return serial and parallel distances of motions, their rates, a screw."""
+    """Return serial and parallel distances, their motions' joint rates, a screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]

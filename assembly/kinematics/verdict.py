@@ -18,7 +18,7 @@ from assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, SINGULAR
 
 SINGULAR_WORDS = "singular posture: first order decides nothing"
 _FAR_SIDE = "not connected to home without passing a singularity"
-_ROUNDING = 1e-8  # [rad, reference lengths] by which a limit may be exceeded
+_ROUNDING = 1e-8  # [rad, reference lengths] accepted excess over a limit
 
 
 def verdicts(

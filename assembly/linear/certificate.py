@@ -49,9 +49,9 @@ class ScrewBound:
         translation: [m] upper bound, at the platform's origin.
         rotation_open: [rad] part of it that clearances without load leave open: the
             screw is not unique, and the farthest one is at most this far.
-        translation_open: [m] the same of the translation.
+        translation_open: [m] the same for the translation.
         rotation_error: [rad] part of it that is numerical error.
-        translation_error: [m] the same of the translation.
+        translation_error: [m] the same for the translation.
     """
 
     rotation: float
@@ -63,7 +63,7 @@ class ScrewBound:
 
 
 def unproved(assembly: Assembly) -> str:
-    """Return what the certificate does not prove.
+    """Return sentences on the properties that the certificate does not prove.
 
     Proved is an assembly whose closures hold to 1e-9 (rad, or m per reference length),
     whose clearances are within 1e-9 of their bounds, and whose energy is close to the
@@ -212,7 +212,7 @@ def _room(
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # an interval leaves the share at its end; a disc, the width of a cap of that height
+    # range in an interval: the distance from its end; in a disc: the width of a cap
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]

@@ -257,7 +257,7 @@ def checked_size(robot: Robot) -> float:
     """Return the reference length [m] of a robot, after a check of its errors.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The result of :func:`assembly.kinematics.nominal.size_of`.

@@ -220,7 +220,7 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
     """Return a remark if gravity acts on nothing, or not on a link given by a mesh.
 
     Args:
-        robot: any.
+        robot: any robot.
         gravity: (3,) [m/s^2] or None.
 
     Returns:
@@ -347,7 +347,7 @@ def with_distributed(
 
 
 def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> None:
-    """Refuse numbers that are not finite or too large."""
+    """Reject numbers that are not finite or too large."""
     if given is None:
         return
     values = np.asarray(given, dtype=float)

@@ -25,7 +25,7 @@ class Asked:
         assumption: see the head of :mod:`assembly.linear.pose_error`.
         energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] the same of the translation.
+        tolerance_translation: [m] the same for the translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """

@@ -148,7 +148,7 @@ def bound_pose_error(
         assumption: see the head of this module.
         energy_budget: eta of ``budget``.
         tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] the same of the translation.
+        tolerance_translation: [m] the same for the translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
         method: ``"compiled"``; or ``"reference"``, numpy and Clarabel alone, which

@@ -73,7 +73,7 @@ def structure_of(
     """Return the screws that may move, as columns and as arrays.
 
     Args:
-        robot: any.
+        robot: any robot.
         springs: as for :func:`assembly.linear.closure.virtual_joints`.
         own_axes_free: as for the same function.
         bounded_motion: as for the same function.

@@ -167,7 +167,7 @@ class Solution(PointResults, Generic[N]):
         """Return many points, some of which bounds of passive joints' own motion hold.
 
         Args:
-            rows: numbers of these, in order.
+            rows: numbers of these points, in order.
             joints: joints with all such bounds as cones.
             parts: their ``clearances`` and ``motions`` in the columns of ``joints``.
 

@@ -30,7 +30,7 @@ from assembly.measurement.without_clearance import (
 _MOST_ITERATIONS = 60  # largest number of iterations; 5 to 12 are usual
 _CONVERGED = 1e-12  # [rad, reference lengths] largest change of a screw at the end
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
-_FREE_FORCE = 1e-5  # of the largest wrench: largest force along a free motion
+_FREE_FORCE = 1e-5  # relative to the largest wrench: largest force along a free motion
 _ZERO_LOAD = 1e-9  # [rad, reference lengths] of deformation: zero wrench below
 _CONTRACTION = 0.8  # largest ratio of two successive changes, after the first few
 _TRANSIENT = 3  # iterations in which changes may grow

@@ -22,7 +22,8 @@ from assembly.model.clearance import (
 )
 from assembly.model.robot import Clearance, Frame, Robot
 
-_UNLOADED = 1e-9  # of the largest wrench of its kind: smaller ones count as zero
+# relative to the largest wrench of its kind: smaller ones count as zero
+_UNLOADED = 1e-9
 
 
 def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
@@ -109,7 +110,7 @@ def without_joint_clearances(robot: Robot) -> Robot:
     """Return the robot without clearance; bounds of passive joints' motion stay.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         A robot without clearance cones.

@@ -27,8 +27,8 @@ from assembly.model.links import in_series
 from assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # of a wrench's size: step for the slope of a law
-_SETTLED = 1e-10  # of the largest deflection: accepted residual
+_STEP = 1e-6  # relative to a wrench's size: step for the slope of a law
+_SETTLED = 1e-10  # relative to the largest deflection: accepted residual
 _STEPS = 40
 
 

@@ -50,7 +50,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
     """Return the links whose stress can be computed, in the robot's order of frames.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         Beams of a declared shape and links given by a surface.

@@ -40,7 +40,7 @@ def link_compliances(robot: Robot) -> NDArray:
 
 @lru_cache(maxsize=4096)  # a robot that is changed in one frame keeps its others
 def link_compliance(frame: Frame) -> NDArray:
-    """Return the (6, 6) compliance of a frame's own body, in its axes; read-only."""
+    """Return the (6, 6) compliance of a frame's body in its axes, a read-only array."""
     C = _compliance(frame)
     C.setflags(write=False)
     return C

@@ -28,7 +28,7 @@ def mesh_solution(frame: Frame) -> MeshSolution:
         :func:`modulus_factor`.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     solution = _mesh(frame).solution
     if solution is None:
@@ -37,7 +37,7 @@ def mesh_solution(frame: Frame) -> MeshSolution:
 
 
 def refuse_unsolved(frame: Frame) -> NoReturn:
-    """Refuse a link whose stiffness was not computed when the robot was loaded."""
+    """Reject a link whose stiffness was not computed when the robot was loaded."""
     kind = "library" if isinstance(frame.link, LibraryLink) else "mesh"
     raise BadInput(
         f"frame {quoted(frame.name)}.link.{kind}: found no stiffness, expected a robot "
@@ -60,7 +60,7 @@ def mesh_link_stiffness(frame: Frame) -> LinkStiffness:
         The link, read at the tip interface's centre, which is the frame's origin.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     link, factor = mesh_solution(frame).solved.link, modulus_factor(frame)
     if factor != 1.0:
@@ -82,7 +82,7 @@ def mesh_link_mass(frame: Frame) -> tuple[NDArray, NDArray]:
         frame's axes; and (3,) [m] from base to tip, in the frame's axes.
 
     Raises:
-        BadInput: it was not solved when the robot was loaded.
+        BadInput: the link was not solved when the robot was loaded.
     """
     solution = mesh_solution(frame)
     span = solution.solved.centers[1] - solution.solved.centers[0]

@@ -65,7 +65,7 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     """Return frames by full name, or by the part after a leg's dot in every leg.
 
     Args:
-        robot: any.
+        robot: any robot.
         names: names such as ``["leg1.link_a"]``, or ``["link_a"]`` for all legs.
 
     Returns:

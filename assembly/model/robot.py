@@ -54,7 +54,7 @@ class Robot:
         description: one line.
         effects: parameters of the known effects of the machine, by name; see
             :mod:`assembly.effects`.
-        session_effects: the same for effects of one session alone, by session.
+        session_effects: effects of one session alone, by session.
         functions: known general effects of the machine.
         learned_range: least and largest value of each variable in the data from which
             the effects were identified, by public name.

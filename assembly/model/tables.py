@@ -169,7 +169,7 @@ def component_unit(unit: str, component: str) -> str:
 
     Args:
         unit: unit of the variable, such as ``"rad, m"``.
-        component: as in :func:`frame_table`; its labels begin with R or T, M or F, or
+        component: see :func:`frame_table`; its labels begin with R or T, M or F, or
             are rotation and translation.
 
     Returns:

@@ -29,10 +29,11 @@ from assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] distance within which a clearance counts as at its bound
 _NEAR_BOUND = 1e-3  # [-] distance within which it may be pressed, see ``contacts``
-_PRESSED = 1e-8  # of the largest force: a smaller one counts as zero
-_ROUNDING = 1e-12  # of the energy without clearance: a smaller force counts as zero
+_PRESSED = 1e-8  # relative to the largest force: a smaller one counts as zero
+# relative to the energy without clearance: a smaller force counts as zero
+_ROUNDING = 1e-12
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_FLAT = 1e-12  # of the largest curvature: smaller ones count as zero
+_FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-14  # [-] accepted excess over the bounds
 _GUESSES = 3  # largest number of guesses of the pressed clearances

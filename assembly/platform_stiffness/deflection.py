@@ -40,11 +40,12 @@ from forcefit.inputs.renamed import renamed_keywords
 from forcefit.results.display import html_table, largest_row, numbers, short_repr
 
 _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
-_CARRIES = 1e-6  # of the largest force times bound: smaller ones count as zero
+_CARRIES = 1e-6  # relative to the largest force times bound: smaller ones count as zero
 # largest number of contact changes followed within a load step: in symmetric robots
 # some contacts carry rounding alone, and change with it
 _CHANGES = 8
-_STAYS = 1e-6  # of the largest motion in a mode: below it the platform counts as fixed
+# relative to the largest motion in a mode: below it the platform counts as fixed
+_STAYS = 1e-6
 _STILL = 1e-12  # [characteristic lengths] size below which motions are rounding
 _JUMP = 5.0  # times the motion predicted by the tangents on both sides
 _BOUNDS = (
@@ -55,7 +56,8 @@ _BOUNDS = (
     "radial",
     "axial",
 )  # by row of a screw
-_NO_LOAD = 1e-9  # of the largest load: below it clearances may leave the pose open
+# relative to the largest load: below it clearances may leave the pose open
+_NO_LOAD = 1e-9
 
 
 @dataclass(frozen=True)

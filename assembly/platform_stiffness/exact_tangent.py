@@ -33,7 +33,7 @@ from assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-FLAT = 1e-12  # of the largest curvature: smaller ones count as zero
+FLAT = 1e-12  # relative to the largest curvature: smaller ones count as zero
 
 
 def exact_tangent(

@@ -68,7 +68,7 @@ def platform_stiffness(
         gravity: (3,) [m/s^2] base axes; without effect on the classical model.
         at: (3,) [m] point of the platform, in its axes, at which screws and wrenches
             are read.
-        side: of a change of contact, where a clearance touches its bound without a
+        side: side of a change of contact, where a clearance touches its bound without a
             force: ``"holding"`` or ``"letting go"``.
         method: ``"compiled"``, with the reference where that does not suffice; or
             ``"reference"``, numpy and Clarabel alone.  In the state ``"contact"`` it is

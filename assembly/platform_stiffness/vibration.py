@@ -38,7 +38,7 @@ from stiffness.beam.beam import section_axes
 from stiffness.beam.sections import declared_section
 from stiffness.screws import screw_map
 
-_NULL = 1e-12  # of the largest eigenvalue: below it neither mass nor stiffness
+_NULL = 1e-12  # relative to the largest eigenvalue: below it neither mass nor stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ def natural_modes(
 
 
 def check_masses(robot: Robot) -> None:
-    """Refuse a robot without any mass.
+    """Reject a robot without any mass.
 
     Raises:
         BadInput: no body has a mass.

@@ -36,8 +36,8 @@ GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required of the interior-point method
 # of the proved gap that is required here: the full problem adds to the gap
 _SHARE = 0.1
-_STOP = 1e-2  # of this gap, at which Newton's method stops
-_STEPS, _FIRST_SIGMA = 150, 1e6  # of Newton's method
+_STOP = 1e-2  # share of this gap at which Newton's method stops
+_STEPS, _FIRST_SIGMA = 150, 1e6  # most steps of Newton's method, and its first sigma
 _RESIDUAL = 1e-11  # accepted residual of a row without springs
 _LARGEST_FACTOR = 1e8  # on the clearances: infeasibility is proved up to this factor
 _UNPROVED = "PrimalInfeasible, which its multipliers do not prove"

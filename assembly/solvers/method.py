@@ -8,13 +8,13 @@ METHODS = get_args(Method)
 
 
 def check_method(method: str) -> None:
-    """Refuse an unknown method.
+    """Reject an unknown method.
 
     Args:
         method: name of the method.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the method is unknown.
     """
     if method not in METHODS:
         names = " or ".join(repr(name) for name in METHODS)

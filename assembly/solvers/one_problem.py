@@ -58,8 +58,8 @@ def newton(
     """Minimise the same objective by Newton's method on the dual.
 
     Args:
-        problem: as for :func:`interior_point`.
-        starts: as for :func:`interior_point`.
+        problem: see :func:`interior_point`.
+        starts: see :func:`interior_point`.
         limits: limits of the iteration.
         u: (nu,) first guess within the cones; overwritten with the solution.
         y: (r + p,) overwritten with the multipliers of G's rows, and of H's, whose
@@ -79,7 +79,7 @@ def farthest_points(
         starts: (cones + 1,) first column of each cone, and nu.
         directions: (k, nu) d, of length 1.
         right: (k, p).
-        tolerance: (k,) of d.u.
+        tolerance: (k,) accepted gap of d.u.
 
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate: d.u <=

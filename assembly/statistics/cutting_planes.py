@@ -25,7 +25,7 @@ from assembly.statistics.requirement import TRAINING, Plan, Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # of a limit: largest violation accepted at the end
+_TOLERANCE = 1e-3  # relative to a limit: largest violation accepted at the end
 _MOST_CUTS = 200
 
 

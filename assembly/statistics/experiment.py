@@ -28,7 +28,8 @@ from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-_PRECISION = 1e-3  # of a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-3
 
 
 @renamed_fields(clearance_model="clearance")
@@ -141,7 +142,7 @@ class Experiment:
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
-        """Refuse limits on quantities that are not computed.
+        """Reject limits on quantities that are not computed.
 
         Raises:
             BadInput: margins were left out, or no link's stress can be computed.

@@ -160,7 +160,7 @@ def linear_importance(
 
     Args:
         slopes: (s, m) of the results with each source.
-        sources: m of them.
+        sources: the m sources.
         groups: name and columns of each group.
 
     Returns:

@@ -26,12 +26,12 @@ from assembly.statistics.cutting_planes import cheapest_within
 from assembly.statistics.requirement import Plan, Requirement
 from assembly.statistics.scaling import Samples, scale_uniformly, with_worst_corners
 
-_COARSE = 1e-3  # of the limits: precision of intermediate costs
+_COARSE = 1e-3  # relative to the limits: precision of intermediate costs
 _GAIN = 1e-4  # relative, of the cost: smallest reduction of a step
-_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # of the trust region, factors
+_LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01  # factors of the trust region
 _MOST_STEPS = 60
 _PLANES = 200  # number of worst samples, for a yield of 1
-_NEARLY_ACTIVE = 0.8  # of a limit: samples above it count as active
+_NEARLY_ACTIVE = 0.8  # relative to a limit: samples above it count as active
 
 
 def least_cost(

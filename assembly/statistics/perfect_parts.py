@@ -21,10 +21,10 @@ from assembly.statistics.ranking import kind_of
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
 _DRAWS = 200  # number of positions of a random clearance model, whose median is used
-_PRECISION = (1e-9, 1e-9)  # [rad, m] of the largest pose errors
-_SHARE = 1e-3  # of the largest pose error: smaller parts are not listed
+_PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
+_SHARE = 1e-3  # relative to the largest pose error: smaller parts are not listed
 _KEYS = ("tilt", "spin", "radial", "axial")
-_OWN = 0.02  # of the largest pose error: precision of the parts
+_OWN = 0.02  # relative to the largest pose error: precision of the parts
 OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative excess above a limit
 

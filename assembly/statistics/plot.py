@@ -35,9 +35,10 @@ def figure_of_draws(
     """Return the figure of a data set of draws or tolerances.
 
     Args:
-        data: as saved by ``statistics`` or ``tolerances``, or another data set.
+        data: data set saved by ``statistics`` or ``tolerances``, or another data set.
         kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose.
-        quantities: of a histogram, by the names of :mod:`assembly.sweeps.panels`.
+        quantities: quantities of a histogram, by the names of
+            :mod:`assembly.sweeps.panels`.
 
     Returns:
         The figure; None for another kind of data set.

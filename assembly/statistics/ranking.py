@@ -17,11 +17,11 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
     """Return the first and the last rank that each contributor may have.
 
     Args:
-        shares: by name (value, lower, upper).
+        shares: value, lower and upper bound by name.
 
     Returns:
-        By name: 1 + the number of surely larger shares, and the number of all shares
-        less that of surely smaller ones; none for an unknown share.
+        First and last rank by name.  A share precedes another one if its lower bound is
+        above the other's upper bound.  Unknown shares have no ranks.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T

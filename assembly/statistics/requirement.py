@@ -21,7 +21,8 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-_PRECISION = 1e-4  # of a limit on a pose error: required upper minus lower bound
+# relative to a limit on a pose error: required upper minus lower bound
+_PRECISION = 1e-4
 _BATCH = 512  # draws solved and stored together
 TRAINING, SCALING, FRESH = 10, 11, 12  # streams of random numbers; more from 12 on
 
@@ -86,7 +87,7 @@ class Plan:
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Return the (count, m) errors within tolerances of 1."""
+        """Return (count, m) drawn errors, as factors on the tolerances."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
@@ -276,7 +277,7 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Refuse the limit that clearances alone exceed the most."""
+        """Reject the limit that clearances alone exceed the most."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
@@ -289,7 +290,7 @@ class Requirement:
                 )
 
     def check_taken_up(self) -> None:
-        """Refuse errors that neither clearances nor springs take up at some posture.
+        """Reject errors that neither clearances nor springs take up at some posture.
 
         Raises:
             BadInput: there is one; the message names it.

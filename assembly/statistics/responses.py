@@ -16,7 +16,7 @@ from assembly.statistics.quantities import POSE_ERRORS
 from assembly.statistics.sensitivity import solution_slopes
 from assembly.statistics.worst_clearance import bound_worst_errors, worst_error_slopes
 
-_STEP = 1e-6  # of a wrench, for differences of the stress formula
+_STEP = 1e-6  # step relative to a wrench, for differences of the stress formula
 _PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 

@@ -10,7 +10,7 @@ from assembly.statistics.requirement import Requirement
 from assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # of the limits: precision of the largest utilisation
+_FINE = 1e-4  # relative to the limits: precision of the largest utilisation
 _MOST_TRIALS = 80
 
 

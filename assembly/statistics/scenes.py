@@ -60,7 +60,7 @@ def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> s
 
     Args:
         postures: the postures assessed.
-        present: of :func:`assembly.statistics.tolerances.present_errors`.
+        present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a scene; empty if it cannot be assembled.
@@ -90,7 +90,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
 
     Args:
         postures: the postures assessed.
-        present: of :func:`assembly.statistics.tolerances.present_errors`.
+        present: result of :func:`assembly.statistics.tolerances.present_errors`.
 
     Returns:
         HTML of a map; empty if the grid has no axis or more than two.

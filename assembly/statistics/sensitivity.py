@@ -23,7 +23,8 @@ from assembly.linear.energy import Assembly
 from assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from assembly.statistics.linear_response import LinearResponse
 
-_ACTIVE = 1e-7  # of the largest force on any cone: smaller forces count as zero
+# relative to the largest force on any cone: smaller forces count as zero
+_ACTIVE = 1e-7
 _RANK = 1e-10  # relative rank tolerance: undetermined directions do not move
 
 

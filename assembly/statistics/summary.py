@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # of the largest value: smaller ones count as zero
+_ROUNDING = 1e-18  # relative to the largest value: smaller ones count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "goes together, by force if need be",

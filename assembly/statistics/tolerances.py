@@ -29,7 +29,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
     """Return the postures of a grid that the robot can reach and use.
 
     Args:
-        robot: any.
+        robot: any robot.
         grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:

@@ -13,7 +13,7 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 20  # errors in a table of shares
-_ALIKE = 0.01  # of the largest share: shares as close are equal
+_ALIKE = 0.01  # relative to the largest share: shares as close are equal
 _ASSUMED = (
     "Limits hold at the postures of the grid; between them nothing is said.",
     "Errors are independent and keep within their tolerances.",

@@ -18,7 +18,7 @@ from assembly.statistics.worst_case import (
 )
 
 _BATCH = 256  # number of draws between two reports of progress
-_ROUNDING = 1e-9  # of a limit: excess that counts as rounding
+_ROUNDING = 1e-9  # relative to a limit: excess that counts as rounding
 LOOKS, CONFIDENCE = 4, 0.95  # largest number of verifications; their joint confidence
 
 

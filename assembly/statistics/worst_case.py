@@ -56,8 +56,8 @@ def worst_corner(
         tolerances: (m,) [rad or m] half widths.
         corners: (k, m) signs to start from.
         key: the quantity, see :func:`assembly.statistics.responses.respond`.
-        clearance: as of the same function.
-        contact_length: [m] as of the same function.
+        clearance: see the same function.
+        contact_length: [m] see the same function.
 
     Returns:
         The worst corner.

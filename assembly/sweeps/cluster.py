@@ -183,7 +183,7 @@ def _threads(client: "distributed.Client") -> int:
 
 
 def _check_workers(client: "distributed.Client") -> None:
-    """Refuse a cluster without workers, or with another program version on them."""
+    """Reject a cluster without workers, or with another program version on them."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:

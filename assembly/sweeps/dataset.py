@@ -212,7 +212,7 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
     """Write a data set as NetCDF, whole or not at all.
 
     Args:
-        data: any.
+        data: any data.
         path: path of the new file; it replaces an old one only once it is complete.
 
     Raises:
@@ -225,14 +225,14 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Refuse a NetCDF file that could not be written, before the work.
+    """Reject a NetCDF file that could not be written, before the work.
 
     Args:
         path: path of the file to be written later.
         what: one of :data:`KINDS`; an existing file must be of this kind.
 
     Raises:
-        BadInput: it is of another kind, or as in
+        BadInput: the file is of another kind, or as in
             :func:`forcefit.inputs.writing.check_writable`.
     """
     check_writable(path, NETCDF)

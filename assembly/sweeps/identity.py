@@ -39,7 +39,7 @@ def robot_hash(robot: Robot) -> str:
     """Return the SHA-256 of the content of a robot file, and of the meshes it names.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The digest.

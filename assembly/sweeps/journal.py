@@ -37,7 +37,7 @@ class Journal:
 
     Attributes:
         path: path of the file.
-        record_type: of the rows.
+        record_type: type of the rows.
         owner: check sum of the first line, which those of the records continue.
         places: offset and length of the content of each finished block's record.
     """
@@ -90,7 +90,7 @@ class Journal:
             block: its number.
 
         Returns:
-            Both, as they were added.
+            The rows and texts, as they were added.
 
         Raises:
             BadInput: the file was changed in between, or cannot be read.
@@ -128,7 +128,7 @@ def open_journal(
         path: path of the file.
         whose: plain values that identify the sweep: all must be equal, except
             ``program``, whose version differs between commits of equal sources.
-        record_type: of the rows.
+        record_type: type of the rows.
 
     Yields:
         The journal, with the blocks that are finished.

@@ -53,7 +53,7 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Refuse axes that form neither a map nor a line.
+    """Reject axes that form neither a map nor a line.
 
     Args:
         sizes: number of values on each axis.
@@ -187,7 +187,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """Return a figure with so many panels and at most one more, in a grid."""
+    """Return a figure with a given number of panels, or one more, in a grid."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -199,7 +199,7 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Return the same quantities along one axis, or from posture to posture of a list.
+    """Return figures of the quantities along one axis, or over the postures of a list.
 
     Args:
         data: data of a sweep over one axis.

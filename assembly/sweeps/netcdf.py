@@ -108,7 +108,7 @@ def forgive_damaged_files() -> None:
 
 
 def check_heaps(path: Path) -> None:
-    """Refuse a file whose heaps of texts are damaged: HDF5 would read them endlessly.
+    """Reject a file whose heaps of texts are damaged: HDF5 would read them endlessly.
 
     Args:
         path: path of an HDF5 file; other files pass.

@@ -122,13 +122,14 @@ class Design:
             raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
-        """Refuse numbers that break a rule of the format.
+        """Reject numbers that break a rule of the format.
 
         Args:
             values: values by path.
 
         Raises:
-            BadInput: they do; whether the closures still hold is not checked.
+            BadInput: a number breaks a rule; whether the closures still hold is not
+                checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 

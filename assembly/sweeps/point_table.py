@@ -68,9 +68,9 @@ def write_point_table(
     columns, ``variable.component [unit]``.  A missing number is an empty cell.
 
     Args:
-        data: as for :func:`point_table`.
+        data: see :func:`point_table`.
         path: path of the file.
-        rows: as for :func:`point_table`.
+        rows: see :func:`point_table`.
 
     Raises:
         BadInput: as :func:`point_table`; or the file cannot be written.

@@ -137,7 +137,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
 
 
 def _check(options: SweepOptions, machine: Robot) -> None:
-    """Refuse options that contradict each other or the robot."""
+    """Reject options that contradict each other or the robot."""
     if (options.grid is None) == (options.poses is None):
         raise BadInput("sweep: expected --grid or --poses, one of them")
     assumption, near = options.assumption, options.near
@@ -191,7 +191,7 @@ def _short(value: float | str) -> str:
 
 
 def _check_assumption(question: Question) -> None:
-    """Refuse bounds of the pose error of a loaded robot: (27) has no load."""
+    """Reject bounds of the pose error of a loaded robot: (27) has no load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
@@ -301,7 +301,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """Return it as text: statuses, and the first reason of each that is not ok."""
+    """Return text of the statuses, and of the first reason for each that is not ok."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:

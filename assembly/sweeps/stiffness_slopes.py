@@ -11,7 +11,8 @@ from assembly.platform_stiffness.tangent_slopes import TangentState, compliance_
 from assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-_STEP = 1e-4  # of the number, or of 1 if it is zero: the derivative's error is 1e-8
+# relative to the number, or of 1 if it is zero: the derivative's error is 1e-8
+_STEP = 1e-4
 _SMALL_STEP = 1e-8  # [rad, m] for errors, because contacts change within some um
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 

@@ -124,7 +124,7 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
 
 
 def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
-    """Refuse a component that no posture has."""
+    """Reject a component that no posture has."""
     frames = robot.frames if robot is not None else ()
     valid = [*POSE, *(_JOINT + f.name for f in frames if f.actuated)]
     if name not in valid:
@@ -133,7 +133,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 
 
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
-    """Refuse poses together with joints."""
+    """Reject poses together with joints."""
     joints = [name for name in names if name.startswith(_JOINT)]
     if joints and len(joints) < len(names):
         other = next(name for name in names if not name.startswith(_JOINT))
@@ -230,7 +230,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Refuse equal ids in two rows."""
+    """Reject equal ids in two rows."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

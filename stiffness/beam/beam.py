@@ -137,7 +137,7 @@ def unit_vector(name: str, vector: ArrayLike) -> NDArray:
         (3,) of length one.
 
     Raises:
-        BadInput: it is not three finite numbers, or zero.
+        BadInput: the vector is not three finite numbers, or is zero.
     """
     direction = np.asarray(vector, dtype=float)
     if direction.shape != (3,) or not np.isfinite(direction).all():

@@ -152,7 +152,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
     """Return fibres of a section and the stresses that moments and forces cause there.
 
     Args:
-        section: as in :func:`peak_beam_stress`.
+        section: see :func:`peak_beam_stress`.
 
     Returns:
         (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along
@@ -246,7 +246,7 @@ def _hollow(
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # the right side of a section rotated by so many quarter turns
+        # the right side of a section rotated by quarter turns
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])

@@ -169,7 +169,7 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Return Cowper's shear factor of a thin box, for a force along ``along``."""
+    """Return Cowper's shear factor of a thin box, for a force along one side."""
     m = n = across / along  # flange over web area is the same ratio for equal walls
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
@@ -248,7 +248,7 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Refuse numbers that do not describe a section.
+    """Reject numbers that do not describe a section.
 
     Args:
         place: name of the key, for the message.
@@ -275,7 +275,7 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Refuse elastic constants of no isotropic solid.
+    """Reject elastic constants of no isotropic solid.
 
     Args:
         who: name of the part, for the message.
@@ -290,13 +290,13 @@ def check_material(who: str, E: float, nu: float) -> None:
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Refuse a Poisson's ratio outside (-1, 0.5), that of no isotropic solid."""
+    """Reject a Poisson's ratio outside (-1, 0.5), that of no isotropic solid."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 
 
 def check_positive(who: str, name: str, value: float) -> None:
-    """Refuse a number that is not finite and positive."""
+    """Reject a number that is not finite and positive."""
     if not (math.isfinite(value) and value > 0):
         raise BadInput(f"{who}: {name} = {value:g} must be finite and > 0")
 

@@ -42,7 +42,7 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         (n, n) with both halves.
 
     Raises:
-        BadInput: it is of another kind, or its length differs from its header.
+        BadInput: the file is of another kind, or its length differs from its header.
     """
     lines = text.split("\n")
     try:
@@ -113,7 +113,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         Node and direction, 1 to 6, of each row; or the nodes in their order.
 
     Raises:
-        BadInput: it is neither.
+        BadInput: the file is of neither kind.
     """
     text = read_text(path)
     lines = [line for line in text.split("\n") if line.strip()]

@@ -23,7 +23,7 @@ _GRID = re.compile(r"^GRID\*?[\s,]", re.M | re.I)
 _NODE = re.compile(r"^\*NODE\s*(?:,.*)?$", re.M | re.I)
 _WORKBENCH = re.compile(r"Node Number\tX Location \((\w+)\)")
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
-_ON = 1e-6  # of the body's size: largest distance of a node on its interface
+_ON = 1e-6  # relative to the body's size: largest distance of a node on its interface
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:

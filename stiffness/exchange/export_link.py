@@ -14,7 +14,8 @@ from stiffness.exchange.two_interfaces import both_ends
 from stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
-_FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]  # from our order to translations first
+# forcefit's order, rearranged with translations first
+_FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
@@ -27,7 +28,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         (6, 6) and (3,) [m].
 
     Raises:
-        BadInput: it is no such file.
+        BadInput: the file is not of this kind.
     """
     try:
         content = json.loads(read_text(path))

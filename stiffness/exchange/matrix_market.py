@@ -36,7 +36,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
         (n, n) with both halves of a symmetric one, and where Ansys wrote one half.
 
     Raises:
-        BadInput: it is of another kind, or its length differs from its header.
+        BadInput: the file is of another kind, or its length differs from its header.
     """
     head, *lines = text.split("\n")
     words = tuple(head.lower().split()[1:])

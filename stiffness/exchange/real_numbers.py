@@ -19,7 +19,7 @@ def real(path: Path | str, word: str) -> float:
         Its value.
 
     Raises:
-        BadInput: it is no number.
+        BadInput: the text is not a number.
     """
     match = _REAL.fullmatch(word.strip())
     if not match:
@@ -39,7 +39,7 @@ def whole(path: Path | str, word: str) -> int:
         Its value.
 
     Raises:
-        BadInput: it is no whole number.
+        BadInput: the text is not a whole number.
     """
     try:
         return int(word)

@@ -16,7 +16,7 @@ from forcefit.inputs.errors import BadInput
 from stiffness.link import LinkStiffness, check_definite, inverted
 from stiffness.screws import screw_map, skew
 
-_BALANCED = 1e-5  # of its scale: residual due to text of seven digits
+_BALANCED = 1e-5  # relative to its scale: residual due to text of seven digits
 _FARTHEST = 1e6  # [m] largest distance of a base from its tip
 
 

@@ -164,7 +164,8 @@ def _isostatic_supports(mesh: Elements) -> NDArray:
     off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
     third = int(np.argmax(off))
     normal = np.abs(np.cross(points[third] - points[first], line))
-    # the second node is free along the line to it, the third fixed across the plane
+    # the second node is free along the line from the first to it; the third is fixed
+    # only across the plane of the three
     second_fixed = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
     third_fixed = 3 * third + int(np.argmax(normal))
     return np.array([*(3 * first + d for d in range(3)), *second_fixed, third_fixed])

@@ -211,8 +211,7 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions are continuous across the face: the softer side has more energy
-        # there
+        # tractions are continuous across the face; the softer side has more energy
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))

@@ -48,7 +48,7 @@ from stiffness.surface.patches import (
 from stiffness.surface.surface import Surface, read_surface
 
 _LOG = logging.getLogger(__name__)
-_SETUP = 2.0  # [s] of a solution, independent of its mesh
+_SETUP = 2.0  # [s] time of a solution that does not depend on its mesh
 _MESHER = 0.6  # share of the budget's seconds for the mesher; the solver has the others
 
 
@@ -381,7 +381,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Refuse a first mesh whose solution the budget does not allow."""
+    """Reject a first mesh whose solution the budget does not allow."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:

@@ -107,7 +107,7 @@ def _everywhere(points: NDArray) -> NDArray:
 
 
 def check_materials(materials: Sequence[Material]) -> None:
-    """Refuse a link without a material.
+    """Reject a link without a material.
 
     Args:
         materials: materials of a link.

@@ -77,7 +77,7 @@ def read_parts(link: Table) -> tuple[str, ...]:
         The texts; none if there is no list.
 
     Raises:
-        BadInput: it is not a list of such texts.
+        BadInput: the value is not a list of such texts.
     """
     given = link.get("parts", [])
     if not isinstance(given, list) or not all(isinstance(t, str) for t in given):

@@ -34,7 +34,7 @@ _SMOOTH = np.cos(
     np.radians(5.0)
 )  # patches that meet at a smaller angle form a smooth surface
 _OFF = 5e-3  # of a face's size; cubic faces follow a fillet to 1e-4
-ZONE = 0.9  # of the peak: larger stresses count as nearly as large
+ZONE = 0.9  # relative to the peak: larger stresses count as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:

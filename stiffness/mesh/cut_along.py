@@ -18,7 +18,7 @@ from stiffness.surface.smooth_outline import SmoothOutline
 
 # of the shortest edge at a corner: nearer corners are moved onto the outline
 _NEAR = 0.3
-_REACH = 0.005  # of the part's size: largest motion of a corner
+_REACH = 0.005  # relative to the part's size: largest motion of a corner
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:

@@ -22,11 +22,13 @@ from stiffness.mesh.split_crossing import one_of_each, split_crossing
 from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Plane, Shape, project
 
-_NEAR = 0.3  # of the shortest edge at a corner: it is moved onto the face
-_REACH = 0.005  # of the part's size: a corner is moved by no more
-_LEAST = 0.2  # of a tetrahedron's volume that is left when its corners are moved
-ON_FACE = 1e-6  # of the part's size: a corner on the face; shapes are known to 2e-6
-_TURN = np.cos(np.radians(35.0))  # of a curved face along an edge
+_NEAR = 0.3  # relative to its shortest edge: a nearer corner is moved onto the face
+_REACH = 0.005  # relative to the part's size: largest motion of a corner
+# least volume of a tetrahedron after motion of its corners, relative to before
+_LEAST = 0.2
+# relative to the part's size: a corner on the face; shapes are known to 2e-6
+ON_FACE = 1e-6
+_TURN = np.cos(np.radians(35.0))  # largest rotation of a curved face along an edge
 _PASSES = 12  # most rounds of bisection of too large tetrahedra
 _HALVINGS = 12  # bisections of an edge, to find where it crosses a curved face
 
@@ -94,7 +96,7 @@ def cut(solid: Solid, face: CutFace) -> Solid:
     """Cut a mesh along a face.
 
     Args:
-        solid: any.
+        solid: any solid.
         face: inside it.
 
     Returns:
@@ -250,7 +252,7 @@ def _targets(
     solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
 ) -> tuple[NDArray, NDArray]:
     """Return (n, 3) [m] positions of corners near a shape on it, and which can move."""
-    # those of the boundary, or of other faces inside, stay on their shapes
+    # corners of the boundary or of other faces inside stay on their shapes
     target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
     free = near.copy()
     groups = [(key, group[near[group]]) for key, group in corner_groups(solid)]

@@ -76,7 +76,7 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     """Return the edges of a solid at which stresses are singular.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
 
     Returns:
@@ -108,7 +108,7 @@ def graded_edges(
     """Return singular edges, and edges between materials at the boundary.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
         regions: regions of the link.
 
@@ -125,7 +125,7 @@ def split_joining_edges(
     """Split edges that join singular edges.
 
     Args:
-        solid: any.
+        solid: any solid.
         held: patches that are clamped or loaded.
         regions: regions of the link.
 

@@ -30,7 +30,7 @@ from stiffness.surface.primitives import project
 
 POOR = 0.08  # lower quality of a tetrahedron is improved; pytetwild's are better
 _ROUNDS = 4
-_STEPS = 10  # of a corner's search; a step that does not help is halved
+_STEPS = 10  # steps of a corner's search; a step without improvement is halved
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 

@@ -63,7 +63,7 @@ def mesh_solid(
         time_limit: [s] for the mesher.
         cache: folder; that of :func:`forcefit.inputs.cache_folder.cache_folder` if
             absent.
-        patches: of the surface and these interfaces; computed if absent.
+        patches: patches of the surface and these interfaces; computed if absent.
 
     Returns:
         The solid.

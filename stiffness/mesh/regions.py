@@ -24,7 +24,8 @@ from stiffness.mesh.refine import edge_code
 from stiffness.mesh.solid import Solid
 
 _POOR = 0.2  # quality of tetrahedra that stay valid when they follow a curved face
-_AGREED = 0.9  # of a piece's volume in one region: then the whole piece belongs to it
+# relative to a piece's volume in one region: then the whole piece belongs to it
+_AGREED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
     """Return the region of each tetrahedron.
 
     Args:
-        solid: any.
+        solid: any solid.
         regions: later ones have precedence.
 
     Returns:
@@ -80,7 +81,7 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
     """Cut a mesh so that regions' faces are faces of tetrahedra.
 
     Args:
-        solid: any.
+        solid: any solid.
         regions: regions of the link.
 
     Returns:
@@ -109,7 +110,7 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
     """Return whether a face between regions runs through tetrahedra.
 
     Args:
-        solid: any.
+        solid: any solid.
         regions: regions of the link.
 
     Returns:
@@ -128,7 +129,7 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
     """Return boundary edges between two regions, at which stresses are singular.
 
     Args:
-        solid: any.
+        solid: any solid.
         regions: regions of the link.
 
     Returns:
@@ -143,7 +144,7 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
     """Return the edges of the boundary at which two regions meet.
 
     Args:
-        solid: any.
+        solid: any solid.
         region: (t,) of each tetrahedron.
 
     Returns:

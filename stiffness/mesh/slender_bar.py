@@ -25,7 +25,7 @@ _LAYERS = 60.0  # number of element layers along a bar, without those at its end
 # length of a layer over the section's width, for a bar that is not slender
 _LONGEST = 2.0
 _PARALLEL = 1e-6  # [rad]
-_SAME = 1e-6  # of the length: difference of two positions that agree
+_SAME = 1e-6  # relative to the length: difference of two positions that agree
 _SAME_VOLUME = 1e-3
 
 

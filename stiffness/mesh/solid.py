@@ -58,7 +58,7 @@ def meeting_shapes(
     """Return the shapes on which corners must lie.
 
     Args:
-        solid: any.
+        solid: any solid.
         key: the patches of the corners; none for inner corners.
         points: (n, 3) [m] the corners' places.
 
@@ -72,7 +72,7 @@ def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
     """Return the corners of a solid that must lie on shapes.
 
     Args:
-        solid: any.
+        solid: any solid.
 
     Returns:
         As :func:`node_patches`, for the boundary and for faces between regions.

@@ -22,7 +22,7 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Refuse an unknown shape, or lengths that are not its own.
+    """Reject an unknown shape, or names of lengths that it lacks.
 
     Args:
         shape: one of ``SHAPES``.

@@ -87,7 +87,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
         The interface.
 
     Raises:
-        BadInput: it has none of these forms.
+        BadInput: the value has none of these forms.
     """
     try:
         if isinstance(text, str):
@@ -136,7 +136,7 @@ def _from_table(table: Mapping) -> Interface:
 
 
 def _refuse_unknown(table: Mapping, known: set[str], place: str) -> None:
-    """Refuse a table with an unknown key."""
+    """Reject a table with an unknown key."""
     for key in table:
         if key not in known:
             raise BadInput(f'{place}unknown key "{key}"{nearest(str(key), known)}')

@@ -94,7 +94,7 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Refuse rigid interfaces that share an edge: their stiffness has no finite value.
+    """Reject rigid interfaces that share an edge: their stiffness has no finite value.
 
     Args:
         surface: the link's.
@@ -102,7 +102,8 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
         tip: the loaded interface.
 
     Raises:
-        BadInput: they share an edge, or an interface has no part of the surface.
+        BadInput: the interfaces share an edge, or an interface has no part of the
+            surface.
     """
     codes: list[NDArray] = []
     for name, interface in (("base", base), ("tip", tip)):

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 S = TypeVar("S", bound="Shape")
 # residual evaluations of a fit, and of one that may still succeed
 _CALLS = (25, 100)
-_MAY_FIT = 0.02  # of the points' size: largest residual of such a fit
-_FITS = 1e-9  # of the points' size: residual of a shape that fits
+_MAY_FIT = 0.02  # relative to the points' size: largest residual of such a fit
+_FITS = 1e-9  # relative to the points' size: residual of a shape that fits
 _TINY = 1e-300  # keeps a division at a shape's own axis finite
 
 

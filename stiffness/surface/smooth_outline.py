@@ -14,7 +14,7 @@ from stiffness.surface.facets import Facets
 from stiffness.surface.primitives import Shape, fit_cone, fit_plane
 
 _CORNER = np.cos(np.radians(35.0))  # of an outline: sharper corners are kept
-_ON_WALL = 1e-5  # of the outline's size: distance that counts as on the wall
+_ON_WALL = 1e-5  # relative to the outline's size: distance that counts as on the wall
 _CIRCLE = 10  # least number of corners that distinguish a circle from a polygon
 
 

@@ -17,7 +17,8 @@ from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # facets around a full circle
-_TOUCHING = 1e-6  # of a solid's volume: a smaller overlap is rounding of the file
+# relative to a solid's volume: a smaller overlap is rounding of the file
+_TOUCHING = 1e-6
 _ALL, _AND = "*", "+"  # all solids of a file; several solids as one
 
 
@@ -145,7 +146,7 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
     Args:
         model: gmsh's, of the file.
         path: path of the file, for error messages.
-        solid: as in :func:`read_step`; required if there are several.
+        solid: see :func:`read_step`; required if there are several.
 
     Returns:
         Their tags by name; none if the file's faces belong to no solid.

@@ -168,7 +168,7 @@ def check_surface(
         The surface: vertices merged, degenerate triangles dropped, oriented outward.
 
     Raises:
-        BadInput: it is empty, not finite, of an implausible size, open,
+        BadInput: the surface is empty, not finite, of an implausible size, open,
             self-intersecting, of several bodies, or has edges shared by more than two
             triangles.
     """
@@ -202,7 +202,7 @@ def _place(point: NDArray) -> str:
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Refuse coordinates that are not finite, or a size that shows a wrong unit."""
+    """Reject coordinates that are not finite, or a size that shows a wrong unit."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -273,7 +273,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Orient all triangles outward; refuse several bodies."""
+    """Orient all triangles outward; reject several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
     repairs = [f"{flipped} triangles turned to agree with the rest"] if flipped else []
     shells = [triangles[shell == k] for k in range(shell.max() + 1)]

@@ -81,10 +81,10 @@ class StepSolid:
     """A solid of a STEP file.
 
     Attributes:
-        name: as in ``part.step#name``.
+        name: name after ``#``, as in ``part.step#name``.
         volume: [m^3].
-        low: (3,) [m] the bounding box's lower corner.
-        high: (3,) [m] its upper one.
+        low: (3,) [m] lower corner of the bounding box.
+        high: (3,) [m] upper corner of the bounding box.
     """
 
     name: str
@@ -100,7 +100,7 @@ def step_solids(path: Path | str) -> list[StepSolid]:
         path: path of the file.
 
     Returns:
-        The solids in the file's order, in metres by its own unit.
+        The solids in the file's order, converted to metres.
 
     Raises:
         BadInput: the file cannot be read, holds no solid, or gmsh is not installed.

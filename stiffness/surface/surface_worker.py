@@ -101,7 +101,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Refuse cells with points that do not exist, on which VTK's filters crash."""
+    """Reject cells with points that do not exist, on which VTK's filters crash."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 

@@ -8,7 +8,8 @@ from stiffness.surface.primitives import Shape
 from stiffness.surface.surface import Surface, directed_edges
 
 SHARP = np.cos(np.radians(35.0))  # a sharper edge separates two patches
-_ON_SHAPE = 2e-6  # of the part's size: points nearer are on a shape; STL leaves 1e-7
+# relative to the part's size: points nearer are on a shape; STL leaves 1e-7
+_ON_SHAPE = 2e-6
 # largest number of seeds on one surface; other triangles keep their facets
 _TRIES = 500
 

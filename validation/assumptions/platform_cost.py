@@ -34,7 +34,7 @@ from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from stiffness.screws import screw_map
 from validation.assumptions.solid_links import SolidLink, solid_links
 
-_RANK = 1e-9  # of the largest singular value: smaller ones count as zero
+_RANK = 1e-9  # relative to the largest singular value: smaller ones count as zero
 
 
 class NoSolids(Exception):

@@ -10,7 +10,8 @@ from assembly.model.robot import Robot
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-READING = ("rx", "ry", "rz", "tx", "ty", "tz")  # of a deviation, in a screw's order
+# components of a deviation, in a screw's order
+READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 

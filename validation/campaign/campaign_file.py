@@ -229,7 +229,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
 
 
 def _check_points(declared: _Declared, extent: float) -> None:
-    """Refuse measured points that are far from a robot of an extent [m]."""
+    """Reject measured points that are far from a robot of an extent [m]."""
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
@@ -321,7 +321,7 @@ def _read_robot(root: Table, name: str) -> Robot:
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """Return what the table commands: all of the joints, or components of the pose."""
+    """Return names of the table's commands: all joints, or components of the pose."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]

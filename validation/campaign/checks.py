@@ -16,7 +16,8 @@ from validation.campaign.measurement_table import MeasurementTable
 
 _TURNS = 8 * np.pi  # [rad] largest command of a joint; 25 or more is in degrees
 _FORCE = 1e7  # [N], [N m] larger than any platform's load
-_WARMEST = 250.0  # [K] from calibration; 293 is an absolute temperature
+# [K] largest difference from calibration; 293 is an absolute temperature
+_WARMEST = 250.0
 _LATEST = 3e8  # [s] ten years; larger is a date
 _ROOM = 1000.0  # [m] largest distance of a measuring device
 _FINEST = 1e-15  # [rad, m] finer than any device
@@ -24,7 +25,7 @@ _UNITS = "; if it is in other units say so in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
-    """Refuse impossible commands, loads and covariates.
+    """Reject impossible commands, loads and covariates.
 
     Args:
         table: the table as read.
@@ -71,7 +72,7 @@ def _check_covariates(table: MeasurementTable) -> None:
 
 
 def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
-    """Refuse a row without any measurement.
+    """Reject a row without any measurement.
 
     Args:
         table: the table as read.
@@ -89,7 +90,7 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
 def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
                    registration: str, extent: float) -> None:  # fmt: skip
-    """Refuse deviations larger than the robot, and invalid sigma.
+    """Reject deviations larger than the robot, and invalid sigma.
 
     Args:
         table: the table as read.
@@ -152,7 +153,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Refuse the first value whose size exceeds the largest valid one."""
+    """Reject the first value whose size exceeds the largest valid one."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -50,7 +50,7 @@ class Dialect:
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor from that unit to SI."""
+        """Return the factor from a key's unit to SI."""
         return UNITS[key][self.unit(key)]
 
     @property

@@ -177,7 +177,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
 
 
 def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
-    """Refuse control characters, including NUL, in the last row read."""
+    """Reject control characters, including NUL, in the last row read."""
     header, row = rows[0], rows[-1]
     for k, cell in enumerate(row):
         if not cell.isprintable() and not printable(cell):
@@ -252,7 +252,7 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
 
 
 def _check_labels(table: MeasurementTable) -> None:
-    """Refuse a missing id, or one that another row has."""
+    """Reject a missing id, or one that another row has."""
     seen: dict[str, int] = {}
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"

@@ -45,7 +45,7 @@ _STEPS = 8
 _SETTLED = 1e-3  # [sigma of the value] step at convergence
 _WIDENED = 4.0 ** np.arange(8)  # values of k that are tried
 _SURE = 1.0  # standard errors by which a larger k must predict better
-_MATTERS = 0.03  # of the noise's variance: relevant part
+_MATTERS = 0.03  # relative to the noise's variance: relevant part
 _AT_ONCE = 1000  # number of rows in a batch, to limit memory
 
 

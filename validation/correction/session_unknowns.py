@@ -32,8 +32,8 @@ from assembly.model.robot import Robot
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
 _ZERO = 1e-3  # [rad, m] standard deviation of a zero that was set again
-_SETTLING = ("lag", "creep")  # of time: they begin with the session
-_STEP = 1e-6  # [rad, m] for parameters other than a drift
+_SETTLING = ("lag", "creep")  # functions of time that begin with the session
+_STEP = 1e-6  # [rad, m] step of parameters other than a drift
 _CONSTANT = "time_constant"
 
 

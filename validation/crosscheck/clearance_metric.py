@@ -27,7 +27,7 @@ from validation.crosscheck.pair import Pair
 from validation.crosscheck.verdict import Check
 
 TOLERANCE = 0.02  # relative, of limits: contacts are compliant and smoothed
-FLOOR_ENERGY = 1e-4  # [J] at scale 1: of the springs that centre clearances
+FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
 
 
 @dataclass(frozen=True, eq=False)

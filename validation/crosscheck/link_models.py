@@ -18,7 +18,7 @@ def link_models(robot: Robot, kind: str) -> SimulationModel:
     """Return the model of a robot's links: stiffnesses of springs, and solids.
 
     Args:
-        robot: any.
+        robot: any robot.
         kind: ``"beam"``: beams as beams, all others as springs; ``"spring"``: all as
             springs; ``"fem"``: meshed links as solids, others as for ``"beam"``.
 
@@ -43,7 +43,7 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
     """Return K_E of the links that a simulation models as springs.
 
     Args:
-        robot: any.
+        robot: any robot.
         links: ``"spring"``, or another kind, in which beams are left out.
 
     Returns:

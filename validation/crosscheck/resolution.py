@@ -33,7 +33,7 @@ from validation.crosscheck.pair import (
 )
 from validation.crosscheck.pose_metric import PoseMetric
 
-_CHANGE = 1e-2  # relative, of a number, to compute its effect
+_CHANGE = 1e-2  # relative change of a number, to compute its effect
 _QUADRATIC = "optimality gap"  # grows with the square of a change
 UNPROVED = 1.0  # relative change that is not detected
 _NAMED = 4  # largest number of numbers in a line of text

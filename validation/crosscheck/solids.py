@@ -14,7 +14,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
     """Return the solids of a robot's mesh links, for a simulation.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         By frame, the finest mesh, from which the linear model's K_E comes too; links of

@@ -29,7 +29,7 @@ from validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-# number of scales on which a check may fail; at which none is added
+# least number of scales on which a check may fail; largest number of scales
 _FEWEST, _MOST = 4, 6
 
 

@@ -18,7 +18,8 @@ from assembly.model.robot import Robot
 from validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-_ROUNDING = 1e-12  # of the largest component of a vector: smaller changes are rounding
+# relative to the largest component of a vector: smaller changes are rounding
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)

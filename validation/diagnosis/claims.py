@@ -17,7 +17,8 @@ from validation.diagnosis.lack_of_fit import UNLIKELY
 from validation.diagnosis.separability import orthonormal_basis
 from validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-_AT_BOUND = 1e-3  # of a bound: distance within which an unknown is at the bound
+# relative to a bound: distance within which an unknown is at the bound
+_AT_BOUND = 1e-3
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:

@@ -18,7 +18,7 @@ from validation.diagnosis.states import IN_USE, Models, State
 from validation.diagnosis.weighted_readings import NONE
 
 _STEP = 1.0  # first step of the logarithms of both sizes, which start at one sigma
-_CLOSE = 0.05  # of a logarithm: step that ends the search
+_CLOSE = 0.05  # relative to a logarithm: step that ends the search
 _LEAST = 0.02  # [sigma] contribution to the readings below which a size is 0
 _CLEAR = 1.0  # [sigma] contribution to the readings above which a size is needed
 _EVALUATIONS = 40  # largest number of evaluations; each fits a model

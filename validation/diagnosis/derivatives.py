@@ -19,7 +19,8 @@ from validation.diagnosis.hypotheses import Slot
 from validation.diagnosis.responses import Responses, responses
 from validation.diagnosis.sensitivities import Sensitivities
 
-STEP = 1e-3  # of an unknown's plausible size: a step between rounding and curvature
+# relative to an unknown's plausible size: a step between rounding and curvature
+STEP = 1e-3
 
 
 class Derivatives:

@@ -15,18 +15,19 @@ from assembly.measurement.conditions import Conditions
 from assembly.measurement.variables import variable
 from assembly.model.robot import Robot
 
-KNOTS = 7  # of a spline: it fits shapes that powers up to three do not
+KNOTS = 7  # knots of a spline, which fits shapes that powers up to three do not
 MANY = 150  # number of rows above which waves of high order are searched
-LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5  # of the span of time
-_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # of a slow wave in the span of time
-_DEPTHS = 0.03, 0.1, 0.3, 1.0  # of slip, relative to the variable's range
+# time constants relative to the span of time
+LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
+_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the span of time
+_DEPTHS = 0.03, 0.1, 0.3, 1.0  # depths of slip, relative to the variable's range
 # of the best depth, in a refined search
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 # turns of a screw over its slide's range: step of the search; larger ones miss waves
 _TURNS = 0.5
-_MOST_TURNS = 200.0  # of a screw over that range, and two for each position
+_MOST_TURNS = 200.0  # most turns of a screw over that range, and two for each position
 _FINER = 1.2  # first factor in the refinement of a shape parameter
-_NO_LOAD = 1e-3  # of the largest load: a smaller one does not take up backlash
+_NO_LOAD = 1e-3  # relative to the largest load: a smaller one does not take up backlash
 _HIGH = 12  # highest order of waves that is tried alone
 _CLOCKS = "time", "cov.time"
 _JUMPS, _MANY_JUMPS = 10, 91  # numbers of times at which a step is tried

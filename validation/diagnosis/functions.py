@@ -92,13 +92,13 @@ class Functions:
         self._numbers = cache(self._columns)
 
     def of(self, variables: list[str]) -> "Functions":
-        """Return the same for some of the variables."""
+        """Return the functions of some of the variables."""
         other = copy(self)
         other._depend_on(variables)
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the same, with elements that have columns of some rows only."""
+        """Return the functions with elements that have columns only in some rows."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)

@@ -41,7 +41,7 @@ from validation.diagnosis.whitening import independent, size_of_noise, whitening
 
 # rms of held-out rows, in sigma, that counts as noise for any probability
 _LOOSE = 1.25
-_SHARE = 0.5  # of the readings: largest share of determined unknowns
+_SHARE = 0.5  # relative to the readings: largest share of determined unknowns
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,8 @@ from validation.diagnosis.noise import repeat_scatter
 from validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # probability below which a residual is not noise
-UNLIKELY = 1e-3  # the same for one of many things tested
-OUTLIERS = 20  # at most one row in so many may be called an outlier
+UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
+OUTLIERS = 20  # at most one row in 20 may be an outlier
 _LEVELS = 30  # steps of a covariate's range; rows in one step are alike
 _OUTLYING = 5.5  # rms of an outlying row, in medians of all rows
 _MOST = 6  # largest number of trends that are reported

@@ -17,8 +17,8 @@ from assembly.model.function import Function
 from assembly.model.robot import Robot
 from validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # of a range: accepted extrapolation
-_SAME = 1e-3  # of a value: accepted difference if a variable never varied
+_MARGIN = 0.05  # relative to a range: accepted extrapolation
+_SAME = 1e-3  # relative to a value: accepted difference if a variable never varied
 # forms that repeat after a turn of any variable; then those of the first alone
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 

@@ -29,8 +29,9 @@ from validation.diagnosis.fit import MachineFit
 
 _TRIED = 240  # number of conditions tried
 _FURTHER = 1.5  # factor on the range of loads and covariates used so far
-_STEP = 1e-3  # of a standard deviation: step for derivatives
-_AS_GOOD = 0.97  # of the largest non-centrality: conditions above it are equally good
+_STEP = 1e-3  # relative to a standard deviation: step for derivatives
+# relative to the largest non-centrality: conditions above it are equally good
+_AS_GOOD = 0.97
 _DECIDES = 1.0  # [-] least non-centrality worth a measurement
 
 

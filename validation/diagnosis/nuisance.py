@@ -22,8 +22,9 @@ from validation.diagnosis.signatures import UNSEEN, whiten
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
-LARGEST_SHIFT = 0.1  # of the robot's size: the same for translations
-_ROUNDING = 1e-9  # of the largest column of a group: smaller ones move no reading
+LARGEST_SHIFT = 0.1  # relative to the robot's size: largest plausible translation
+# relative to the largest column of a group: smaller ones move no reading
+_ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
 

@@ -33,10 +33,10 @@ class Sizes:
     """Optimised prior standard deviations and the posterior.
 
     Attributes:
-        std: (k,) of every unknown, in units of the noise's scale tau.
+        std: (k,) prior standard deviation of every unknown, over the noise's scale tau.
         of_group: standard deviations by group.
-        mean: (k,) posterior.
-        covariance: (k, k) likewise, over tau^2.
+        mean: (k,) posterior mean.
+        covariance: (k, k) posterior covariance, over tau^2.
         squares: z' C^-1 z.
         log_det: ln det C.
         cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
@@ -81,7 +81,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the same without some unknowns, by their numbers."""
+        """Return the unknowns without some of them, by number."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],

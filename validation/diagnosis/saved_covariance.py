@@ -29,7 +29,7 @@ from validation.diagnosis.unknowns import STEP, Small, effects_in, with_effects_
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-_STAYS = 1e-3  # of a compliance: least remainder after a decrease
+_STAYS = 1e-3  # relative to a compliance: least remainder after a decrease
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return its value; for a compliance the change of the file's, which is 0."""
+        """Return the number's value; 0 for a change of a compliance in the file."""
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -180,7 +180,7 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
     """Write a covariance as a file of arrays, with the suffix ``.npz``.
 
     Raises:
-        BadInput: it cannot be written.
+        BadInput: the file cannot be written.
     """
     labels = [json.dumps([n.kind, n.owner, n.name, n.session]) for n in saved.numbers]
     content = io.BytesIO()

@@ -25,7 +25,8 @@ _LOOKED = 2  # number of models of the beam for which functions are scored
 _FORMS = 4  # number of models whose function is tried in all forms
 # decrease of the log posterior accepted for a larger model, if two are needed
 _DROP = 1.0
-_ROUNDS = 3  # of exchanges: with memory that is not in the model they do not end
+# rounds of exchanges; without the machine's memory in the model they do not end
+_ROUNDS = 3
 _NEAR = 15.0  # log posterior: error of an estimate at fixed standard deviations
 
 

@@ -49,7 +49,7 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Find what the declared model lacks.
+    """Find the effects and functions that the declared model lacks.
 
     Args:
         columns: columns of all N measured cells.

@@ -35,11 +35,13 @@ from validation.diagnosis.candidates import (
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import Responses
 
-_STIFF = 0.1  # of a spline's size: prior size of its linear part, per step
+_STIFF = 0.1  # relative to a spline's size: prior size of its linear part, per step
 _RANK = 1e-8  # relative size of a power above the rounding of those below it
-_STEP = 1e-3  # of the largest load: step for a derivative, in which the model is linear
+# relative to the largest load: step for a derivative, in which the model is linear
+_STEP = 1e-3
 _BENT = 64  # columns that are cached for forms whose shape parameter is being fitted
-_NOTHING = 1e-9  # of the largest unknown: below it the readings do not depend on it
+# relative to the largest unknown: below it the readings do not depend on it
+_NOTHING = 1e-9
 
 
 class Sensitivities:
@@ -54,7 +56,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Return the same for some rows, by number; forms are normalised over all."""
+        """Return the sensitivities for some rows, with forms normalised over all."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -62,7 +64,7 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """Return the same for conditions that effects have changed.
+        """Return the sensitivities for conditions changed by effects.
 
         Forms are normalised as before.
         """

@@ -29,12 +29,12 @@ Place = tuple[int, int]
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean squares over some rows.
+    """Root mean square errors over some rows.
 
     Attributes:
-        position: [m] of the components measured.
-        rotation: [rad] of the components measured.
-        normalised: [-] of residual over sigma.
+        position: [m] error of the components measured.
+        rotation: [rad] error of the components measured.
+        normalised: [-] error of the components measured over sigma.
     """
 
     position: float

@@ -32,8 +32,9 @@ _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # number of sets of corrections that are followed
 # of the residual: if it falls below, only this set of corrections is followed
 _CLEAR = 0.1
-_LESS = 0.9  # of the residual: a further correction is followed if it falls below
-_DECISIVE = 0.5  # of the residual: blunders are reported if it falls below
+# relative to the residual: a further correction is followed if it falls below
+_LESS = 0.9
+_DECISIVE = 0.5  # relative to the residual: blunders are reported if it falls below
 _NEEDED = 1.5  # factor on the residual without a correction, above which it is needed
 _FAR = 10.0  # times the spread of the readings: no unit of the positions explains it
 _NOISE = 3.0  # [sigma] residual below which no blunder is searched

@@ -30,7 +30,7 @@ from validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 Mode = tuple[bool, bool]  # geometric errors in use, springs in use
 MORE = math.log(2.0)  # each further element halves the prior probability
 IN_USE = math.log(10.0)  # prior odds against geometry, and against springs: 10
-_GROUPS = 4  # of nuisance parameters
+_GROUPS = 4  # number of groups of nuisance parameters
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,8 +44,8 @@ from validation.diagnosis.weighted_readings import NONE
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _SEARCHED = 2000  # rows by which models are chosen; all are fitted
-_TURNS = 6  # of the search, without gross blunders
-_BENDS = 1  # of them, with what finite geometric errors add
+_TURNS = 6  # most repetitions of the search without gross blunders
+_BENDS = 1  # repetitions with second-order terms of geometric errors
 _GROSS = 30.0  # medians of all rows, from which a row is a gross blunder
 _CLEARLY = 2.0  # standard errors by which time must predict other spans better
 _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from which on
@@ -53,10 +53,10 @@ _BENT = 0.3  # [sigma] change of a reading by finite geometric errors, from whic
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """What the search found.
+    """Result of the search for effects and functions.
 
     Attributes:
-        campaign: campaign of R rows; sigma is as large as the search believed, of a
+        campaign: campaign of R rows; sigma is as large as the search estimated, of a
             blunder many times as large, and so is the noise in common.
         conditions: conditions of all rows, registered, with what finite geometric
             errors add.
@@ -154,7 +154,8 @@ def trace(
         fitted: (R,) bool, the rows that are read.
         declared: declared model of all rows.
         update: called with the step's name, the number done and their total.
-        odds: factors on the prior odds of what may act, see :class:`.columns.Columns`.
+        odds: factors on the prior odds of effects and functions, see
+            :class:`.columns.Columns`.
 
     Returns:
         The effects found, and the fitted machine with them.

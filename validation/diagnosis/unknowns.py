@@ -29,7 +29,7 @@ from validation.diagnosis.signatures import conditions_of
 _WIDE = 1e3  # plausible sizes of an effect's unknown: standard deviation of its prior
 _BEND = 0.5  # standard deviation of a function's shape parameter; and its bound
 _HELD = 1e-12  # plausible sizes: standard deviation of an unknown with a declared value
-STEP = 1e-4  # of a number's size: step for its derivative
+STEP = 1e-4  # relative to a number's size: step for its derivative
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +242,7 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Return the same without one of its effects."""
+        """Return the unknowns without those of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 

@@ -25,7 +25,7 @@ class CellValues:
     Attributes:
         sheet: the table.
         header: its columns.
-        writing: the declared format, for what the table does not state.
+        writing: declared format, used where the table states none.
     """
 
     sheet: Sheet

@@ -106,7 +106,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
 
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
-    """Refuse a missing label, or one that another row has."""
+    """Reject a missing label, or one that another row has."""
     if not label:
         raise BadInput(f"{place}: empty; expected a label")
     if label in seen:

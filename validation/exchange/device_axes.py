@@ -21,19 +21,21 @@ from validation.exchange.device_frame import robust_frame, scatter_of
 from validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-_FAR_BETTER = 0.25  # of the scatter: another reading is accepted if less remains
+# relative to the scatter: another reading is accepted if less remains
+_FAR_BETTER = 0.25
 _SCALED = 0.02  # largest scatter of ratios of distances with one factor
 # accepted error of the factor of two units, since the robot has errors too
 _UNIT = 0.05
 _PAIRED = 10  # number of following readings, to each of which the distance is taken
-_APART = 0.1  # of the declared distance of two targets: larger differences are reported
+# relative to the declared distance of two targets: larger differences are reported
+_APART = 0.1
 _MIRRORED = np.array([1.0, -1.0, 1.0])  # any axis: a rotation makes them equal
 
 
 def check_axes(
     file: Path, measured: NDArray, nominal: NDArray, known: bool
 ) -> None:  # fmt: skip
-    """Refuse lengths in another unit, mirrored axes, and exchanged axes.
+    """Reject lengths in another unit, mirrored axes, and exchanged axes.
 
     Args:
         file: the targets file, for messages.
@@ -143,7 +145,7 @@ def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
 def _check_known_axes(
     file: Path, measured: NDArray, nominal: NDArray, scatter: float
 ) -> None:
-    """Refuse device axes that are exchanged or reversed axes of the base."""
+    """Reject device axes that are exchanged or reversed axes of the base."""
     best, found = scatter, ""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         tried = _scatter(measured[:, list(order)] * signs, nominal, known=True)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _GROSS = 20.0  # times the scatter of all readings: impossible for a machine
-_BETTER = 0.25  # of the misfit: an exchange is accepted if less remains
+_BETTER = 0.25  # relative to the misfit: an exchange is accepted if less remains
 _MOST = 6  # largest number of targets whose exchanges are all tried: 720
 
 

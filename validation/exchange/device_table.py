@@ -37,7 +37,7 @@ def read_device_table(
 
     Args:
         path: the file.
-        writing: the declared format, for what the file does not state.
+        writing: declared format, used where the file states none.
         targets: (3,) [m] by name, platform axes; a table may have columns for each of
             them.
 

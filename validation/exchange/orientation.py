@@ -16,7 +16,7 @@ from validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-_FAR_BETTER = 0.25  # of the scatter: the inverse is accepted if less remains
+_FAR_BETTER = 0.25  # relative to the scatter: the inverse is accepted if less remains
 _GROSS = 20.0  # times the scatter: readings left out of the mean
 _MEDIAN = 1.538  # median length of a Gaussian vector in space, of one component's sigma
 _ROUNDING = 1e-12  # [rad] scatter of rounding

@@ -24,7 +24,7 @@ from validation.exchange.orientation import turns_of
 from validation.exchange.reading import Reading
 from validation.exchange.targets_file import TargetsFile
 
-_ASTRAY = 0.1  # of the spread of the commands: larger than any machine's error
+_ASTRAY = 0.1  # relative to the spread of the commands: larger than any machine's error
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]  # command, and readings by target

@@ -11,7 +11,7 @@ from validation.exchange.cell_values import CellValues, missing
 from validation.exchange.reading import Reading
 
 _COUNTERS = 3  # columns that may precede the targets': a counter, a time
-_ALIKE = 0.1  # of the scatter of distances: right columns leave less
+_ALIKE = 0.1  # relative to the scatter of distances: right columns leave less
 
 
 def read_plain_rows(

@@ -12,7 +12,7 @@ LARGEST = 1e12  # largest number in a table
 
 @dataclass(frozen=True)
 class Writing:
-    """Format of an export, for what the export does not state itself.
+    """Declared format of an export, used where the export states none.
 
     Attributes:
         unit: unit of lengths, None if the header states it.

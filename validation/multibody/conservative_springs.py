@@ -106,7 +106,7 @@ def _power_series(factors: Sequence[float], x: float) -> float:
 
 
 def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
-    """Return a vector seen from axes rotated by half of w."""
+    """Return a vector in axes rotated by half of w."""
     half = turn / 2
     first = math.sin(half) / turn if turn else 0.5
     second = 2 * (math.sin(half / 2) / turn) ** 2 if turn else 0.125

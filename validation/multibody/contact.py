@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 from assembly.model.robot import Clearance, Frame
 
-TURN_STIFFNESS = 1e9  # [N m/rad] of the contact
-SHIFT_STIFFNESS = 1e12  # [N/m] of the contact
+TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
+SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
 # [-] first and last width of the smoothing, in sizes of the cone
 WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] larger bounds of own motions are checked afterwards
@@ -66,7 +66,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Return the same with the stiffness of its contacts times a factor."""
+        """Return the clearance with the stiffness of its contacts times a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 

@@ -25,7 +25,8 @@ from validation.multibody.motion import inverse, shifted
 _SWAP = np.r_[3:6, 0:3]  # our [R T] <-> Exudyn's [T R]
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
 HOLDING_STIFFNESS = 1e-2  # [N m/rad, N/m] on free motions while closures are closed
-_CENTRING = 1e3  # [N/m] of clearances; times 1e-3 in N m/rad, times 1e-6 about own axes
+# [N/m] springs of clearances; times 1e-3 in N m/rad, times 1e-6 about own axes
+_CENTRING = 1e3
 
 
 @dataclass(frozen=True)

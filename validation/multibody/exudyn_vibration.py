@@ -12,7 +12,7 @@ from validation.multibody.exudyn_model import Model
 from validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
-_NOTHING = 1e-12  # of the largest: smaller inertias count as zero
+_NOTHING = 1e-12  # relative to the largest: smaller inertias count as zero
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float]]) -> None:

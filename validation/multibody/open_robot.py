@@ -74,7 +74,7 @@ def link_springs(
     """Return the stiffness of every link that becomes neither a beam nor a mesh.
 
     Args:
-        robot: any.
+        robot: any robot.
         links: ``"beam"`` or ``"spring"``.
         given: K_E (6, 6) [N m/rad .. N/m] by frame.
         meshes: solids by frame.

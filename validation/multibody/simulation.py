@@ -58,7 +58,8 @@ from validation.multibody.open_robot import (
 )
 
 LINKS = ("beam", "spring")
-TIME_LIMIT = 600.0  # [s] of one simulation; the slowest took 26 on an idle core
+# [s] largest time of a simulation; the slowest took 26 s on an idle core
+TIME_LIMIT = 600.0
 _FINEST = 1e-10  # [m, rad, -] smallest tolerance
 # tried in turn; with contacts closures must not be much softer than these, and a rod
 # between two spherical joints may roll by radians under its weight unless it is held
@@ -198,7 +199,7 @@ def simulate_assembly(
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
     """
     started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
@@ -257,9 +258,9 @@ def simulated_frequencies(
     """Return natural frequencies of a robot in Exudyn at its nominal pose, drives held.
 
     Args:
-        posture: as in :func:`simulate_assembly`; links with a section are beams with
+        posture: see :func:`simulate_assembly`; links with a section are beams with
             consistent masses, the others must be given by a matrix and have none.
-        count: largest number.
+        count: largest number of frequencies.
         elements: number of elements of each beam.
 
     Returns:
@@ -301,7 +302,7 @@ def closing_sequence(
     """Return the frames of a robot without clearances while its closures are closed.
 
     Args:
-        posture: as in :func:`simulate_assembly`; links with a section are beams, the
+        posture: see :func:`simulate_assembly`; links with a section are beams, the
             others must be given by a matrix.
         steps: number of steps that close the closures, at least 4.
         scale: factor on the geometric errors.
@@ -344,7 +345,7 @@ def without_clearance(robot: Robot) -> Robot:
     """Return the same robot without clearances, to compare with a simulation.
 
     Args:
-        robot: any.
+        robot: any robot.
 
     Returns:
         The robot; its passive joints move along their z without bound.

@@ -88,7 +88,7 @@ def simulated_tangent(
     Raises:
         BadInput: a spring's stiffness is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: it was not found in time; a :class:`SimulationFailed`.
+        OutOfTime: the solution was not found in time; a :class:`SimulationFailed`.
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)

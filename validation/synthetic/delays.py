@@ -13,14 +13,15 @@ def behind(time_constant: float) -> str:
 
 
 def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Row]:
-    """Return rows with lagged temperatures; between rows the recorded one is linear.
+    """Return rows with lagged temperatures, by linear interpolation between rows.
 
     Args:
         rows: rows in the order of time.
-        time_constants: [s] each.
+        time_constants: [s] one for each lagged temperature.
 
     Returns:
-        Rows with a further covariate for each; in the first row it is the temperature.
+        Rows with a lagged temperature for each; in the first row it is the recorded
+        one.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):

@@ -86,7 +86,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
     """Return a design that varies the covariates of effects.
 
     Args:
-        design: any.
+        design: any design.
         names: names of the effects.
 
     Returns:
@@ -130,7 +130,7 @@ def plan_campaign(
     Args:
         robot: declared.
         design: design of the campaign.
-        rng: of the draws.
+        rng: random number generator of the draws.
 
     Returns:
         The plan.

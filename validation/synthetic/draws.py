@@ -30,7 +30,7 @@ def draw_effect(
         name: name of the effect.
         robot: the robot with the effect.
         duration: [s] of the session.
-        rng: of the draws.
+        rng: random number generator of the draws.
 
     Returns:
         The effect; :func:`strengthened` sets its strength.
@@ -50,7 +50,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
     """Return the effect with its contribution to the readings scaled by a factor.
 
     Args:
-        effect: any.
+        effect: any effect.
         factor: [-] > 0.
 
     Returns:

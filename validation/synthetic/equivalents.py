@@ -26,10 +26,10 @@ from validation.synthetic.machine import Hidden, simulate_readings
 
 SAME = 10.0  # residual chi square below which noise hides the difference
 _DRIFTS = (0.1, 0.3, 1.0)  # time constants tried, in durations
-_STEP = 1e-5  # [rad, m] of a finite difference
-_GRAM = 1e-3  # [kg, kg m] of a finite difference
+_STEP = 1e-5  # [rad, m] step of a finite difference
+_GRAM = 1e-3  # [kg, kg m] step of a finite difference
 MOMENTS = ("moment.x", "moment.y", "moment.z")
-_SOFT = 1e9  # [N m/rad, N/m] of a spring added for a finite difference
+_SOFT = 1e9  # [N m/rad, N/m] stiffness of a spring added for a finite difference
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,12 @@ from validation.synthetic.effects import (
 from validation.synthetic.laws import ClearanceLaw, PowerLawSpring, TwoStepSpring
 from validation.synthetic.springs import rest_on_springs
 
-# of a beam; corrected elements are exact enough at these small deflections
+# elements of a beam; corrected elements are accurate at these small deflections
 _ELEMENTS = 2
 _STEPS = 60
 _SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] the same of clearances, with the rounding of the sensor at small loads
+# [rad, m] change of clearances at convergence, with the sensor's rounding at small
+# loads
 _SETTLED_CLEARANCE = 5e-9
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}  # [N/m, N m/rad]
 Progress = Callable[[int, int], None]
@@ -50,7 +51,7 @@ def rest_poses(
     """Return the equilibria of machines of one structure under their loads.
 
     Args:
-        machines: with all their effects.
+        machines: machines with all their effects.
         program: one of :data:`PROGRAMS`.
         update: called with the number of machines at rest and their total.
 

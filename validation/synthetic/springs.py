@@ -36,8 +36,8 @@ from validation.multibody.simulation import SimulationFailed
 from validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
-_CONVERGED = 1e-12  # [rad, m] of the last step
-_DIVERGED = 1e3  # [rad, m] of a coordinate, above which the steps diverge
+_CONVERGED = 1e-12  # [rad, m] size of the last step
+_DIVERGED = 1e3  # [rad, m] coordinate above which the steps diverge
 _RANK = 1e-10  # relative: smaller singular values belong to idle motions
 
 

@@ -73,11 +73,11 @@ def least_energy(
 def solve_with(
     lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
 ) -> Assembly:
-    """Close a manipulator at least energy with a given choice of what may move.
+    """Return the assembly of least energy with given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: what may move.
+        joints: virtual joints that may move.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         frame_loads: all loads, this one among them.
 

@@ -42,7 +42,7 @@ from assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from stiffness.screws import SCREW
 
-_STILL = 1e-6  # of the largest motion: smaller ones count as rounding
+_STILL = 1e-6  # relative to the largest motion: smaller ones count as rounding
 _NAMED = 4  # largest number of joints that a message names
 
 

@@ -49,11 +49,11 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
 def margin_with(
     lin: Linearisation, joints: VirtualJoints
 ) -> tuple[float, float, NDArray]:
-    """Return the margin with a given choice of what may move.
+    """Return the margin with given virtual joints.
 
     Args:
         lin: the assembly constraints.
-        joints: what may move, without springs.
+        joints: virtual joints that may move, without springs.
 
     Returns:
         The margin and its certified lower bound, inf if no factor suffices; the (n, 6)
