@@ -31,18 +31,26 @@ app = Commands(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(stiffness.app, name="stiffness", help="How stiff is a link?")
-app.add_typer(assembly.app, name="assembly", help="What pose, energy, error?")
-app.add_typer(validation.app, name="validation", help="Is it true?")
-app.add_typer(report.app, name="report", help="What changed between two runs?")
+app.add_typer(stiffness.app, name="stiffness", help="Stiffness of links.")
+app.add_typer(
+    assembly.app,
+    name="assembly",
+    help="Forced assembly: pose, energy, errors, stiffness.",
+)
+app.add_typer(
+    validation.app,
+    name="validation",
+    help="Validation by simulation and measured data.",
+)
+app.add_typer(report.app, name="report", help="Comparison of two runs.")
 app.command()(convert)
 app.command()(example)
 app.command()(schema)
 
 
-def _print_version(asked: bool) -> None:
-    """What ``--version`` does."""
-    if asked:
+def _print_version(requested: bool) -> None:
+    """Print the version and exit."""
+    if requested:
         from forcefit import __version__
 
         print(f"forcefit {__version__}")
@@ -61,7 +69,7 @@ def forcefit(
         ),
     ] = False,
 ) -> None:
-    """Forced assembly of parallel manipulators, and the proof of each number.
+    """Forced assembly of parallel manipulators, with certified results.
 
     Stiffness, energy, pose error. SI units; screws [R T], wrenches [M F].
     """
@@ -75,7 +83,7 @@ def study(
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Run the main job: every check of a study file, one report.
+    """Run every check of a study file and write one report.
 
     Writes report.html (self-contained), results.json and results.nc into the folder
     the study file names.  Exit status 1 if a check fails.
@@ -84,10 +92,10 @@ def study(
     from validation.study.study import run_study
     from validation.study.study_file import read_study
 
-    asked = read_study(file, output)
+    requested = read_study(file, output)
     need("jinja2")
     with progress_bars() as update:
-        results = run_study(asked, update)
+        results = run_study(requested, update)
         update("report", 0, 1)
         folder = write_study(results)
         update("report", 1, 1)
@@ -118,7 +126,7 @@ def main() -> None:
 
 
 def _print_any_letter() -> None:
-    r"""Print letters that standard output's encoding lacks as ``\u03a9``.
+    r"""Print characters that standard output's encoding lacks as ``\u03a9``.
 
     As stderr does: on Windows the encoding of a file or a pipe has 256 letters.
     """
@@ -128,7 +136,7 @@ def _print_any_letter() -> None:
 
 
 def _status_after(error: BaseException, interrupted: bool) -> int:
-    """The exit status after an exception, with its message on stderr, if it has one."""
+    """Return the exit status of an exception, and print its message to stderr."""
     if interrupted or isinstance(error, KeyboardInterrupt | typer.Abort):
         return _complain("interrupted", 130)
     match error:
@@ -150,10 +158,11 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
 
 @contextmanager
 def _interrupts() -> Generator[list[int], None, None]:
-    """Ctrl-C is recorded, and raised as always.
+    """Record Ctrl-C, and raise it as usual.
 
     Compiled code that is interrupted fails with errors of its own, such as matplotlib's
-    ``ValueError: Invalid bounding box``; what was recorded tells what they mean.
+    ``ValueError: Invalid bounding box``; the record shows their
+    cause.
     """
     recorded: list[int] = []
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -173,14 +182,14 @@ def _interrupts() -> Generator[list[int], None, None]:
 
 
 def _with_found(message: str, error: BaseException) -> str:
-    """A parser's message and the value refused, which newer ones leave out."""
+    """Return a parser's message with the refused value, which newer parsers omit."""
     refused: list[dict] = getattr(error.__cause__, "errors", list)()
     values = [str(one.get("input")) for one in refused[:1] if one.get("input")]
     return "; ".join([message, *(f"found {quoted(v)}" for v in values)])
 
 
 def _complain(message: str, status: int) -> int:
-    """A message on stderr, if there is one: help without a command has none."""
+    """Print a message to stderr, if there is one, and return the exit status."""
     if message:
         print(f"forcefit: {one_line(message, 800)}", file=sys.stderr)
     return status

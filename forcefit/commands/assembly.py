@@ -56,7 +56,8 @@ def error(
     assumption: Annotated[
         list[str] | None,
         typer.Option(
-            help="frozen | free | budget; default all, under a load the first two."
+            help="Assumption on the clearances: frozen | free | budget. Default: all; "
+            "under a load frozen and free."
         ),
     ] = None,
     load: LoadOption = None,
@@ -66,16 +67,16 @@ def error(
         float, typer.Option(help="eta of the budget assumption: E <= (1 + eta) E*.")
     ] = 0.05,
     tolerance_rotation: Annotated[
-        float, typer.Option(help="[rad] upper minus lower bound.")
+        float, typer.Option(help="[rad] Largest difference of upper and lower bound.")
     ] = 1e-6,
     tolerance_translation: Annotated[
-        float, typer.Option(help="[m] upper minus lower bound.")
+        float, typer.Option(help="[m] Largest difference of upper and lower bound.")
     ] = 1e-6,
     at: AtOption = None,
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Certified bounds of the largest pose error, problem (27)."""
+    """Compute certified bounds of the largest pose error, problem (27)."""
     from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.model.statuses import OK
@@ -118,7 +119,8 @@ def show(
     figure: Annotated[
         Path | None,
         typer.Option(
-            "--figure", help="PNG, JPEG, BMP or TIFF; a window opens without."
+            "--figure",
+            help="Picture to write: PNG, JPEG, BMP or TIFF; without it a window opens.",
         ),
     ] = None,
     pose: PoseOption = None,
@@ -131,13 +133,16 @@ def show(
     ] = None,
     error_body: Annotated[
         str | None,
-        typer.Option(help="Also the body of possible errors: translation | rotation."),
+        typer.Option(
+            help="Also show the set of possible platform errors: translation | "
+            "rotation."
+        ),
     ] = None,
     assumption: Annotated[
         str | None,
         typer.Option(
-            help="Of that body: frozen | free | budget; default budget, of a loaded "
-            "robot frozen."
+            help="Assumption of that set: frozen | free | budget. Default: budget; "
+            "under a load frozen."
         ),
     ] = None,
 ) -> None:

@@ -26,17 +26,17 @@ class BeamOptions:
     theory: str = "timoshenko"
 
     def has_section(self) -> bool:
-        """Whether a section is given, in one form or another."""
+        """Return whether a section is given."""
         lengths = (self.radius, self.inner_radius, self.width, self.height)
         return {*lengths, self.section_text} != {None}
 
     def material(self) -> tuple[float, float]:
-        """Young's modulus [Pa] and Poisson's ratio."""
+        """Return Young's modulus [Pa] and Poisson's ratio."""
         E = checked("--young", self.young, "Pa", above=0)
         return E, checked("--poisson", self.poisson, "1", above=-1, below=0.5)
 
     def declared(self) -> dict[str, float]:
-        """The section's lengths or constants by name; errors name what is missing."""
+        """Return the section's lengths [m] or constants by name."""
         plain = {
             "radius": self.radius,
             "inner_radius": self.inner_radius,
@@ -68,12 +68,12 @@ class BeamOptions:
         return given
 
     def section(self) -> Section:
-        """The section of the options; an error names what is missing."""
+        """Return the section of the options."""
         _, nu = self.material()
         return declared_section(self.declared(), nu)
 
     def checked_theory(self) -> str:
-        """The name of a beam theory."""
+        """Return the name of a beam theory."""
         if self.theory not in THEORIES:
             raise BadInput(
                 f"--theory: found {describe(self.theory)}"
@@ -84,7 +84,7 @@ class BeamOptions:
     def link(
         self, base: NDArray, tip: NDArray, up: NDArray | None = None
     ) -> LinkStiffness:
-        """The beam between two points, in the axes they are given in."""
+        """Return the beam between two points, in the axes they are given in."""
         E, nu = self.material()
         theory = self.checked_theory()
         C = beam_compliance(

@@ -1,4 +1,4 @@
-"""Options of the commands that lay out a campaign's rows: which, how, how exactly."""
+"""Options of the commands that plan or simulate a campaign: ranges and noise."""
 
 from typing import Annotated
 
@@ -8,10 +8,16 @@ Reach = Annotated[
     float, typer.Option(help="[rad] Largest change of a drive from home.")
 ]
 Stroke = Annotated[
-    float, typer.Option(help="[m/rad] What a sliding drive moves per rad of reach.")
+    float, typer.Option(help="[m/rad] Travel of a sliding drive per rad of reach.")
 ]
-Force = Annotated[float, typer.Option(help="[N] Largest load.")]
-Temperature = Annotated[str, typer.Option(help="swing | around | constant")]
-CommandedIn = Annotated[str, typer.Option(help="joints | pose")]
-RotationNoise = Annotated[float, typer.Option(help="[rad] 1 sigma.")]
-PositionNoise = Annotated[float, typer.Option(help="[m] 1 sigma.")]
+Force = Annotated[float, typer.Option(help="[N] Largest force on the platform.")]
+Temperature = Annotated[
+    str, typer.Option(help="Temperature over the rows: swing | around | constant.")
+]
+CommandedIn = Annotated[str, typer.Option(help="Commanded quantities: joints | pose.")]
+RotationNoise = Annotated[
+    float, typer.Option(help="[rad] Standard deviation of a rotation reading.")
+]
+PositionNoise = Annotated[
+    float, typer.Option(help="[m] Standard deviation of a position reading.")
+]

@@ -1,4 +1,4 @@
-"""The command ``forcefit stiffness compare``: finite elements beside beams."""
+"""The command ``forcefit stiffness compare``: finite elements against beams."""
 
 from functools import partial
 from pathlib import Path
@@ -47,8 +47,8 @@ def compare(
     ratios: Annotated[
         str | None,
         typer.Option(
-            help="In place of a SURFACE: straight bars of the section, of these L / r, "
-            "such as 5,10,20,40."
+            help="Instead of a SURFACE: slenderness ratios L / r of straight bars of "
+            "the section, such as 5,10,20,40."
         ),
     ] = None,
     radius: Radius = None,
@@ -64,25 +64,25 @@ def compare(
     unit: Annotated[
         str | None,
         typer.Option(
-            help="Of the file: m (the default), cm, mm, um, inch; STEP has its own."
+            help="Unit of length of the file: m (the default), cm, mm, um, inch; a "
+            "STEP file states its own."
         ),
     ] = None,
     accuracy: Annotated[
         float | None,
         typer.Option(
-            help="Requested largest relative error of K; 0.005 of a SURFACE, 0.002 "
-            "with --ratios if absent."
+            help="Required relative error of K. Default: 0.005; with --ratios 0.002."
         ),
     ] = None,
     interface: Kind = "rigid",
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """K_E by finite elements beside a beam, entry by entry.
+    """Compare K_E by finite elements with a beam's, entry by entry.
 
     The beam of a SURFACE is straight, of the section given, or along a curve.  With
-    --ratios bars of the section show the end effect over L / r, where r is twice the
-    section's larger radius of gyration, a round bar's radius.
+    --ratios the end effect is fitted to bars of several L / r, where r is twice the
+    section's larger radius of gyration, the radius of a round bar.
     """
     from forcefit.commands.beam_options import BeamOptions
 
@@ -108,7 +108,7 @@ def compare(
 
 
 def _check_no_surface(**values: object) -> None:
-    """Refuse what belongs to a SURFACE where bars are compared."""
+    """Refuse options of a SURFACE where bars are compared."""
     for name, value in values.items():
         if value is not None:
             option = name if name == "SURFACE" else f"--{name}"

@@ -13,17 +13,21 @@ def convert(
     source: Annotated[
         str,
         typer.Argument(
-            metavar="IN", help=".urdf, .xml (MJCF), .sdf or .toml; or a built-in name."
+            metavar="IN",
+            help="Robot: .urdf, .xml (MJCF), .sdf or .toml; or a built-in name.",
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", help=".toml, .urdf or .xml (MJCF).")
+        Path,
+        typer.Option(
+            "-o", "--output", help="File to write: .toml, .urdf or .xml (MJCF)."
+        ),
     ],
     loops: Annotated[
         Path | None,
         typer.Option(
-            help="Loops and drives of a URDF (YAML, closed_loop); without it the file "
-            "of the URDF's name, or robot.yaml beside it."
+            help="Loops and drives of a URDF (YAML, closed_loop). Default: the YAML "
+            "file of the URDF's name, or robot.yaml, in its folder."
         ),
     ] = None,
     overlay: Annotated[
@@ -33,9 +37,9 @@ def convert(
     points: Annotated[
         str | None,
         typer.Option(
-            help="Loops that meet only in a point, whatever their type: loop1 for the "
-            "first, or a name of an end, between commas; all; none: types as they "
-            "stand."
+            help="Loops closed in a point only, without orientation: loop1 for the "
+            "first, or the name of an end, separated by commas; all; none: types as "
+            "declared."
         ),
     ] = None,
     rest: RestOption = None,
@@ -44,10 +48,10 @@ def convert(
 ) -> None:
     """Convert a robot from or to URDF, MJCF and SDF.
 
-    A home pose is found where the file's own leaves loops open.  What is written is
-    read back and compared in 100 random postures; what it cannot hold is listed.  Where
-    MuJoCo is installed, what it reads in the same URDF or MJCF is compared too: exit
-    status 1 if that is another robot.
+    A home pose is computed where the file's own does not close the loops.  The written
+    file is read back and compared in 100 random postures; data that it cannot hold are
+    listed.  Where MuJoCo is installed, the robot that it reads from the same URDF or
+    MJCF is compared too: exit status 1 if they differ.
     """
     from assembly.exchange.convert import convert as convert_robot
     from assembly.kinematics.closing import closing_of

@@ -42,8 +42,8 @@ def predict(
 ) -> None:
     """Predict the readings of a campaign or a table.
 
-    With the geometric errors, effects and functions of the robot's file, and with
-    intervals where the file says how uncertain they are.  Where rows are measured, the
+    Geometric errors, effects and functions of the robot's file are applied; readings
+    have intervals where the file states uncertainties.  Where rows are measured, the
     error of the prediction is printed.  Exit status 1 if a row has no answer; its cells
     are empty.
     """
@@ -71,14 +71,14 @@ def predict(
 
 
 def _about(table: dict[str, Any]) -> list[str]:
-    """What a prediction rests on, a line each."""
+    """Return lines on the basis of a prediction."""
     from forcefit.results.text import readings_text
 
     lines = []
     if any(size > 0.0 for size in table["std"].values()):
         lines.append(
-            f"uncertainty of the model, 1 sigma: {readings_text(table['std'])}; of a "
-            f"reading about it: {readings_text(table['noise'])}"
+            f"uncertainty of the model, 1 sigma: {readings_text(table['std'])}; noise "
+            f"of a reading: {readings_text(table['noise'])}"
         )
     if table["not_measured"]:
         names = ", ".join(table["not_measured"])
@@ -109,25 +109,27 @@ def compensate(
     ],
     offsets: Annotated[
         Path | None,
-        typer.Option(help="Also what is to be added to each drive, row by row (CSV)."),
+        typer.Option(
+            help="Also write the correction of each drive [rad or m], row by row (CSV)."
+        ),
     ] = None,
     diagnosed: Annotated[
         Path | None,
-        typer.Option(help="Answer of diagnose --json: the error to be expected."),
+        typer.Option(help="JSON of validation diagnose, for the expected error."),
     ] = None,
     as_read: Annotated[
         bool,
         typer.Option(
-            "--as-read", help="Correct also what only the measuring device shows."
+            "--as-read", help="Also correct effects that act on the readings only."
         ),
     ] = False,
     json: JsonOption = None,
 ) -> None:
     """Find the commands that cancel the robot's errors.
 
-    ROBOT is the corrected robot.  TARGETS command the poses wanted, as if nothing were
-    wrong.  Limits of joints are kept; closed chains are followed.  Exit status 1 if a
-    row has no answer; its command is unchanged.
+    ROBOT has the identified errors, as saved by diagnose --save.  TARGETS command the
+    required poses of the nominal robot.  Joint limits are respected; loops stay closed.
+    Exit status 1 if a row has no answer; its command is unchanged.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_commands
@@ -152,7 +154,7 @@ def compensate(
 
 
 def _warned(commands: "Campaign") -> dict[str, Any]:
-    """What leaves the range in which the robot was learned, said in a line each."""
+    """Warn of variables outside the range of the identification data."""
     from validation.diagnosis.learned_range import beyond
 
     left = beyond(commands.robot, commands)
@@ -162,7 +164,7 @@ def _warned(commands: "Campaign") -> dict[str, Any]:
 
 
 def _left(path: Path) -> dict[str, float]:
-    """What a diagnosis left on the held-out rows, from its answer."""
+    """Return the residual of the held-out rows [m, rad] from a diagnosis' JSON."""
     from json import loads
 
     from forcefit.inputs.table import read_text
@@ -185,7 +187,10 @@ def carry(
         ),
     ],
     fit: Annotated[
-        str, typer.Option(help="What is the session's: registration,tool,zeros.")
+        str,
+        typer.Option(
+            help="Quantities that differ between sessions: registration,tool,zeros."
+        ),
     ] = "registration",
     output: Annotated[
         Path | None,
@@ -195,11 +200,11 @@ def carry(
 ) -> None:
     """Carry a saved robot over to a new session.
 
-    Where the device stands, what changed with time (and what --fit names) is fitted to
-    the set-up rows of each session, the robot's own numbers too, with their covariance
-    as prior; the error is that of its other rows, beside the declared robot's.  Exit
-    status 1, and no robot written, where the set-up rows do not suffice or the saved
-    robot is worse than the declared one.
+    The device's pose, effects of time and the quantities of --fit are fitted to the
+    set-up rows of each session.  The robot's parameters are fitted too, with their
+    covariance as prior.  Errors are those of the other rows, by the carried and by the
+    declared robot.  Exit status 1, and no robot written, where the set-up rows do not
+    suffice or the carried robot is worse than the declared one.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.campaign.campaign_file import read_campaign, read_commands
@@ -240,7 +245,8 @@ def explain(
 ) -> None:
     """Show the functions of a robot's file as curves.
 
-    With their bands; one that remembers as its answer to a step of one unit.
+    Curves have confidence bands.  A function with memory is shown by its response to a
+    unit step.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.correction import curves
@@ -261,7 +267,7 @@ def explain(
 def _ranges(
     functions: tuple["Function", ...], texts: list[str]
 ) -> dict[str, tuple[float, float]]:
-    """Ranges by variable from ``--over``."""
+    """Return the ranges by variable from ``--over``."""
     valid = {name for function in functions for name in (*function.variables, "time")}
     ranges = {}
     for part in ",".join(texts).split(",") if texts else ():

@@ -23,13 +23,16 @@ from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.inputs.errors import BadInput, describe, nearest
 from forcefit.inputs.writing import PICTURE, check_writable, save_figure, write_json
 
-_MOST = 10_000  # loads of a curve
+_MOST = 10_000  # largest number of loads of a curve
 
 
 def deflection(
     robot: RobotArgument,
     along: Annotated[
-        str, typer.Option(help="Component of the load, from:to:step, as fz=0:-500:10.")
+        str,
+        typer.Option(
+            help="Component of the load [N or N m], from:to:step, such as fz=0:-500:10."
+        ),
     ],
     pose: PoseOption = None,
     joint: JointOption = None,
@@ -46,22 +49,22 @@ def deflection(
         ),
     ] = "contact",
     back: Annotated[
-        bool, typer.Option("--back", help="Also back to the first load.")
+        bool, typer.Option("--back", help="Then return to the first load.")
     ] = False,
     follow: Annotated[
         bool,
         typer.Option(
             "--follow",
-            help="By arc length past limit points, stable or not; finite motions, "
-            "clearances held at zero.",
+            help="Follow the path by arc length past limit points, stable or not "
+            "(finite motions, clearances at zero).",
         ),
     ] = False,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Load against deflection, up to critical loads.
+    """Compute load against deflection, up to critical loads.
 
-    Free motion in clearances, contacts, elastic deformation, jumps.
+    It shows free motion within clearances, contacts, elastic deformation and jumps.
     """
     from assembly.model.statuses import OK
     from assembly.report.deflection import (
@@ -96,7 +99,7 @@ def deflection(
 
 
 def parse_along(text: str) -> tuple[int, list[float]]:
-    """Component and values of ``--along``.
+    """Return the component and values of ``--along``.
 
     Args:
         text: such as ``"fz=0:-500:10"``; the step's sign does not matter.

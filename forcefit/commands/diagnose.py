@@ -31,7 +31,7 @@ def diagnose(
     finite_motions: Annotated[
         bool,
         typer.Option(
-            "--finite-motions", help="Motions of the declared model are finite."
+            "--finite-motions", help="Use finite motions of the declared model."
         ),
     ] = False,
     without: Annotated[
@@ -39,7 +39,8 @@ def diagnose(
         typer.Option(help="Leave out an effect, function (any), geometry or springs."),
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option(help="Look for these alone, named likewise.")
+        list[str] | None,
+        typer.Option(help="Consider these alone, named as for --without."),
     ] = None,
     prior: Annotated[
         list[str] | None,
@@ -52,8 +53,8 @@ def diagnose(
     """Trace measured deviations to the effect the model lacks.
 
     The verdict is explained, learned, none_needed, ambiguous, outside_library or
-    not_enough_rows; errors before and after are on rows that played no part in choosing
-    or fitting.  The machine found is saved wherever it predicts these rows better.
+    not_enough_rows.  Errors before and after are of held-out rows, on which nothing was
+    chosen or fitted.  --save writes the robot if it predicts these rows better.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.diagnosis import results
@@ -93,12 +94,12 @@ def diagnose(
 
 
 def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, float]:
-    """Factors on the prior odds of what may act, from the options."""
+    """Return the factors on the prior odds of the effects, from the options."""
     from assembly.effects import LIBRARY
 
     names = [*LIBRARY, "function", "geometry", "springs"]
     odds = dict.fromkeys(names, 0.0) if only else {}
-    asked = [("--without", n, 0.0) for n in without] + [
+    factors = [("--without", n, 0.0) for n in without] + [
         ("--only", n, 1.0) for n in only
     ]
     for text in prior:
@@ -110,8 +111,8 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
         if not 0.0 < value < 1e9:
             expected = "expected NAME=FACTOR, above 0"
             raise BadInput(f"--prior: found {quoted(text)}, {expected}")
-        asked.append(("--prior", name, value))
-    for option, name, value in asked:
+        factors.append(("--prior", name, value))
+    for option, name, value in factors:
         if name not in names:
             raise BadInput(f"{option}: found {quoted(name)}{nearest(name, names)}")
         odds[name] = value
@@ -119,11 +120,11 @@ def _odds(without: list[str], only: list[str], prior: list[str]) -> dict[str, fl
 
 
 def _worse(diagnosis: "Diagnosis") -> str:
-    """Why the machine found is not saved."""
+    """Return why the identified robot is not saved."""
     if not len(diagnosis.fit.unknowns) and not diagnosis.effects:
         return "nothing was found that the declared robot lacks"
     after, before = diagnosis.after.normalised, diagnosis.before.normalised
     return (
-        "the machine found predicts the held-out rows no better than the declared "
+        "the identified robot predicts the held-out rows no better than the declared "
         f"robot ({after:.3g} and {before:.3g} sigma)"
     )

@@ -14,7 +14,7 @@ class _Example(NamedTuple):
     """One example.
 
     Attributes:
-        about: what it shows.
+        about: its content, in a few words.
         files: its files and folders, from the folder that has ``examples``.
         first: a command to begin with.
     """
@@ -32,13 +32,13 @@ EXAMPLES = {
         "forcefit study examples/irsbot2.toml",
     ),
     "tolerance_allocation": _Example(
-        "how loose the tolerances of the paper's robot may be",
+        "allocation of the tolerances of the paper's robot",
         ("examples/tolerance_allocation",),
         'forcefit assembly tolerances irsbot2 --grid "tx=-0.2:0.2:0.2,tz=-0.5" '
         "--plan examples/tolerance_allocation/mostly.toml",
     ),
     "campaign": _Example(
-        "measurements of an arm that lacks an effect in its model",
+        "measurements of an arm whose model lacks an effect",
         ("examples/campaign",),
         "forcefit validation diagnose examples/campaign",
     ),
@@ -48,7 +48,7 @@ EXAMPLES = {
         "python examples/paper_figure5.py",
     ),
     "hexapod": _Example(
-        "what half the clearance gains in a hexapod, in Python",
+        "accuracy gained by half the clearance in a hexapod, in Python",
         ("examples/hexapod_accuracy.py", "examples/hexapod_errors.toml"),
         "python examples/hexapod_accuracy.py",
     ),
@@ -94,16 +94,18 @@ EXAMPLES = {
 def example(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Of examples; none lists them."),
+        typer.Argument(
+            metavar="[NAME]...", help="Names of examples; without one all are listed."
+        ),
     ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder that exists.")
+        Path, typer.Option("-o", "--output", help="Existing folder to write into.")
     ] = Path(),
 ) -> None:
-    """Write the files of examples, as they stand in the repository.
+    """Write the files of examples, as in the repository.
 
-    The commands of the README and of the documentation then work in that folder.  A
-    file that is there already with another content is kept, and nothing is written.
+    The commands of the README and of the documentation then work in that folder.  If a
+    file exists with another content, nothing is written.
     """
     if not names:
         for name, one in EXAMPLES.items():
@@ -129,7 +131,7 @@ def example(
 
 
 def _root() -> Path:
-    """The folder that has the examples: of the package installed, or of a checkout."""
+    """Return the folder of the examples, of the installed package or of a checkout."""
     package = Path(__file__).parents[1]
     for folder in (package, package.parent):
         if (folder / "examples" / "irsbot2.toml").is_file():
@@ -138,7 +140,7 @@ def _root() -> Path:
 
 
 def _files(root: Path, part: str) -> Iterator[Path]:
-    """A file, or all files of a folder, relative to the root."""
+    """Yield a file, or all files of a folder, relative to the root."""
     if (root / part).is_file():
         yield Path(part)
         return
@@ -148,7 +150,7 @@ def _files(root: Path, part: str) -> Iterator[Path]:
 
 
 def _is_absent(target: Path, source: Path) -> bool:
-    """Whether an example's file is not there yet; another content is refused."""
+    """Return whether an example's file is absent; refuse another content."""
     if not target.exists():
         check_writable(next(p for p in target.parents if p.exists()) / target.name)
         return True

@@ -20,7 +20,7 @@ def import_(
         Path, typer.Option(help="Robot, targets on its platform, units (TOML).")
     ],
     commands: Annotated[
-        Path, typer.Option(help="What was commanded: id, q.* or pose.*, time, load.*.")
+        Path, typer.Option(help="Table of commands: id, q.* or pose.*, time, load.*.")
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Folder of the new campaign.")
@@ -30,16 +30,15 @@ def import_(
         bool,
         typer.Option(
             "--diagnose",
-            help="Then trace what the model lacks, as validation diagnose does; --json "
-            "and --report are its.",
+            help="Then run validation diagnose, which writes --json and --report.",
         ),
     ] = False,
     report: ReportOption = None,
 ) -> None:
-    """Make a campaign of a measuring device's own files.
+    """Make a campaign from the files of a measuring device.
 
-    Readings are joined to commands by name, by time or by order; where the device
-    stood is found; exchanged targets and gross readings are named and left out.
+    Readings are joined to commands by name, by time or by order; the
+    device's pose is fitted; exchanged targets and outliers are reported and left out.
     """
     from validation.exchange.tracker import import_readings
 

@@ -37,10 +37,10 @@ def frequencies(
             "errors, clearances and loads)."
         ),
     ] = "nominal",
-    count: Annotated[int, typer.Option(help="Modes.", min=1, max=1000)] = 6,
+    count: Annotated[int, typer.Option(help="Number of modes.", min=1, max=1000)] = 6,
     json: JsonOption = None,
 ) -> None:
-    """Natural frequencies and modes, the drives held.
+    """Compute natural frequencies and modes, the drives held.
 
     Masses must be declared.
     """

@@ -24,11 +24,11 @@ from forcefit.commands.progress import progress_bars
 from forcefit.inputs.errors import BadInput, checked
 from forcefit.inputs.writing import check_json, check_new_folder, write_json
 
-DEFAULT_STRENGTH = 5.0  # [-] sigmas
+DEFAULT_STRENGTH = 5.0  # [-] size of an effect over the noise
 
 
 def parse_effects(texts: list[str] | None) -> dict[str, float]:
-    """Names and strengths from ``--effect``.
+    """Return the names and strengths from ``--effect``.
 
     Args:
         texts: such as ``["self_weight", "link_length=3"]``.
@@ -56,51 +56,56 @@ def parse_effects(texts: list[str] | None) -> dict[str, float]:
 
 def generate(
     robot: RobotArgument,
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="To be written.")],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder to write.")],
     truth: Annotated[
-        Path, typer.Option(help="File for what is hidden; not inside FOLDER.")
+        Path, typer.Option(help="File for the hidden effects, not inside FOLDER.")
     ],
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            "--effect", help="Hidden: NAME, or NAME=MULTIPLE of the noise (5)."
+            "--effect", help="Hidden effect: NAME, or NAME=MULTIPLE of the noise (5)."
         ),
     ] = None,
     configurations: Annotated[
-        int, typer.Option(help="Different ones.", min=1, max=1_000_000)
+        int, typer.Option(help="Number of configurations.", min=1, max=1_000_000)
     ] = 24,
     rows: Annotated[
-        int, typer.Option(help="Measurements, interleaved.", min=1, max=1_000_000)
+        int,
+        typer.Option(help="Number of measurements, interleaved.", min=1, max=1_000_000),
     ] = 116,
     reach: Reach = 0.6,
     stroke: Stroke = 0.1,
     force: Force = 40.0,
-    loads: Annotated[str, typer.Option(help="many | one")] = "many",
+    loads: Annotated[str, typer.Option(help="Load levels: many | one.")] = "many",
     temperature: Temperature = "swing",
     command: CommandedIn = "joints",
     humidity: Annotated[
-        bool, typer.Option("--humidity", help="Record it as a covariate.")
+        bool, typer.Option("--humidity", help="Record the humidity as a covariate.")
     ] = False,
     rotation: RotationNoise = 1e-5,
     position: PositionNoise = 5e-6,
     error_size: Annotated[
         float,
-        typer.Option(help="[rad] Declared errors drawn up to it, 0.5 mm per mrad."),
+        typer.Option(
+            help="[rad] Largest declared error drawn; of lengths 0.5 mm per mrad."
+        ),
     ] = 0.0,
-    outliers: Annotated[int, typer.Option(help="Rows spoilt.", min=0)] = 0,
+    outliers: Annotated[int, typer.Option(help="Number of outlying rows.", min=0)] = 0,
     missing: Annotated[float, typer.Option(help="Share of empty cells.")] = 0.0,
     hidden_frame: Annotated[
-        float, typer.Option(help="[rad, m] Size of an unknown measuring frame.")
+        float, typer.Option(help="[rad, m] Size of the measuring frame's unknown pose.")
     ] = 0.0,
     at: AtOption = None,
-    program: Annotated[str, typer.Option(help="multibody | springs")] = "multibody",
-    seed: Annotated[int, typer.Option(help="Of all draws.", min=0)] = 0,
+    program: Annotated[
+        str, typer.Option(help="Simulation: multibody | springs.")
+    ] = "multibody",
+    seed: Annotated[int, typer.Option(help="Seed of all draws.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Measure a simulated machine with effects its file lacks.
+    """Simulate a campaign with effects that the file lacks.
 
-    Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints are tight
-    unless a clearance is hidden.
+    Writes campaign.toml, measurements.csv and robot.toml to FOLDER.  Joints have no
+    clearance unless a hidden effect is one.
     """
     import numpy as np
 
@@ -161,4 +166,4 @@ def generate(
     write_json({folder.name: hidden}, str(truth))
     write_json({"folder": str(folder), "rows": len(campaign.readings)}, json)
     if json != "-":
-        print(f"{folder}: {len(campaign.readings)} rows; what is hidden: {truth}")
+        print(f"{folder}: {len(campaign.readings)} rows; hidden effects: {truth}")

@@ -50,7 +50,7 @@ class Commands(typer.Typer):
 
 
 def _title_of(param: Any) -> str:
-    """The title under which the help lists a parameter."""
+    """Return the title under which the help lists a parameter."""
     if param.param_type_name == "argument":
         return "Arguments"
     groups = [_GROUP_OF[name] for name in param.opts if name in _GROUP_OF]

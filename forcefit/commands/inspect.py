@@ -18,18 +18,16 @@ def inspect(
     campaign: CampaignArgument,
     iso: Annotated[
         bool,
-        typer.Option(
-            "--iso", help="In place of that, figures of ISO 9283 and ISO 230-2."
-        ),
+        typer.Option("--iso", help="Print figures of ISO 9283 and ISO 230-2 instead."),
     ] = False,
     json: JsonOption = None,
 ) -> None:
-    """What measured data can tell; figures of ISO 9283 and 230-2.
+    """Inspect measured data; figures of ISO 9283 and 230-2.
 
-    Rows, loads and covariates; noise from repeats against the stated sigma; which
-    effects would show, and which this design cannot tell apart.  With --iso, from
-    repeats: pose accuracy and repeatability, distance accuracy, drift; reversal,
-    repeatability and accuracy of each reading that was approached from both sides.
+    Reports rows, loads and covariates; noise from repeats against the stated sigma;
+    effects that would show, and effects that this design cannot distinguish.
+    With --iso, from repeats: pose accuracy and repeatability, distance accuracy, drift;
+    reversal, repeatability and accuracy of each reading approached from both sides.
     """
     from validation.campaign.campaign_file import read_campaign
     from validation.inspection.inspection import inspect_campaign

@@ -13,16 +13,20 @@ from forcefit.inputs.errors import BadInput
 from forcefit.inputs.writing import write_json
 
 library = Commands(no_args_is_help=True)
-Folder = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Its folder.")]
+Folder = Annotated[
+    Path, typer.Argument(metavar="LIBRARY", help="Folder of the library.")
+]
 
 
 @library.command()
 def build(
     spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Build file (TOML).")],
-    workers: Annotated[int, typer.Option(help="Processes.", min=1, max=1024)] = 1,
+    workers: Annotated[
+        int, typer.Option(help="Number of processes.", min=1, max=1024)
+    ] = 1,
     json: JsonOption = None,
 ) -> None:
-    """Compute the entries of a build file that are not there yet."""
+    """Compute the missing entries of a build file."""
     from stiffness.report.library_build import build_library, read_spec
 
     wanted = read_spec(spec)
@@ -39,12 +43,12 @@ def read(
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help="K_E between entries, interpolated, with its error: such as "
-            "radius=0.02,length=0.4."
+            help="Interpolate K_E between entries, with its error, at parameters in "
+            "SI units such as radius=0.02,length=0.4."
         ),
     ] = None,
     family: Annotated[
-        str, typer.Option(help="With --at: of parts by their surface.")
+        str, typer.Option(help="With --at: family of parts given by their surfaces.")
     ] = "",
     to: Annotated[
         str | None,
@@ -74,7 +78,7 @@ def read(
 
 
 def _list(folder: Path, json: str | None) -> None:
-    """Print the entries of a library and how good they are."""
+    """Print the entries of a library and their estimated errors."""
     from stiffness.report.library import read_library
 
     entries = read_library(folder)
@@ -82,7 +86,7 @@ def _list(folder: Path, json: str | None) -> None:
     if json != "-":
         for entry in entries:
             error = entry.about["relative_error_estimate"]
-            print(f"{entry.key}  error {error:.2g}")
+            print(f"{entry.key}  relative error {error:.2g}")
 
 
 def _look_up(folder: Path, at: list[str], family: str, json: str | None) -> None:

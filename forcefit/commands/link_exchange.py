@@ -9,7 +9,12 @@ from forcefit.commands.options import JsonOption
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.inputs.writing import Kind, check_writable, write_bytes, write_json
 
-Length = Annotated[str, typer.Option(help="Of lengths: m, cm, mm, um, inch; N, rad.")]
+Length = Annotated[
+    str,
+    typer.Option(
+        help="Unit of lengths: m, cm, mm, um, inch; forces in N, angles in rad."
+    ),
+]
 
 
 def import_(
@@ -18,28 +23,31 @@ def import_(
         typer.Argument(metavar="FILE", help=".mtx, .pch, .dmig, .npy, .npz: K_E or K."),
     ],
     base: Annotated[
-        str, typer.Option(help='Held: a node, or "z=0" [m] with --nodes.')
+        str, typer.Option(help='Held interface: a node, or "z=0" [m] with --nodes.')
     ] = "1",
-    tip: Annotated[str, typer.Option(help="Where the screw is read, likewise.")] = "2",
+    tip: Annotated[
+        str, typer.Option(help="Interface at which the screw is read, likewise.")
+    ] = "2",
     nodes: Annotated[
-        Path | None, typer.Option(help="Places of nodes: number, x, y, z; or a deck.")
+        Path | None,
+        typer.Option(help="Positions of nodes: number, x, y, z; or a deck."),
     ] = None,
     mass: Annotated[
-        Path | None, typer.Option(help="Mass matrix of the same freedoms.")
+        Path | None, typer.Option(help="Mass matrix of the same degrees of freedom.")
     ] = None,
     unit: Length = "m",
     order: Annotated[
         str,
         typer.Option(
-            help="Of a node's freedoms where the file names none: "
+            help="Order of a node's degrees of freedom where the file names none: "
             "translations-first, rotations-first."
         ),
     ] = "translations-first",
     json: JsonOption = None,
 ) -> None:
-    """K_E from another program's matrix.
+    """Import K_E from another program's matrix.
 
-    Condensed on two interfaces.
+    The matrix is condensed on two interfaces.
     """
     from stiffness.exchange.import_link import import_link
     from stiffness.report.results import link_results, link_text
@@ -54,13 +62,16 @@ def import_(
 
 def export(
     file: Annotated[
-        Path, typer.Argument(metavar="LINK.json", help="Written with --json.")
+        Path,
+        typer.Argument(
+            metavar="LINK.json", help="Results of a link, written with --json."
+        ),
     ],
     to: Annotated[
         str,
         typer.Option(
-            help="matrix-market, abaqus, calculix, nastran, numpy, exudyn, adams, "
-            "mapdl."
+            help="Format: matrix-market, abaqus, calculix, nastran, numpy, exudyn, "
+            "adams, mapdl."
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write.")],
@@ -68,7 +79,7 @@ def export(
 ) -> None:
     """Write a link's K_E as another program's matrix.
 
-    A matrix of two nodes.
+    The matrix is that of two nodes, base and tip.
     """
     from stiffness.exchange.export_link import link_file, read_link_results
 

@@ -1,13 +1,13 @@
 """Old names of commands and options: each works for one release, with a line on stderr.
 
-The commands themselves know the new names only; ``--help`` shows no others.  Those that
-the public formats name stay for good, and nothing is said of them.
+The commands have the new names only; ``--help`` shows no others.  Old names in the
+public formats stay valid, without a message.
 """
 
 import sys
 from collections.abc import Sequence
 
-# new words by the words of a command that is part of another one now
+# new words by the old words of a merged command
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -105,7 +105,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
 
 
 def _with_new_command(words: list[str]) -> list[str]:
-    """Replace a command that is part of another one now."""
+    """Replace the words of a merged command."""
     for old, new in COMMANDS.items():
         count = len(old.split())
         if words[:count] == old.split():
@@ -115,19 +115,19 @@ def _with_new_command(words: list[str]) -> list[str]:
 
 
 def _parts(word: str) -> tuple[str, str, str]:
-    """Option, "=" and value of a word; of ``-ofile`` too."""
+    """Return the option, "=" and value of a word; of ``-ofile`` too."""
     if word.startswith("--") or not word.startswith("-"):
         return word.partition("=")
     return word[:2], "=" * bool(word[2:]), word[2:]
 
 
 def _staying(words: Sequence[str]) -> list[str]:
-    """Old options of the command that the public formats name."""
+    """Return the old options of the command that the public formats name."""
     return [old for command, old in STAY if list(words[:2]) == command.split()]
 
 
 def _renamed_options(words: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Old options of the command that the first words name."""
+    """Return the old options of the command that the first words name."""
     renamed: dict[str, tuple[str, ...]] = {}
     for command, options in OPTIONS.items():
         path = command.split()

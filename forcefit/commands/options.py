@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _built_in_names(incomplete: str) -> list[str]:
-    """Names that a shell completes, beside files."""
+    """Return the built-in robots whose names complete a word."""
     from assembly.robots import BUILT_IN
 
     return [name for name in BUILT_IN if name.startswith(incomplete)]
@@ -38,19 +38,23 @@ RobotArgument = Annotated[
 
 PoseOption = Annotated[
     list[str] | None,
-    typer.Option("--pose", help="Nominal platform pose, such as tx=0.1,tz=-0.5."),
+    typer.Option(
+        "--pose", help="Nominal platform pose [m, rad], such as tx=0.1,tz=-0.5."
+    ),
 ]
 
 
 JointOption = Annotated[
     list[str] | None,
-    typer.Option("--joint", help="Actuated coordinates, such as leg1.drive=0.1."),
+    typer.Option(
+        "--joint", help="Coordinates of the drives [rad or m], such as leg1.drive=0.1."
+    ),
 ]
 
 
 LoadOption = Annotated[
     list[str] | None,
-    typer.Option("--load", help="Load on the platform, such as fx=10,mz=1."),
+    typer.Option("--load", help="Load on the platform [N, N m], such as fx=10,mz=1."),
 ]
 
 
@@ -65,7 +69,9 @@ AtOption = Annotated[
 
 AlongOption = Annotated[
     list[str] | None,
-    typer.Option("--along", help="Direction of the platform, such as tx=1,tz=-1."),
+    typer.Option(
+        "--along", help="Direction of a translation or rotation, such as tx=1,tz=-1."
+    ),
 ]
 
 
@@ -79,7 +85,7 @@ UnderOption = Annotated[
     list[str] | None,
     typer.Option(
         "--under",
-        help="What the robot's effects depend on: temperature=5,time=0,approach=1; "
+        help="Covariates of the robot's effects: temperature=5,time=0,approach=1; "
         "session=NAME.",
     ),
 ]
@@ -89,8 +95,8 @@ RestOption = Annotated[
     str | None,
     typer.Option(
         "--rest",
-        help="A frame in a loop that does not close at home: what is left open becomes "
-        "its geometric error.",
+        help="Frame of a loop that does not close at home; the gap becomes its "
+        "geometric error.",
     ),
 ]
 
@@ -99,15 +105,15 @@ MismatchOption = Annotated[
     str | None,
     typer.Option(
         "--mismatch",
-        help="spring: redundant elastic drives take up what their coordinates "
-        "(--joint, or those at home) leave open.",
+        help="spring: redundant elastic drives close the gap that their coordinates "
+        "(--joint, or those at home) leave.",
     ),
 ]
 
 
 FigureOption = Annotated[
     Path | None,
-    typer.Option("--figure", help="Also a picture of it: PNG, SVG or PDF."),
+    typer.Option("--figure", help="Also write a figure: PNG, SVG or PDF."),
 ]
 
 
@@ -122,7 +128,7 @@ JsonOption = Annotated[
 
 
 def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] | None:
-    """Wrench ``[mx my mz fx fy fz]`` given by component; None if not given.
+    """Return the wrench ``[mx my mz fx fy fz]`` given by component; None if not given.
 
     Args:
         texts: such as ``["fx=10,mz=1"]``; components not named are zero.
@@ -147,7 +153,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 def _components(
     texts: list[str], option: str, names: Sequence[str], largest: float
 ) -> dict[str, float]:
-    """Numbers given by component, all of known names."""
+    """Return the numbers given by component, all of known names."""
     given = parse_assignments(texts, option, largest)
     for name in given:
         if name not in names:
@@ -157,12 +163,12 @@ def _components(
 
 
 def parse_gravity(texts: list[str] | None) -> list[float] | None:
-    """Gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
+    """Return the gravity (3,) [m/s^2] from ``--gravity``; see :func:`parse_vector`."""
     return parse_vector(texts, "--gravity")
 
 
 def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
-    """Three numbers given by component; None if not given.
+    """Return three numbers given by component; None if not given.
 
     Args:
         texts: such as ``["z=-9.81"]``.
@@ -188,7 +194,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
 def parse_state(
     text: str, valid: Sequence[str] = ("nominal", "contact", "exact")
 ) -> Any:
-    """State in which K_C is taken, from ``--state``.
+    """Return the state in which K_C is taken, from ``--state``.
 
     Args:
         text: what was given.
@@ -206,7 +212,7 @@ def parse_state(
 
 
 def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
-    """A point of the platform from ``--at``; its origin if not given.
+    """Return a point of the platform from ``--at``; its origin if not given.
 
     Args:
         texts: such as ``["0,0,-0.1"]`` or ``["z=-0.1"]``.
@@ -237,7 +243,7 @@ def parse_point(texts: list[str] | None) -> tuple[float, float, float]:
 
 
 def parse_direction(texts: list[str] | None) -> list[float] | None:
-    """Direction of a platform screw from ``--along``, as a unit vector.
+    """Return the direction of a platform screw from ``--along``, as a unit vector.
 
     Args:
         texts: such as ``["tx=1,tz=-1"]``.
@@ -269,7 +275,7 @@ def posture_of(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True,
 ) -> Any:  # fmt: skip
-    """The posture that ``--pose`` or ``--joint`` asks for; home if neither.
+    """Return the posture of ``--pose`` or ``--joint``; home without either.
 
     Args:
         robot: name or file.
@@ -277,12 +283,12 @@ def posture_of(
         joint: coordinates.
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
-        own_errors: whether the robot keeps its errors beside those of the two.
-        note: whether to say on stderr what is to be known of the posture.
+        own_errors: whether the robot keeps its declared errors in addition.
+        note: whether to print remarks on the posture to stderr.
         links: of :func:`assembly.exchange.robot_files.load_robot`.
 
     Returns:
-        The posture, of the robot as the effects of its file make it.
+        The posture, with the effects of the robot's file applied.
 
     Raises:
         BadInput: an effect loads the robot, and the command supports no loads.
@@ -306,9 +312,9 @@ def declared_posture(
     rest: str | None = None, mismatch: str | None = None, own_errors: bool = True,
     note: bool = True, links: bool = True,
 ) -> Any:  # fmt: skip
-    """The posture of the options, of the robot without the effects of its file.
+    """Return the posture of the options, of the robot without the effects of its file.
 
-    What is to be known of the posture is said on stderr where ``note`` says so.
+    Remarks on the posture are printed to stderr if ``note`` is true.
     """
     from assembly.exchange.robot_files import load_robot
     from assembly.kinematics.closing import closing_of
@@ -344,7 +350,7 @@ def declared_under(
     mismatch: str | None = None,
     note: bool = True,
 ) -> Any:
-    """The robot under the loads and covariates asked for, its file's effects applied.
+    """Return the robot under loads and covariates, its file's effects applied.
 
     Args:
         robot: name or file.
@@ -356,7 +362,7 @@ def declared_under(
         finite: whether the exact model is used.
         rest: of ``--rest``.
         mismatch: of ``--mismatch``.
-        note: whether to say on stderr what is to be known of the posture.
+        note: whether to print remarks on the posture to stderr.
 
     Returns:
         The posture, loads and conditions with the effects applied.
@@ -372,7 +378,7 @@ def declared_under(
 
 
 def note_massless(robot: Any, gravity: list[float] | None) -> None:
-    """Say on stderr that gravity acts on nothing, if it does not."""
+    """Print a note to stderr if there is gravity and no body has a mass."""
     from assembly.linear.load import massless
 
     for remark in massless(robot, gravity):
@@ -380,14 +386,14 @@ def note_massless(robot: Any, gravity: list[float] | None) -> None:
 
 
 def note_closing(robot: Any, rest: str | None, mismatch: str | None) -> None:
-    """Say on stderr what ``--rest`` or ``--mismatch`` made of a robot."""
+    """Print to stderr how ``--rest`` or ``--mismatch`` closed a robot."""
     asked = [option for option in (rest, mismatch) if option is not None]
     for remark in robot.remarks[len(robot.remarks) - len(asked) :]:
         print(f"forcefit: note: {robot.name}: {remark}", file=sys.stderr)
 
 
 def parse_covariates(texts: list[str] | None) -> dict[str, float | str]:
-    """Covariates from ``--under``.
+    """Return the covariates from ``--under``.
 
     Args:
         texts: such as ``["temperature=5,approach=1"]``.
@@ -412,7 +418,7 @@ def _names_session(assignment: str) -> bool:
 
 
 def parse_axis(option: str, text: str) -> "NDArray":
-    """A direction as ``x``, ``-y`` or ``1,0,2``.
+    """Return a direction as ``x``, ``-y`` or ``1,0,2``.
 
     Args:
         option: for the message.
@@ -445,7 +451,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
 
 
 def parse_sizes(option: str, text: str, unit: str) -> list[float]:
-    """Positive numbers between commas, smallest first, none twice.
+    """Return positive numbers, separated by commas, in ascending order.
 
     Args:
         option: for the message.
@@ -456,7 +462,7 @@ def parse_sizes(option: str, text: str, unit: str) -> list[float]:
         The numbers.
 
     Raises:
-        BadInput: one is not a finite number > 0, or stands there twice.
+        BadInput: one is not a finite number > 0, or is given twice.
     """
     try:
         sizes = sorted(float(part) for part in text.split(","))

@@ -30,10 +30,12 @@ def plan(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Campaign folder to be written.")
     ],
-    rows: Annotated[int, typer.Option(help="Measurements.", min=1, max=1_000_000)] = 60,
+    rows: Annotated[
+        int, typer.Option(help="Number of measurements.", min=1, max=1_000_000)
+    ] = 60,
     configurations: Annotated[
         int,
-        typer.Option(help="Different ones to choose from.", min=1, max=1_000_000),
+        typer.Option(help="Number of candidate configurations.", min=1, max=1_000_000),
     ] = 120,
     reach: Reach = 0.6,
     stroke: Stroke = 0.1,
@@ -43,13 +45,13 @@ def plan(
     rotation: RotationNoise = 1e-5,
     position: PositionNoise = 5e-6,
     at: AtOption = None,
-    seed: Annotated[int, typer.Option(help="Of the rows to choose from.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the candidate rows.", min=0)] = 0,
     json: JsonOption = None,
 ) -> None:
-    """Plan rows that tell effects apart.
+    """Plan rows that distinguish effects.
 
     Writes campaign.toml, measurements.csv without readings and robot.toml.  Times and
-    temperatures are those to aim at, to be replaced by those that were.
+    temperatures are targets, to be replaced by the measured ones.
     """
     from assembly.exchange.robot_files import load_robot
     from validation.inspection import planning

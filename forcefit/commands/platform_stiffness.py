@@ -46,26 +46,28 @@ def stiffness(
     state: Annotated[
         str,
         typer.Option(
-            help="nominal (clearances at zero; contact too if there are any) | contact "
-            "(errors, loads, clearances) | exact (internal forces and loads stiffen or "
-            "soften)."
+            help="nominal (clearances at zero; with clearances also contact) | "
+            "contact (errors, loads, clearances) | exact (internal forces and loads "
+            "stiffen or soften)."
         ),
     ] = "nominal",
     length: Annotated[
         float | None,
-        typer.Option(help="[m] by which angles are multiplied in eigen-stiffnesses."),
+        typer.Option(
+            help="[m] Characteristic length that multiplies angles in eigenstiffnesses."
+        ),
     ] = None,
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also dC by a number of the robot file, by its path; in "
-            "the state chosen."
+            help="Also the derivative of the compliance with a number of the robot "
+            "file, given by its path."
         ),
     ] = None,
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """How stiff the platform is, and which part gives way."""
+    """Compute the platform's stiffness, and each part's compliance."""
     from assembly.model.statuses import OK
     from assembly.report.platform_stiffness import (
         plot_shares,
@@ -116,7 +118,7 @@ def _slopes(
     asked: tuple[Any, ...],
     under: list[str] | None,
 ) -> "tuple[dict[str, NDArray], dict[str, str]]":
-    """Derivatives of the compliance of one state, posture kept; why some are none."""
+    """Return derivatives of the compliance in one state, or reasons for none."""
     from assembly.platform_stiffness.tangent_slopes import TangentState
     from assembly.sweeps.parameters import load_design
     from assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
@@ -136,13 +138,15 @@ def _slopes(
 
 
 def _print_slopes(results: dict[str, Any]) -> None:
-    """A line for each derivative, and for each that there is not."""
+    """Print a line for each derivative, and for each reason why there is none."""
     for key in ("slopes", "slopes_contact"):
         name = key.removeprefix("slopes").replace("_", " ")
         for path, slope in results.get(key, {}).items():
             text = f"dC/d({path}){name}"
             if (slope != slope).all():  # NaN
-                print(f"{text}: none; motions are free, or clearances just touch")
+                print(
+                    f"{text}: none; the platform moves freely, or clearances just touch"
+                )
             else:
                 print(f"{text}, diagonal: {slope.diagonal()}")
     for reason in results.get("cannot_change", {}).values():

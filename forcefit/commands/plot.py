@@ -30,43 +30,44 @@ CsvOption = Annotated[
 
 def plot(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Of a sweep, draws or tolerances.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Data set of a sweep, draws or tolerances."
+        ),
     ],
     picture: FigureOption = None,
     csv: CsvOption = None,
     at: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Of the figure: where to stand on other axes, such as draw=3."
-        ),
+        typer.Option(help="For the figure: values on the other axes, such as draw=3."),
     ] = None,
     kind: Annotated[
         str | None,
         typer.Option(
-            help="Of the figure: histogram | tornado | allocation; else what the file "
-            "is."
+            help="For the figure: histogram | tornado | allocation. Default: by the "
+            "file."
         ),
     ] = None,
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="Of the figure, such as stiffness.FX,translation or "
+            help="For the figure, such as stiffness.FX,translation or "
             "wrench.leg1.link_a.FZ. A variable alone: all components."
         ),
     ] = None,
     rows: Annotated[
         str | None,
         typer.Option(
-            help="Of the CSV table: axes of other rows than points, such as "
+            help="For the CSV table: axes of the rows instead of points, such as "
             "quantity,group."
         ),
     ] = None,
 ) -> None:
     """Plot a saved file, or write it as a CSV table.
 
-    A figure has maps, lines, histograms or tolerances.  A table has a row for each
+    A figure shows maps, lines, histograms or tolerances.  A table has a row for each
     point and a column for each component of every variable.  Its first column, id,
-    counts the rows from 0; heads have the units in brackets.
+    counts the rows from 0; column heads have the units in brackets.
     """
     from assembly.sweeps.point_table import write_point_table
 

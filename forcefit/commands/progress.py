@@ -14,10 +14,10 @@ _DELAY = 2.0  # [s] before the first line of progress
 
 
 def one_thread() -> AbstractContextManager:
-    """Linear algebra on one thread: a posture's matrices are too small for more.
+    """Limit linear algebra to one thread: a posture's matrices are small.
 
-    Idle threads wait actively and would slow down the working one.  Where
-    ``threadpoolctl`` is missing, that is what they do.
+    Idle threads wait actively and would slow down the working one.  Without
+    ``threadpoolctl`` there is no limit.
     """
     try:
         from threadpoolctl import threadpool_limits
@@ -48,7 +48,7 @@ class _Links(logging.Handler):
                 self.bar = None
 
     def _begin(self) -> None:
-        """A bar on stderr, if that is a terminal and shows no other one."""
+        """Start a bar on stderr, if it is a terminal without another bar."""
         from rich.console import Console
         from rich.errors import LiveError
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -67,7 +67,7 @@ class _Links(logging.Handler):
 
 
 def report_loading() -> None:
-    """From now on, show progress where finite elements run when a robot is loaded."""
+    """Show progress of the finite elements that loading a robot runs."""
     log = logging.getLogger("assembly.files.solved_links")
     log.setLevel(logging.DEBUG)
     log.handlers = [_Links()]
@@ -75,7 +75,7 @@ def report_loading() -> None:
 
 @contextmanager
 def progress_lines() -> Generator[Any, None, None]:
-    """Progress on stderr of what is usually done at once; yields ``update``.
+    """Print progress of a usually short computation to stderr; yield ``update``.
 
     ``update(what, done, most)`` prints a line where two seconds have passed since the
     last one: how many steps there will be is not known, so there is no bar.
@@ -93,10 +93,10 @@ def progress_lines() -> Generator[Any, None, None]:
 
 @contextmanager
 def progress_bars() -> Generator[Any, None, None]:
-    """Progress bars on stderr; yields ``update(what, done, total)``, a bar for each.
+    """Show progress bars on stderr; yield ``update(what, done, total)``.
 
     Where stderr is no terminal, bars appear only at the end; a line is printed for
-    what takes longer than two seconds.  With bad input no bar is left.
+    a task that takes longer than two seconds.  After bad input no bar remains.
     """
     from rich.console import Console
     from rich.progress import (

@@ -36,7 +36,7 @@ _File = Annotated[
 
 @app.callback()
 def report() -> None:
-    """Reports of runs."""
+    """Comparison of two runs."""
 
 
 @app.command()
@@ -46,7 +46,7 @@ def compare(
     page: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Two runs side by side: what changed, the largest change first."""
+    """Compare two runs: the values that differ, largest change first."""
     from forcefit.page.comparison import compare as compare_results
     from forcefit.page.comparison import comparison_page, comparison_text
 
@@ -63,7 +63,7 @@ def compare(
 
 
 def _results(path: Path) -> dict:
-    """What a report or a JSON file holds."""
+    """Return the results in a report or a JSON file."""
     from forcefit.page.page import results_in
 
     try:
@@ -74,7 +74,7 @@ def _results(path: Path) -> dict:
 
 
 def provenance(*sources: Path | str | None) -> "Provenance":
-    """The command that runs and the files it read.
+    """Return the command that runs and the files it read.
 
     Args:
         sources: files, folders for the files in them, names of built-in robots, None.

@@ -44,13 +44,13 @@ def solve(
     quantities: Annotated[
         str | None,
         typer.Option(
-            help="margin: only whether clearances alone let the robot assemble, and "
-            "the factor on them at which they just do."
+            help="margin: only the zone margins, the factors on all clearances at "
+            "which the robot just assembles without force."
         ),
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Close at least energy: pose error, energy, wrenches, margin."""
+    """Solve the forced assembly: energy, pose, wrenches."""
     exact = parse_state(state, ("contact", "exact")) == "exact"
     if quantities is not None:
         _check_margins(quantities, exact, load=load, gravity=gravity, under=under)
@@ -65,7 +65,7 @@ def solve(
 
 
 def _answer(results: dict[str, Any], text: str, status: str, json: str | None) -> None:
-    """Write and print results; exit status 1 where there is no good answer."""
+    """Write and print results; exit with status 1 where the status is not ok."""
     from assembly.model.statuses import OK
 
     write_json(results, json)
@@ -76,7 +76,7 @@ def _answer(results: dict[str, Any], text: str, status: str, json: str | None) -
 
 
 def _results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Solution of small motions, problem (22), and its text."""
+    """Return the solution of small motions, problem (22), and its text."""
     from assembly.model.statuses import OK
     from assembly.report.results import solution_of, solution_text
 
@@ -88,7 +88,7 @@ def _results(applied: Any) -> tuple[dict[str, Any], str]:
 
 
 def _exact_results(applied: Any) -> tuple[dict[str, Any], str]:
-    """Solution of finite motions, and its text."""
+    """Return the solution of finite motions, and its text."""
     from assembly.report.results import exact_of, exact_text
 
     with one_thread(), progress_lines() as update:
@@ -117,7 +117,7 @@ def _solve_margins(
     robot: str, pose: list[str] | None, joint: list[str] | None, rest: str | None,
     mismatch: str | None, json: str | None,
 ) -> None:  # fmt: skip
-    """Whether clearances alone let the robot assemble; links are not computed."""
+    """Write and print the zone margins; link stiffnesses are not computed."""
     from assembly.report.first_order import singular_status
     from assembly.report.results import zone_of, zone_text
 

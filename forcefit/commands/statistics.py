@@ -43,23 +43,23 @@ if TYPE_CHECKING:
 ClearanceOption = Annotated[
     str,
     typer.Option(
-        help="Clearance positions for pose errors: worst (any, the largest error "
-        "counts) | uniform | contact (of a wrench of random direction; loads of "
-        "service say more: --load) | least (that of the solution)."
+        help="Positions within the clearances for pose errors: worst (largest error) "
+        "| uniform | contact (pressed by a wrench of random direction; --load for "
+        "known loads) | least (of the least-energy solution)."
     ),
 ]
 ContactLengthOption = Annotated[
     float | None,
     typer.Option(
-        help="[m] --clearance contact: a random moment over it is as large as a random "
-        "force. Default: the longest body."
+        help="[m] With --clearance contact: ratio of random moments to random forces. "
+        "Default: the longest body."
     ),
 ]
 
 
 def statistics(
     robot: RobotArgument,
-    errors: Annotated[Path, typer.Option(help="How errors are distributed (TOML).")],
+    errors: Annotated[Path, typer.Option(help="Distributions of the errors (TOML).")],
     pose: PoseOption = None,
     joint: JointOption = None,
     load: LoadOption = None,
@@ -67,39 +67,56 @@ def statistics(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     draws: Annotated[
-        int, typer.Option(help="Draws of all errors.", min=2, max=10**9)
+        int, typer.Option(help="Number of draws of all errors.", min=2, max=10**9)
     ] = 10_000,
-    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the draws.", min=0, max=2**63 - 1)
+    ] = 1,
     clearance: ClearanceOption = "worst",
     contact_length: ContactLengthOption = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(help="Such as energy=5, translation=2e-4; may be repeated."),
+        typer.Option(
+            help="Limit in SI units, such as energy=5 or translation=2e-4; may be "
+            "repeated."
+        ),
     ] = None,
     yield_strength: Annotated[
-        float | None, typer.Option(help="[Pa] of the links: a limit on their stress.")
+        float | None,
+        typer.Option(
+            help="[Pa] Yield strength of the links, the limit of their stress."
+        ),
     ] = None,
     importance: Annotated[
         int | None,
         typer.Option(
-            help="Base draws for the importance of errors.", min=16, max=1_000_000
+            help="Number of base draws for the Sobol indices of the errors.",
+            min=16,
+            max=1_000_000,
         ),
     ] = None,
     by: Annotated[
-        str, typer.Option(help="Importance by: source | frame | kind.")
+        str,
+        typer.Option(
+            help="Groups of errors in the Sobol indices: source | frame | kind."
+        ),
     ] = "kind",
     margins: Annotated[
-        bool, typer.Option("--margins/--no-margins", help="Zone margins too.")
+        bool, typer.Option("--margins/--no-margins", help="Also compute zone margins.")
     ] = True,
     state: Annotated[
         str | None,
         typer.Option(
-            help="Spread of the platform's stiffness in a state: contact (clearances "
-            "pressed or free) | exact (internal forces too)."
+            help="Also the distribution of the platform's stiffness in a state: "
+            "contact (clearances pressed or free) | exact (internal forces too)."
         ),
     ] = None,
-    confidence: Annotated[float, typer.Option(help="Of all intervals.")] = 0.95,
-    workers: Annotated[int, typer.Option(help="Threads.", min=1, max=1024)] = 1,
+    confidence: Annotated[
+        float, typer.Option(help="Confidence of all intervals.")
+    ] = 0.95,
+    workers: Annotated[
+        int, typer.Option(help="Number of threads.", min=1, max=1024)
+    ] = 1,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file of all draws.")
     ] = None,
@@ -108,10 +125,10 @@ def statistics(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Draw errors many times: yields, pose errors, what matters.
+    """Draw random errors: yield, pose errors, importance.
 
-    With OUTPUT, finished draws are kept in OUTPUT.journal: the same command goes on
-    from there after a kill and ends in the same file.
+    With OUTPUT, finished draws are kept in OUTPUT.journal: after an interruption the
+    same command continues from there and ends in the same file.
     """
     from assembly.model.error_distributions import read_sources
     from assembly.report.first_order import posture_status
@@ -147,11 +164,11 @@ def statistics(
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)
     note_massless(posture.robot, g)
-    if said := posture_status(posture, wrench, g):
+    if failure := posture_status(posture, wrench, g):
         whose = {"robot": posture.robot.name, "pose": posture.pose()}
-        write_json(whose | said, json)
+        write_json(whose | failure, json)
         if json != "-":
-            print(status_line(said))
+            print(status_line(failure))
         raise typer.Exit(1)
     experiment = Experiment(
         posture, sources, seed, clearance, margins,
@@ -191,7 +208,7 @@ def statistics(
 
 
 def _check_word(option: str, word: str, valid: Sequence[str]) -> None:
-    """Refuse what is none of a few words."""
+    """Refuse a word other than the valid ones."""
     if word not in valid:
         raise BadInput(f'{option}: found "{word[:60]}"{nearest(word, valid)}')
 
@@ -214,11 +231,11 @@ def _check_clearance_model(clearance: str, contact_length: float | None) -> None
 
 @contextmanager
 def _interruptible(output: Path | None) -> Generator[None, None, None]:
-    """Ctrl-C ends with exit status 130 and says what is kept."""
+    """After Ctrl-C, report the journal and exit with status 130."""
     try:
         yield
     except KeyboardInterrupt:
-        kept = f"; what is finished is kept in {output}.journal" if output else ""
+        kept = f"; finished results are kept in {output}.journal" if output else ""
         print(f"forcefit: interrupted{kept}", file=sys.stderr)
         raise typer.Exit(130) from None
 
@@ -229,13 +246,14 @@ def tolerances(
         str, typer.Option(help="Workspace, such as tx=-0.2:0.2:0.1,tz=-0.5.")
     ],
     plan: Annotated[
-        Path | None, typer.Option(help="What tightness costs and must hold (TOML).")
+        Path | None,
+        typer.Option(help="Costs of tolerances and limits of results (TOML)."),
     ] = None,
     quantities: Annotated[
         str,
         typer.Option(
-            help="Of present errors: margin_free (compliant joints free about their "
-            "own axis) | margin (rigid)."
+            help="Margin of the present errors: margin_free (compliant joints free "
+            "about their own axis) | margin (rigid)."
         ),
     ] = "margin_free",
     clearance: ClearanceOption = "worst",
@@ -244,7 +262,9 @@ def tolerances(
     mismatch: MismatchOption = None,
     fresh: Annotated[
         int,
-        typer.Option(help="Fresh draws that verify the tolerances.", min=0, max=10**9),
+        typer.Option(
+            help="Number of new draws that verify the tolerances.", min=0, max=10**9
+        ),
     ] = 2000,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="NetCDF file.")
@@ -254,12 +274,12 @@ def tolerances(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """How tight errors must be; with a plan, how loose they may be.
+    """Assess present errors; with a plan, allocate tolerances.
 
-    Without --plan the robot's own errors are judged: the factor on all of them at which
-    it goes together everywhere, and which errors it owes its margin to.  With OUTPUT,
-    what is computed is kept in OUTPUT.journal: the same command goes on from there
-    after a kill and ends in the same file.
+    Without --plan: the factor on the robot's errors at which it assembles at every
+    posture, and the errors that govern its margin.  With OUTPUT, finished results are
+    kept in OUTPUT.journal: after an interruption the same command continues from there
+    and ends in the same file.
     """
     from dataclasses import replace
 
@@ -354,7 +374,7 @@ def _save_allocation(
     allocation: "Allocation", output: Path | None, figure: Path | None,
     csv: Path | None,
 ) -> None:  # fmt: skip
-    """The tolerances as a data set, a picture and a table, where asked for."""
+    """Save the tolerances as a data set, a figure and a table, where requested."""
     from assembly.statistics.allocated_tolerances import tolerance_dataset
     from assembly.statistics.plot import allocation_figure
     from assembly.sweeps.dataset import save_dataset

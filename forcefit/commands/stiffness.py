@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from stiffness.link import LinkStiffness
 
 app = Commands(no_args_is_help=True)
-app.add_typer(library, name="library", help="Link stiffnesses kept on disk.")
+app.add_typer(library, name="library", help="Libraries of link stiffnesses.")
 app.command("import")(import_)
 app.command()(export)
 
@@ -63,7 +63,7 @@ def beam(
         typer.Argument(metavar="FILE", help="Pieces of a curved beam (TOML)."),
     ] = None,
     length: Annotated[
-        float | None, typer.Option(help="Of a straight beam, base to tip [m].")
+        float | None, typer.Option(help="Length of a straight beam, base to tip [m].")
     ] = None,
     radius: Radius = None,
     inner_radius: InnerRadius = None,
@@ -71,13 +71,16 @@ def beam(
     height: Height = None,
     section: SectionText = None,
     along: Annotated[
-        str | None, typer.Option(help="Base to tip: x (the default), y, z or 1,0,2.")
+        str | None,
+        typer.Option(
+            help="Direction from base to tip: x (the default), y, z or 1,0,2."
+        ),
     ] = None,
     up: Up = None,
     theory: Theory = "timoshenko",
     json: JsonOption = None,
 ) -> None:
-    """K_E of a beam: straight in closed form, or along a curve.
+    """Compute K_E of a beam, straight or along a curve.
 
     A straight beam has a length and a constant section.  A FILE describes a tapered,
     bent or L-shaped one by its pieces.
@@ -102,7 +105,7 @@ def beam(
 def _straight_link(
     options: "BeamOptions", length: float | None, along: str, up: str | None
 ) -> "LinkStiffness":
-    """A straight beam of constant section."""
+    """Return a straight beam of constant section."""
     import numpy as np
 
     from forcefit.commands.options import parse_axis
@@ -131,7 +134,7 @@ def fea(
     time_limit: TimeLimit = 300.0,
     json: JsonOption = None,
 ) -> None:
-    """K_E by finite elements, refined to the required accuracy.
+    """Compute K_E by finite elements, refined to the required accuracy.
 
     --part list prints the solids of a STEP file: name, volume, bounding box.
     """
@@ -160,7 +163,7 @@ def fea(
 
 
 def _list_solids(file: Path, json: str | None) -> None:
-    """The solids of a STEP file: name, volume, bounding box."""
+    """Print the solids of a STEP file: name, volume, bounding box."""
     from dataclasses import asdict
 
     from stiffness.surface.surface_files import step_solids
@@ -185,7 +188,7 @@ def stress(
     base: Base,
     tip: Tip,
     wrench: Annotated[
-        list[str] | None, typer.Option(help="At the tip: fx=10,mz=1 [N, N m].")
+        list[str] | None, typer.Option(help="Wrench at the tip: fx=10,mz=1 [N, N m].")
     ] = None,
     young: YoungOfRest = None,
     poisson: PoissonOfRest = None,
@@ -193,11 +196,15 @@ def stress(
     part: Parts = None,
     gravity: Annotated[
         list[str] | None,
-        typer.Option(help="In the file's axes: z=-9.81 [m/s^2], for its own weight."),
+        typer.Option(
+            help="Gravity in the file's axes, for the own weight: z=-9.81 [m/s^2]."
+        ),
     ] = None,
     away: Annotated[
         float | None,
-        typer.Option(help="From the interfaces [m]; one interface radius if absent."),
+        typer.Option(
+            help="Distance from the interfaces [m]. Default: one interface radius."
+        ),
     ] = None,
     radius: Radius = None,
     inner_radius: InnerRadius = None,
@@ -211,9 +218,9 @@ def stress(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Peak von Mises stress, away from the clamped edges.
+    """Compute the peak von Mises stress away from clamped edges.
 
-    With a section, the beam formula stands beside it.
+    With a section, the beam formula is evaluated too.
     """
     import numpy as np
 

@@ -23,48 +23,72 @@ Young = Annotated[float, typer.Option(help="Young's modulus [Pa].")]
 Poisson = Annotated[float, typer.Option(help="Poisson's ratio.")]
 YoungOfRest = Annotated[
     float | None,
-    typer.Option("--young", help="Young's modulus [Pa]; of what no --part names."),
+    typer.Option("--young", help="Young's modulus [Pa], outside every --part."),
 ]
 PoissonOfRest = Annotated[
     float | None, typer.Option("--poisson", help="Poisson's ratio, likewise.")
 ]
 Radius = Annotated[float | None, typer.Option(help="Outer radius [m].")]
-InnerRadius = Annotated[float | None, typer.Option(help="Of a tube's hole [m].")]
-Width = Annotated[float | None, typer.Option(help="Across `up` [m].")]
-Height = Annotated[float | None, typer.Option(help="Along `up` [m].")]
+InnerRadius = Annotated[float | None, typer.Option(help="Inner radius of a tube [m].")]
+Width = Annotated[
+    float | None, typer.Option(help="Width of the section, across `up` [m].")
+]
+Height = Annotated[
+    float | None, typer.Option(help="Height of the section, along `up` [m].")
+]
 SectionText = Annotated[
     str | None,
     typer.Option(
         "--section",
-        help="Any section, in its place: width=0.06,height=0.04,wall=0.003 (a box); "
-        "...,web=0.004,flange=0.006 (an I); area=..,I_y=..,I_z=..,J=..,shear_y=..,"
-        "shear_z=.. [m].",
+        help="Any section, instead of these lengths, in SI units: "
+        "width=0.06,height=0.04,wall=0.003 (a box); ...,web=0.004,flange=0.006 (an "
+        "I); area=..,I_y=..,I_z=..,J=..,shear_y=..,shear_z=...",
     ),
 ]
-Up = Annotated[str | None, typer.Option(help="The section's z: x, y, z or 0,0,1.")]
+Up = Annotated[
+    str | None,
+    typer.Option(help="Direction of the section's z axis: x, y, z or 0,0,1."),
+]
 Theory = Annotated[str, typer.Option(help="timoshenko or euler.")]
 Base = Annotated[
-    str, typer.Option(help='Held: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].')
+    str,
+    typer.Option(
+        help='Held interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m].'
+    ),
 ]
-Tip = Annotated[str, typer.Option(help="Where the screw is read, like --base [m].")]
+Tip = Annotated[
+    str, typer.Option(help="Interface at which the screw is read, like --base [m].")
+]
 Unit = Annotated[
-    str, typer.Option(help="Of the file: m, cm, mm, um, inch; STEP has its own.")
+    str,
+    typer.Option(
+        help="Unit of length of the file: m, cm, mm, um, inch; a STEP file states its "
+        "own."
+    ),
 ]
-Accuracy = Annotated[float, typer.Option(help="Asked largest relative error of K.")]
-Kind = Annotated[str, typer.Option(help="rigid, distributing, distributing-both.")]
-Density = Annotated[float, typer.Option(help="[kg/m^3] for mass and inertia.")]
+Accuracy = Annotated[float, typer.Option(help="Required relative error of K.")]
+Kind = Annotated[
+    str,
+    typer.Option(
+        help="Coupling of the interfaces: rigid, distributing, distributing-both."
+    ),
+]
+Density = Annotated[float, typer.Option(help="Density [kg/m^3], for mass and inertia.")]
 Parts = Annotated[
     list[str] | None,
     typer.Option(
         "--part",
-        help='Of another material: "z=0.2..0.4/young=2e11,poisson=0.3,density=7800", '
-        'a box along the mesh\'s axes [m], or "solid=one+other/young=...", of a STEP '
-        "file (fea: list prints its solids). May be repeated; the last counts.",
+        help="Part of another material: "
+        '"z=0.2..0.4/young=2e11,poisson=0.3,density=7800", a box along the mesh\'s '
+        'axes [m], or "solid=one+other/young=...", of a STEP file (fea: list prints '
+        "its solids). May be repeated; the last counts.",
     ),
 ]
 Masses = Annotated[
     list[str] | None,
-    typer.Option("--mass", help='Added: "1.5/0,0,0.452" [kg, m]. May be repeated.'),
+    typer.Option(
+        "--mass", help='Point mass: "1.5/0,0,0.452" [kg, m]. May be repeated.'
+    ),
 ]
 OptionalSurface = Annotated[
     Path | None,
@@ -73,18 +97,22 @@ OptionalSurface = Annotated[
 OptionalBase = Annotated[
     str | None,
     typer.Option(
-        help='Held: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m]; a mesh needs one.'
+        help='Held interface: "z=0", "bore=0,0,0/0,1,0/0.01", "disc=..." [m]; '
+        "required for a mesh."
     ),
 ]
 OptionalTip = Annotated[
     str | None,
-    typer.Option(help="Where the screw is read, like --base [m]; a mesh needs one."),
+    typer.Option(
+        help="Interface at which the screw is read, like --base [m]; required for a "
+        "mesh."
+    ),
 ]
-TimeLimit = Annotated[float, typer.Option(help="Budget of time [s].")]
+TimeLimit = Annotated[float, typer.Option(help="Time limit [s].")]
 
 
 def tell_progress() -> None:
-    """Each mesh's unknowns, error and expected cost, on stderr, as they come."""
+    """Print the unknowns, error and expected time of each mesh to stderr."""
     log = logging.getLogger("stiffness.fem.fea")
     log.setLevel(logging.INFO)
     log.handlers = [logging.StreamHandler()]
@@ -103,7 +131,7 @@ def parse_interfaces(
 
 
 def parse_up(text: str | None) -> "NDArray | None":
-    """The section's z, if it was given."""
+    """Return the section's z, if it was given."""
     from forcefit.commands.options import parse_axis
 
     return None if text is None else parse_axis("--up", text)
@@ -112,7 +140,7 @@ def parse_up(text: str | None) -> "NDArray | None":
 def parse_materials(
     young: float | None, poisson: float | None, density: float, parts: list[str] | None
 ) -> "list[Material]":
-    """The link's materials: one that fills it, then those of its parts."""
+    """Return the link's materials: one that fills it, then those of its parts."""
     from forcefit.commands.beam_options import BeamOptions
     from forcefit.inputs.errors import checked
     from stiffness.fem.material import Material
@@ -134,7 +162,7 @@ def parse_materials(
 
 
 def parse_accuracy(value: float) -> float:
-    """An accuracy that can be asked for."""
+    """Return a valid accuracy."""
     from forcefit.inputs.errors import checked
 
     return checked("--accuracy", value, "1", least=1e-5, below=0.5)
@@ -143,7 +171,7 @@ def parse_accuracy(value: float) -> float:
 def curve_link(
     path: Path, options: "BeamOptions"
 ) -> "tuple[LinkStiffness, float, float]":
-    """A beam along a curve, its section's size and its length [m]."""
+    """Return a beam along a curve, its section's size and its length [m]."""
     from forcefit.commands.beam_options import beam_name
     from stiffness.beam.curve import curve_compliance, curve_length
     from stiffness.beam.curve_file import read_curve

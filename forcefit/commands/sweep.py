@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def _list_quantities(names: list[str] | None) -> list[str] | None:
-    """Print the data variables of sweeps where ``list`` is asked for."""
+    """Print the data variables of sweeps where ``list`` is given."""
     if names == ["list"]:
         from assembly.sweeps.selection import quantities_text
 
@@ -49,63 +49,76 @@ def _list_quantities(names: list[str] | None) -> list[str] | None:
 
 def sweep(
     robot: RobotArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", help="NetCDF file.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="NetCDF file to write.")
+    ],
     grid: Annotated[
         str | None,
         typer.Option(
-            help="Such as tx=-0.2:0.2:0.025,tz=-0.5, or q.<frame>=.. for joints."
+            help="Grid of postures, such as tx=-0.2:0.2:0.025,tz=-0.5, or "
+            "q.<frame>=.. for joints."
         ),
     ] = None,
     poses: Annotated[
         Path | None,
         typer.Option(
-            help="CSV table of postures: pose.tx .. or q.<frame>, perhaps id."
+            help="CSV table of postures: pose.tx .. or q.<frame>, optionally id."
         ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help="A number of the robot file, PATH=VALUE,.. or PATH=FIRST:LAST:STEP."
+            help="Numbers of the robot file to vary: PATH=VALUE,.. or "
+            "PATH=FIRST:LAST:STEP."
         ),
     ] = None,
     errors: Annotated[
-        Path | None, typer.Option(help="How errors are distributed (TOML).")
+        Path | None, typer.Option(help="Distributions of the errors (TOML).")
     ] = None,
     draws: Annotated[
         int | None,
-        typer.Option(help="Draws of errors at each point.", min=1, max=10**9),
+        typer.Option(help="Number of draws of errors at each point.", min=1, max=10**9),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the draws.", min=0, max=2**63 - 1)] = 1,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the draws.", min=0, max=2**63 - 1)
+    ] = 1,
     assumption: Annotated[
-        str, typer.Option(help="Of the pose error: frozen | free | budget | none.")
+        str,
+        typer.Option(
+            help="Assumption of the pose error: frozen | free | budget | none."
+        ),
     ] = "frozen",
     quantities: Annotated[
         list[str] | None,
         typer.Option(
-            help="Names of data variables to compute and store, such as energy,margin; "
-            "default stands for those stored without it, list prints all.",
+            help="Names of data variables to compute and store, such as "
+            "energy,margin; default: those stored without this option; list prints "
+            "all.",
             callback=_list_quantities,
             is_eager=True,
         ),
     ] = None,
     wrench_of: Annotated[
-        list[str] | None, typer.Option(help="A frame whose wrench is kept.")
+        list[str] | None, typer.Option(help="Frame whose wrench is stored.")
     ] = None,
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also K_C, and which part deforms: nominal (clearances at zero) | "
-            "contact | exact (both with errors, loads and clearances)."
+            help="Also K_C and the compliance of each part: nominal (clearances at "
+            "zero) | contact | exact (both with errors, loads and clearances)."
         ),
     ] = None,
     frequencies: Annotated[
-        int | None, typer.Option(help="Natural frequencies, so many.", min=1, max=1000)
+        int | None, typer.Option(help="Number of natural frequencies.", min=1, max=1000)
     ] = None,
     near: Annotated[
-        float, typer.Option(help="Distance below which a singularity is named.")
+        float, typer.Option(help="Distance [-] below which a singularity is reported.")
     ] = 0.02,
     yield_strength: Annotated[
-        float | None, typer.Option(help="[Pa] of the links: their stress and safety.")
+        float | None,
+        typer.Option(
+            help="[Pa] Yield strength of the links, for their stress and safety."
+        ),
     ] = None,
     load: LoadOption = None,
     gravity: GravityOption = None,
@@ -113,7 +126,8 @@ def sweep(
     rest: RestOption = None,
     mismatch: MismatchOption = None,
     workers: Annotated[
-        int | None, typer.Option(help="Processes on this machine.", min=1, max=1024)
+        int | None,
+        typer.Option(help="Number of processes on this machine.", min=1, max=1024),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask cluster, tcp://HOST:PORT.")
@@ -122,10 +136,10 @@ def sweep(
     csv: CsvOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Margins, energy, errors over postures, designs and draws.
+    """Compute margins, energy, errors over postures and designs.
 
-    Finished points are kept in OUTPUT.journal from the first on: stop or kill it when
-    you like, the same command goes on from there and ends in the same file.
+    Finished points are kept in OUTPUT.journal: after an interruption the same command
+    continues from there and ends in the same file.
     """
     from assembly.model.statuses import UNUSABLE
     from assembly.sweeps.dataset import check_dataset, open_dataset
@@ -148,7 +162,7 @@ def sweep(
     wrench, g = parse_load(load), parse_gravity(gravity)
     covariates = parse_covariates(under)
     with progress_bars() as update:
-        update("robot", 0, 1)  # where it is placed, code may be compiled
+        update("robot", 0, 1)  # placing it may compile code
         asked = ask_sweep(
             robot,
             SweepOptions(
@@ -167,8 +181,8 @@ def sweep(
     note_closing(asked.question.robot, rest, mismatch)
     if frequencies is not None and (any(wrench or ()) or any(g or ())):
         print(
-            "forcefit: note: load and gravity are left out of the frequencies; "
-            "assembly frequencies --state exact counts them",
+            "forcefit: note: the frequencies leave out load and gravity; "
+            "assembly frequencies --state exact includes them",
             file=sys.stderr,
         )
     done = [0]
@@ -185,7 +199,7 @@ def sweep(
     except KeyboardInterrupt:
         print(
             f"forcefit: interrupted; {done[0]} of {asked.size} points are kept in "
-            f"{journal_path(output)}: the same command goes on",
+            f"{journal_path(output)}: the same command continues",
             file=sys.stderr,
         )
         raise typer.Exit(130) from None
@@ -204,7 +218,7 @@ def sweep(
 
 
 def _solver(workers: int | None, scheduler: str | None) -> "Solver":
-    """What solves blocks of points: this process, others beside it, or a cluster."""
+    """Return the solver of blocks of points: this process, several, or a cluster."""
     if workers is None and scheduler is None:
         from assembly.sweeps.sweep import solve_here
 

@@ -56,22 +56,24 @@ app.command()(compensate)
 
 @app.callback()
 def validation() -> None:
-    """Is it true?"""
+    """Validation by simulation and measured data."""
 
 
 ErrorsOption = Annotated[
     Path | None,
     typer.Option(
-        help="How errors are distributed (TOML); one draw of them, not the robot's own."
+        help="Distributions of errors (TOML); one draw replaces the robot's own errors."
     ),
 ]
-SeedOption = Annotated[int, typer.Option(help="Of that draw.", min=0, max=2**63 - 1)]
+SeedOption = Annotated[
+    int, typer.Option(help="Seed of that draw.", min=0, max=2**63 - 1)
+]
 
 
 def _with_errors(
     posture: "Posture", errors: Path | None, seed: int, fixed: "NDArray | None"
 ) -> "Posture":
-    """The posture with one draw of errors, about fixed ones, or with its own."""
+    """Return the posture with one draw of errors, about fixed ones, or with its own."""
     if errors is None:
         return posture
     from assembly.model.error_distributions import read_sources
@@ -82,7 +84,7 @@ def _with_errors(
 
 
 def parse_scales(text: str) -> list[float]:
-    """Factors on the errors, from ``--scale``.
+    """Return the factors on the errors, from ``--scale``.
 
     Args:
         text: such as ``"1,0.5,0.25"``.
@@ -147,15 +149,15 @@ def crosscheck(
     json: JsonOption = None,
     figure: FigureOption = None,
     time_limit: Annotated[
-        float, typer.Option(min=0.0, help="[s] for each simulation.")
+        float, typer.Option(min=0.0, help="Time limit of each simulation [s].")
     ] = 600.0,
 ) -> None:
     """Compare with a multibody simulation, at several scales.
 
-    The scales are of errors and loads.  Joint clearances are left out on both sides
-    unless asked for; energies and springs are then compared instead of poses.  Exit
-    status 1 when a check fails, or when the robot has neither errors nor a load:
-    nothing is then compared.
+    Errors and loads are scaled.  Both models leave out joint clearances; with
+    --with-clearance they have them, and energies and springs are compared instead of
+    poses.  Exit status 1 when a check fails, or when the robot has neither errors nor a
+    load: nothing is then compared.
     """
     from assembly.effects.robot_effects import apply_robot_effects
     from assembly.exchange.robot_files import load_robot
@@ -222,7 +224,7 @@ def crosscheck(
 def _crosscheck_grid(
     machine: "Robot", grid: str, compare: "Callable[[Posture], Any]", json: str | None
 ) -> None:
-    """Every pose of a grid, with a progress bar."""
+    """Compare at every pose of a grid, with a progress bar."""
     from assembly.sweeps.targets import parse_grid
     from validation.crosscheck.poses import check_poses, poses_table, poses_text
 
@@ -250,7 +252,7 @@ def validity(
     solids: Annotated[
         bool,
         typer.Option(
-            "--solids", help="Also mesh links as solids; some seconds for each shape."
+            "--solids", help="Also mesh links as solids; takes seconds for each shape."
         ),
     ] = False,
     grid: Annotated[
@@ -258,18 +260,19 @@ def validity(
         typer.Option(help="At every pose of a grid: tx=-0.2:0.2:0.1,tz=-0.5."),
     ] = None,
     poses: Annotated[
-        Path | None, typer.Option(help="At every pose of a CSV: pose.tx .. or q.*.")
+        Path | None,
+        typer.Option(help="At every pose of a CSV table: pose.tx .. or q.*."),
     ] = None,
     json: JsonOption = None,
     figure: FigureOption = None,
 ) -> None:
-    """What the model's assumptions cost a robot.
+    """Estimate the errors due to the model's assumptions.
 
-    At a pose or over many, in position, rotation and energy: linear closures, beams
-    instead of solids, weight
-    at the links' ends, disc and cone instead of pins in two bushes; what exceeds 20 um
-    or 1 % is marked.  With --solids also in the platform's stiffness.  Exit status 1
-    when there is nothing to compare: a robot without errors and load.
+    In position, rotation and energy, at a pose or over many: linear closures, beams
+    instead of solids, weight at the links' ends, disc and cone instead of pins in two
+    bushes.  Errors above 20 um or 1 % are marked.  With --solids also errors of the
+    platform's stiffness.  Exit status 1 when there is nothing to compare: a robot
+    without errors and load.
     """
     from assembly.sweeps.targets import grid_targets, parse_grid, read_targets
     from validation.assumptions.over_poses import costs_at, costs_over_poses
