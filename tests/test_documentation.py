@@ -57,7 +57,8 @@ def commands_of(page):
             for words in command_lines(text):
                 if not " ".join(words).startswith(NOT_RUN):
                     assert words[0] == "forcefit", words
-                    yield words[1:]
+                    end = words.index(">") if ">" in words else None
+                    yield words[1:end]
 
 
 def parsed(words):

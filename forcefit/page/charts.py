@@ -1,4 +1,4 @@
-"""Charts and maps of a page: data in SI, drawn by plotly.js with values under a click.
+"""Charts and maps of a page: data in SI, drawn by plotly.js; a click shows values.
 
 A chart is a list of plotly traces; every axis has its SI unit and the one shown.  A map
 holds several quantities over one or two axes and all numbers of each point; a scene is
@@ -44,7 +44,7 @@ class Layer:
         key: its name in the results.
         title: in words.
         unit: SI.
-        values: (nx, ny), or (nx,) over one axis; not finite where there is none.
+        values: (nx, ny), or (nx,) over one axis; NaN where there is none.
     """
 
     key: str
@@ -54,7 +54,7 @@ class Layer:
 
 
 def label(name: str) -> str:
-    """A name as plotly.js is to write it: not as tags."""
+    """Return a name for plotly.js, without tags."""
     return html.escape(name, quote=False)
 
 
@@ -62,14 +62,14 @@ def chart(
     traces: Sequence[Mapping[str, Any]], x: Axis, y: Axis, caption: str,
     bars: str = "overlay",
 ) -> str:  # fmt: skip
-    """A chart of plotly traces, their data in SI.
+    """Return a chart of plotly traces, their data in SI.
 
     Args:
         traces: of plotly.js; ``x``, ``y`` and ``error_*.array`` in SI.
         x: the horizontal axis.
         y: the vertical axis.
         caption: below it.
-        bars: that share a place: ``"overlay"`` or ``"stack"``.
+        bars: bars at one position: ``"overlay"`` or ``"stack"``.
 
     Returns:
         HTML, drawn when the page is opened.
@@ -84,11 +84,11 @@ def chart(
 
 
 def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) -> str:
-    """Horizontal bars, the first on top, their numbers beside them.
+    """Return horizontal bars, the first on top, with their numbers.
 
     Args:
         values: [SI] by name.
-        x: what they are.
+        x: the horizontal axis.
         caption: below them.
         line: [SI] where a line is drawn across; NaN for none.
 
@@ -113,14 +113,14 @@ def bars(values: Mapping[str, float], x: Axis, caption: str, line: float = 1.0) 
 def matrix(
     values: ArrayLike, names: Sequence[str], title: str, caption: str, around: bool
 ) -> str:
-    """A square matrix as colours, its numbers written in them.
+    """Return a square matrix as coloured cells with numbers.
 
     Args:
         values: (n, n).
         names: of rows and columns.
-        title: of the colours.
+        title: title of the colour scale.
         caption: below it.
-        around: colours around zero; otherwise from 0 to 1.
+        around: whether the colour scale is centred at zero; otherwise 0 to 1.
 
     Returns:
         HTML.
@@ -145,7 +145,7 @@ def value_map(
     axes: Sequence[tuple[Axis, NDArray]], layers: Sequence[Layer], states: NDArray,
     caption: str,
 ) -> str:  # fmt: skip
-    """Quantities over a grid: one is chosen, all are opened by a click on a point.
+    """Return a map of quantities over a grid; a click on a point shows all of them.
 
     Args:
         axes: one or two, with their values in SI.
@@ -179,11 +179,11 @@ def value_map(
     note = piece("constants", same) if same else ""
     if not drawn:
         return note
-    return _figure(spec, "map", caption + " A click opens a point's numbers.") + note
+    return _figure(spec, "map", caption + " Click a point for its numbers.") + note
 
 
 def scene(spec: Mapping[str, Any], caption: str) -> str:
-    """A robot that the reader turns, exaggerates and closes.
+    """Return a robot that the reader can turn, exaggerate and close.
 
     Args:
         spec: plain values as ``page.js`` reads them, SI.
@@ -196,23 +196,23 @@ def scene(spec: Mapping[str, Any], caption: str) -> str:
 
 
 def grid(*charts: str) -> str:
-    """Charts side by side."""
+    """Return charts in a row."""
     return piece("grid", charts)
 
 
 def _constant(layer: Layer) -> float | None:
-    """The one value of a layer that does not vary; NaN if it has none."""
+    """Return the one value of a layer that does not vary; NaN if it has none."""
     values = np.asarray(layer.values, dtype=float)
     finite = values[np.isfinite(values)]
     if not len(finite):
         return float("nan")
-    # less than this is rounding, and would be drawn as a pattern
+    # smaller variation is rounding, which a map would show as a pattern
     same = np.ptp(finite) <= 1e-9 * np.abs(finite).max()
     return float(finite[0]) if same else None
 
 
 def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
-    """The unit shown for data of an SI unit, and its factor."""
+    """Return the unit shown for data of an SI unit, and its factor."""
     array = np.asarray(values, dtype=float) if unit else np.zeros(0)
     finite = array[np.isfinite(array)]
     shown = shown_in(unit, float(np.abs(finite).max()) if len(finite) else 0.0)
@@ -220,7 +220,7 @@ def _unit(unit: str, values: ArrayLike) -> dict[str, Any]:
 
 
 def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
-    """An axis as ``page.js`` reads it; its unit suits all that is drawn along it."""
+    """Return an axis for ``page.js``, with a unit for the data along it."""
     arrays = [np.ravel(np.asarray(d, dtype=float)) for d in data if axis.unit]
     values = np.concatenate(arrays) if arrays else np.zeros(0)
     return _unit(axis.unit, values) | {
@@ -229,5 +229,5 @@ def _axis(axis: Axis, data: Sequence[ArrayLike]) -> dict[str, Any]:
 
 
 def _figure(spec: Mapping[str, Any], kind: str, caption: str) -> str:
-    """A figure that ``page.js`` fills."""
+    """Return a figure that ``page.js`` fills."""
     return piece("figure", kind, plain(spec), caption)

@@ -1,4 +1,4 @@
-"""Two results side by side: every number that changed, the largest change first."""
+"""Comparison of two results: every number that changed, the largest change first."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,9 +10,9 @@ from forcefit.page.page import Page, Provenance, Tile, page, section
 from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import in_words, unit_of
 
-SAME = 1e-9  # relative: less is rounding
-_LISTED = 60  # changes on the page at once: some two sheets of paper
-# pure numbers that say how well, not what
+SAME = 1e-9  # relative difference due to rounding
+_LISTED = 60  # number of changes not folded, about two printed sheets
+# accuracy and cost of a result, not its values
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
 _HEADLINES = {"worst_clearance", "within_limits", "error", "allocation"}
@@ -59,10 +59,10 @@ class Comparison:
 
     Attributes:
         names: of both.
-        titles: what each is of, such as its robot.
+        titles: subject of each, such as its robot.
         changes: numbers first, the largest relative change on top, then texts.
-        same: how many values are the same.
-        only: places that one of the two has alone.
+        same: number of equal values.
+        only: places that only one of the two has.
     """
 
     names: tuple[str, str]
@@ -72,7 +72,7 @@ class Comparison:
     only: tuple[Change, ...]
 
     def table(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values."""
         return {
             "compared": list(self.names), "same": self.same,
             "changes": [_plain(one) for one in self.changes],
@@ -83,7 +83,7 @@ class Comparison:
 def compare(
     first: Mapping[str, Any], second: Mapping[str, Any], names: tuple[str, str]
 ) -> Comparison:
-    """Two results of the same command.
+    """Compare two results of the same command.
 
     Args:
         first: plain values, of a report or a JSON file.
@@ -91,8 +91,8 @@ def compare(
         names: of both.
 
     Returns:
-        All differences; the numbers of a certificate are left out, which say how well
-        the others are known.
+        All differences; the numbers of a certificate, which bound errors of the
+        others, are left out.
     """
     a, b = (dict(_leaves(one, ())) for one in (first, second))
     both = [place for place in a if place in b]
@@ -112,7 +112,7 @@ def compare(
 
 
 def _leaves(value: Any, place: tuple[str, ...]) -> Any:
-    """Every number and text, with the keys that lead to it."""
+    """Yield every number and text, with the keys that lead to it."""
     if isinstance(value, Mapping):
         for key, one in value.items():
             if key not in _MEASURES:
@@ -125,7 +125,7 @@ def _leaves(value: Any, place: tuple[str, ...]) -> Any:
 
 
 def _named(row: Any) -> str:
-    """What a row of a list is of, as its order may change; empty if it has no name."""
+    """Return the name of a row of a list, whose order may change; empty if none."""
     if not isinstance(row, Mapping):
         return ""
     names = (row.get(key) for key in _NAMES)
@@ -133,19 +133,19 @@ def _named(row: Any) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a number, not a truth."""
+    """Return whether a value is a number, not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _vector(place: tuple[str, ...]) -> tuple[str, ...]:
-    """The vector or matrix of which a number is a component, or its own place."""
+    """Return vector or matrix of which a number is a component, or its own place."""
     while len(place) > 1 and place[-1].isdigit():
         place = place[:-1]
     return place
 
 
 def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float]:
-    """The largest component of each vector: zeros among them hold its rounding."""
+    """Return the largest component of each vector, the scale of its rounding."""
     sizes: dict[tuple[str, ...], float] = {}
     for place, value in leaves.items():
         if _is_number(value) and math.isfinite(value):
@@ -155,34 +155,34 @@ def _sizes(leaves: Mapping[tuple[str, ...], Any]) -> dict[tuple[str, ...], float
 
 
 def _same(a: Any, b: Any, size: float) -> bool:
-    """Whether two values are one, up to rounding of their vector of a size."""
+    """Return whether two values are equal, up to rounding of their vector's size."""
     if _is_number(a) and _is_number(b):
         return math.isclose(a, b, rel_tol=SAME, abs_tol=max(1e-15, 1e-3 * SAME * size))
     return bool(a == b)
 
 
 def _is_headline(place: tuple[str, ...]) -> bool:
-    """Whether it is one of the figures on top of a page; no component of a vector."""
+    """Return whether a place is a headline figure; no component of a vector is."""
     if any(key.isdigit() for key in place):
         return False
     return place[0] in _HEADLINES or place[-2:] in _FIGURES
 
 
 def _size(change: Change) -> tuple[int, float, tuple[str, ...]]:
-    """Numbers first, those of headlines before all, the largest change on top."""
+    """Return a sort key: headline numbers, other numbers by change, texts."""
     relative = change.relative
     group = 2 if math.isnan(relative) else int(not _is_headline(change.place))
     return (group, 0.0 if group == 2 else -abs(relative), change.place)
 
 
 def _title(results: Mapping[str, Any]) -> str:
-    """What results are of."""
+    """Return the title, campaign or robot of results."""
     keys = [key for key in ("title", "campaign", "robot") if key in results]
     return str(results[keys[0]]) if keys else "results"
 
 
 def _plain(change: Change) -> dict[str, Any]:
-    """A change as plain values."""
+    """Return a change as plain values."""
     relative = change.relative
     return {
         "place": list(change.place), "before": change.before, "after": change.after,
@@ -191,7 +191,7 @@ def _plain(change: Change) -> dict[str, Any]:
 
 
 def comparison_text(comparison: Comparison, most: int = 20) -> str:
-    """A comparison for people.
+    """Return a comparison as text.
 
     Args:
         comparison: of two results.
@@ -211,21 +211,21 @@ def comparison_text(comparison: Comparison, most: int = 20) -> str:
 
 
 def _brief(value: Any) -> str:
-    """A value on a few characters."""
+    """Return a short text of a value."""
     return f"{value:.6g}" if _is_number(value) else str(value)[:60]
 
 
 def _sentence(comparison: Comparison) -> str:
-    """How much changed."""
+    """Return a sentence on the number of changes."""
     changed, same = len(comparison.changes), comparison.same
     text = f"{changed} of {changed + same} values differ"
     if comparison.only:
-        text += f"; {len(comparison.only)} are in one of the two alone"
+        text += f"; {len(comparison.only)} are only in one of the two"
     return text + "."
 
 
 def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
-    """A comparison as a page.
+    """Return a comparison as a page.
 
     Args:
         comparison: of two results.
@@ -247,8 +247,8 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
     a, b = comparison.names
     body = [section("Every change", *_listed(comparison.changes, (a, b), "changes"))]
     if comparison.only:
-        own = _listed(comparison.only, (a, b), "values in one alone")
-        body.append(section("In one of the two alone", *own))
+        own = _listed(comparison.only, (a, b), "values only in one")
+        body.append(section("Only in one of the two", *own))
     return page(
         Page(
             title=" and ".join(dict.fromkeys(comparison.titles)) + ": two runs",
@@ -258,8 +258,8 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
             about=f"{a} and {b}.",
             body=body,
             assumed=[
-                f"Numbers within {SAME:g} of themselves are the same.",
-                "Certificates, which say how well numbers are known, are left out.",
+                f"Numbers with a relative difference below {SAME:g} count as equal.",
+                "Certificates, which bound the errors of results, are left out.",
             ],
             provenance=provenance,
             results=comparison.table(),
@@ -270,8 +270,8 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
 def _listed(
     changes: Sequence[Change], names: tuple[str, str], what: str
 ) -> Iterator[str]:
-    """The first changes as a table; further ones are opened, and not printed."""
-    head = ["what", *names, "change"]
+    """Yield the first changes as a table, the others folded and not printed."""
+    head = ["quantity", *names, "change"]
     yield table(head, [_row(one) for one in changes[:_LISTED]], what)
     more = [_row(one) for one in changes[_LISTED:]]
     if more:
@@ -280,7 +280,7 @@ def _listed(
 
 
 def _row(change: Change) -> list[Cell]:
-    """A change as a row of a table."""
+    """Return a change as a row of a table."""
     cells = [
         Value(v, change.unit, 6) if _is_number(v) else "-" if v is None else str(v)
         for v in (change.before, change.after)
@@ -289,6 +289,6 @@ def _row(change: Change) -> list[Cell]:
 
 
 def _percent(change: Change) -> str:
-    """The change in per cent."""
+    """Return the change in per cent."""
     relative = change.relative
     return f"{100 * relative:+.3g} %" if math.isfinite(relative) else "-"

@@ -9,18 +9,18 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµumkM]?(?:m|rad|N|J|Pa|Hz))(?![\w
 
 
 def piece(macro: str, *values: Any) -> str:
-    """A piece of a page as HTML: a macro of ``page.jinja`` with its arguments."""
+    """Return a piece of a page as HTML: a macro of ``page.jinja`` with arguments."""
     return str(getattr(_template(), macro)(*values))
 
 
 def packaged(name: str) -> bytes:
-    """A file that comes with this chapter."""
+    """Return the content of a file of this package."""
     return files("forcefit.page").joinpath(*name.split("/")).read_bytes()
 
 
 @cache
 def _template() -> Any:
-    """The macros; jinja2 is imported when the first page is written."""
+    """Return the macros; import jinja2 when the first page is written."""
     from jinja2 import Environment, StrictUndefined
 
     pages = Environment(autoescape=True, trim_blocks=True, undefined=StrictUndefined)

@@ -189,7 +189,7 @@
     if (steps) {
       closing = slider("closing", steps, 1, steps)[0];
       closing.className = "closing";
-      const play = element("button", "play the closing", { type: "button" });
+      const play = element("button", "animate the closing", { type: "button" });
       play.addEventListener("click", async () => {
         for (let k = 0; k <= steps; k++) {
           closing.value = k;
@@ -338,7 +338,7 @@
   }
   function switchUnits(button) {
     si = !si;
-    button.textContent = si ? "units of a drawing" : "SI units";
+    button.textContent = si ? "display units" : "SI units";
     for (const cell of all("[data-si]")) {
       [cell.textContent, cell.dataset.si] = [cell.dataset.si, cell.textContent];
     }

@@ -1,8 +1,8 @@
-"""A whole page: what is concluded, what it rests on, and the pieces between.
+"""A page: conclusions, sections, assumptions and provenance.
 
 ======================  =============================================================
 :func:`page`            the page around its pieces
-:class:`Tile`           one conclusion at the top, for a reader in a hurry
+:class:`Tile`           one conclusion at the top
 :class:`Provenance`     command, versions and digests of the files that were read
 ======================  =============================================================
 
@@ -27,7 +27,7 @@ from forcefit.page.markup import packaged, piece
 from forcefit.page.tables import Value, table
 
 _PACKAGES = ("numpy", "scipy", "clarabel", "cvxpy", "exudyn")
-_DIGITS = 300  # of the longest integer that a float holds, nearly
+_DIGITS = 300  # digits of the largest integer that a float surely holds
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Tile:
     """One conclusion at the top of a page.
 
     Attributes:
-        title: what it answers.
+        title: its subject.
         answer: a few words or numbers.
         note: a sentence, of texts and numbers.
     """
@@ -50,8 +50,8 @@ class Provenance:
     """Where the numbers of a page come from.
 
     Attributes:
-        command: that computed them, empty if it was not a command.
-        files: that it read.
+        command: the command that computed them, empty without one.
+        files: files that it read.
         settings: in words, such as the seed.
     """
 
@@ -67,11 +67,11 @@ class Page:
     Attributes:
         title: of the page.
         verdict: the conclusion in a few sentences.
-        good: whether it is what one hopes for; None for neither.
-        tiles: the same for a reader in a hurry.
+        good: whether the result is favourable; None for neither.
+        tiles: the main figures at the top.
         about: what was computed, below the title.
         body: pieces of HTML in their order.
-        assumed: what the numbers rest on, a sentence each.
+        assumed: assumptions, a sentence each.
         provenance: where they come from.
         results: plain values, kept inside the page for ``forcefit report compare``.
     """
@@ -88,7 +88,7 @@ class Page:
 
 
 def command_line() -> str:
-    """The command that runs, as it was typed; empty where it is not ours."""
+    """Return the running forcefit command as typed; empty for another program."""
     import shlex
 
     name = Path(sys.argv[0]).name
@@ -97,7 +97,7 @@ def command_line() -> str:
 
 
 def page(content: Page) -> str:
-    """A page as one HTML text, which needs no other file.
+    """Return a page as one HTML text, which needs no other file.
 
     Args:
         content: of the page.
@@ -115,7 +115,7 @@ def page(content: Page) -> str:
 
 
 def results_in(text: str, where: str) -> dict[str, Any]:
-    """The results that a page holds, or those of a JSON file.
+    """Return the results that a page holds, or those of a JSON file.
 
     Args:
         text: of a page or of a JSON file of a command.
@@ -135,7 +135,7 @@ def results_in(text: str, where: str) -> dict[str, Any]:
         text = rest.partition("</script>")[0]
     try:
         results = json.loads(text, parse_int=_whole)
-    except (ValueError, RecursionError):  # of brackets by the thousand
+    except (ValueError, RecursionError):  # thousands of nested brackets
         expected = "a report of forcefit or the JSON file of a command"
         raise BadInput(f"{where}: found other text, expected {expected}") from None
     if not isinstance(results, dict):
@@ -144,32 +144,32 @@ def results_in(text: str, where: str) -> dict[str, Any]:
 
 
 def _whole(text: str) -> int | float:
-    """An integer of JSON; one beyond all floats is infinite."""
+    """Return an integer of JSON; beyond the range of floats it is infinite."""
     return int(text) if len(text) <= _DIGITS else float(text)
 
 
 def section(title: str, *pieces: str) -> str:
-    """A heading and what stands below it."""
+    """Return a heading and the pieces below it."""
     return piece("section", title, pieces)
 
 
 def paragraph(*texts: str | Value) -> str:
-    """A paragraph of texts and numbers."""
+    """Return a paragraph of texts and numbers."""
     return piece("paragraph", texts)
 
 
 def _provenance(provenance: Provenance) -> str:
-    """A table of command, versions and digests."""
+    """Return a table of command, versions and digests."""
     rows = [["command", provenance.command]] if provenance.command else []
     rows += [[name, value] for name, value in provenance.settings.items()]
     rows += [["forcefit", _version("forcefit")], ["Python", platform.python_version()]]
     rows += [[n, known] for n in _PACKAGES if (known := _version(n)) != "absent"]
     rows += [[f"SHA-256 of {one.name}", _digest(one)] for one in provenance.files]
-    return table(["what", "value"], rows)
+    return table(["item", "value"], rows)
 
 
 def _version(package: str) -> str:
-    """Of a package, if it is installed."""
+    """Return the version of a package, or ``absent``."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -177,7 +177,7 @@ def _version(package: str) -> str:
 
 
 def _digest(path: Path) -> str:
-    """SHA-256 of a file as it is now."""
+    """Return SHA-256 of a file as it is now."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -186,7 +186,7 @@ def _digest(path: Path) -> str:
 
 @cache
 def _plotly() -> str:
-    """plotly.js with the traces that pages draw, compressed and as text.
+    """Return plotly.js with the traces that pages draw, compressed and as text.
 
     ``plotly/build.mjs`` makes it.  A browser unpacks it in 0.1 s.
 

@@ -1,4 +1,4 @@
-"""Tables and numbers of a page: each number knows its SI value, for the switch."""
+"""Tables and numbers of a page; each number has its SI value, to switch units."""
 
 import math
 from collections.abc import Sequence
@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from forcefit.page.markup import piece
 from forcefit.results.units import Shown, number_text, shown_in
 
-_LONG = (
-    48  # characters of a text that may wrap in its cell; shorter ones and numbers not
-)
+_LONG = 48  # characters; longer texts may wrap in their cells
 Marked = tuple[dict[str, str], str]  # attributes and text of a cell
 
 
@@ -29,7 +27,7 @@ class Value:
 
     @property
     def text(self) -> str:
-        """The number in the unit of a drawing."""
+        """The number in its display unit."""
         shown = shown_in(self.unit, self.value)
         return number_text(self.value * shown.factor, shown.shown, self.digits)
 
@@ -64,7 +62,7 @@ Cell = str | float | Value
 def table(
     head: Sequence[str | Column], rows: Sequence[Sequence[Cell]], name: str = "table"
 ) -> str:
-    """A table that a click on its head sorts, and a button copies as CSV.
+    """Return a table, sorted by a click on its head and copied by a button as CSV.
 
     Args:
         head: of each column; numbers under a :class:`Column` share its unit.
@@ -84,7 +82,7 @@ def table(
 
 
 def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
-    """The unit of a column, by the size of its numbers."""
+    """Return the unit of a column, by the size of its numbers."""
     if isinstance(head, str):
         return Shown("", "", 1.0)
     sizes = [abs(c) for c in cells if isinstance(c, int | float) and math.isfinite(c)]
@@ -92,7 +90,7 @@ def _shown_column(head: str | Column, cells: Sequence[Cell]) -> Shown:
 
 
 def _head_cell(head: str | Column, shown: Shown) -> Marked:
-    """Title and unit of a column."""
+    """Return the title and unit of a column."""
     if isinstance(head, str):
         return {}, head
     if not shown.unit:
@@ -102,7 +100,7 @@ def _head_cell(head: str | Column, shown: Shown) -> Marked:
 
 
 def _cell(cell: Cell, head: str | Column, shown: Shown) -> Marked:
-    """A text, a number under a unit, or a number with its own."""
+    """Return the cell of a text, a number under a unit, or a number with its own."""
     if isinstance(cell, str):
         return {"class": "long"} if len(cell) > _LONG else {}, cell
     if isinstance(cell, Value):

@@ -1,4 +1,4 @@
-"""Quantities of all results: one table, from which text, JSON and attributes are made.
+"""Quantities of all results: one table for text, JSON and attributes.
 
 Begin with :mod:`forcefit.results.quantities`.
 """

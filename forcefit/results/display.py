@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Figures = dict[str, str]
 
-_LONGEST = 72  # most characters of a value
-_FEW = 6  # most numbers that are shown; of a longer array only the count
+_LONGEST = 72  # largest number of characters of a value
+_FEW = 6  # largest number of elements shown; of a longer array only its shape
 
 
 def short_repr(self: Any) -> str:
@@ -93,7 +93,7 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def rounded(value: float) -> float:
-    """Return a number rounded for people; below 1e-9, a rounding error, it is zero."""
+    """Return a number for display; below 1e-9, a rounding error, it is zero."""
     return 0.0 if abs(value) < 1e-9 else float(value)
 
 
@@ -104,7 +104,7 @@ def screw_text(screw: ArrayLike) -> str:
 
 
 def largest(screws: ArrayLike) -> str:
-    """Return lengths of largest rotation, translation of screws (..., 6) [rad, m]."""
+    """Return the largest rotation and translation of screws (..., 6) [rad, m]."""
     parts = np.asarray(screws, dtype=float).reshape(-1, 2, 3)
     turn, shift = 1e3 * np.linalg.norm(parts, axis=-1).max(axis=0, initial=0.0)
     return f"{turn:.4g} mrad, {shift:.4g} mm" if turn or shift else "none"

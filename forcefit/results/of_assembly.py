@@ -1,4 +1,4 @@
-"""What ``--json`` of ``forcefit assembly ...`` holds."""
+"""Records of the JSON of ``forcefit assembly ...`` and ``convert``."""
 
 from collections.abc import Mapping
 
@@ -65,7 +65,7 @@ _ERROR = record(
 )  # fmt: skip
 _SHARES = record(
     links=Each(_SHARE), joints=Each(_SHARE), clearances_=Each(_SHARE),
-    forces_=number("share of the forces present before"),
+    forces_=number("share of the internal forces and loads"),
 )  # fmt: skip
 _ALONG = record(
     free=number("stiffness, the others free", "N m/rad, N/m"),
@@ -120,7 +120,7 @@ _FREQUENCIES = record(
 _BY_NAME = Each(number("value", ""))
 _CLEARANCE_MODEL = text("clearance model")
 _REACHED = record(
-    "unit limit?", reached=number("reached by perfect parts", ""),
+    "unit limit?", reached=number("value with perfect parts", ""),
     clearances_=Each(number("contribution of the clearance", "")),
 )  # fmt: skip
 _OF_DRAWS = record(
@@ -154,7 +154,8 @@ _IMPORTANCE = record(
 _STATISTICS = record(
     "robot seed load gravity draws assembled confidence contact_length duality_gap",
     pose=POSE, clearance=_CLEARANCE_MODEL, clearance_means=text("its meaning"),
-    assembles=Each(INTERVAL), clearance_not_mixed_=count("draws not mixed"),
+    assembles=Each(INTERVAL),
+    clearance_not_mixed_=count("draws whose clearance walk did not mix"),
     exceeds=Each(record("limit unit", _LIMITED)), within_limits_=_LIMITED,
     perfect_parts=Each(_REACHED), perfect_parts_break=Each(_REACHED),
     quantities=Each(_OF_DRAWS),
@@ -169,28 +170,31 @@ _STATISTICS = record(
 )  # fmt: skip
 _CLASS = record(
     "name tolerance unit", share=_SHARE,
-    scaled_alike=number("if all were scaled alike", ""),
-    cost=number("cost"), loosest_allowed=number("loosest allowed", ""),
-    at_loosest=flag("at the loosest allowed"),
+    scaled_alike=number("with one factor on all tolerances", ""),
+    cost=number("cost"), loosest_allowed=number("largest allowed", ""),
+    at_loosest=flag("at the largest allowed"),
 )  # fmt: skip
 _VERIFICATION = record(
-    "draws verdict confidence", look=count("look"), most_looks=count("looks at most"),
+    "draws verdict confidence", look=count("interim test"),
+    most_looks=count("largest number of interim tests"),
     worst_posture_yield=number("yield at the worst posture"),
     posture_yields=number("yield at each posture", "1", "posture"),
     largest_share_of_a_limit=number("largest share of a limit"),
-    confidence_of_a_look=number("confidence of each look"), **{"yield": INTERVAL},
+    confidence_of_a_look=number("confidence of each interim test"),
+    **{"yield": INTERVAL},
 )  # fmt: skip
 _ALLOCATION = record(
     "yield price cuts draws seed contact_length", limits=_BY_NAME,
     cost=text("law of the cost"), tolerances=Listed(_CLASS),
-    price_alike=number("price if all were scaled alike"),
+    price_alike=number("price with one factor on all tolerances"),
     price_bound=number("lower bound of the price"),
     worst=Each(record(found=number("largest found", ""), proven=number("proven", ""))),
-    proven_scale=number("scale at which all is proven"), verification=_VERIFICATION,
+    proven_scale=number("scale at which all limits are proved"),
+    verification=_VERIFICATION,
     clearance=_CLEARANCE_MODEL, distribution=text("distribution within a tolerance"),
     deviations=number("standard deviations in a tolerance"),
     perfect_parts=Each(
-        record("unit limit", reached=number("reached by perfect parts", ""),
+        record("unit limit", reached=number("value with perfect parts", ""),
                at=text("posture"),
                looser_without=number("looser tolerances without clearances"),
                price_without=number("price without clearances"))
@@ -237,16 +241,16 @@ ASSEMBLY: Mapping[str, Content] = {
         "robot left_out", platform=text("platform"), frames=count("frames"),
         closures=count("closures"), files=text("files written", "file"),
         home=record(
-            open_before=number("loops open in the file's home", "rad or m"),
-            open_after=number("loops open in the home found", "rad or m"),
-            drives_held=flag("drives held"),
+            open_before=number("closure gap at the file's home pose", "rad or m"),
+            open_after=number("closure gap at the computed home pose", "rad or m"),
+            drives_held=flag("drives kept at home"),
         ),
         largest_difference=number("largest difference when read back"),
         compared=Listed(
             record(
                 where=text("place of the largest difference"),
                 reader=text("program"), file=text("file"),
-                why_not=text("why it was not compared"), bodies=count("bodies"),
+                why_not=text("reason for no comparison"), bodies=count("bodies"),
                 masses=count("masses"), loops=count("loops"),
                 difference=number("largest difference"),
             )

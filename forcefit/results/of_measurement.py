@@ -1,4 +1,4 @@
-"""What ``--json`` of commands about measured data holds."""
+"""Records of the JSON of commands on measured data."""
 
 from collections.abc import Mapping
 
@@ -49,7 +49,8 @@ _LEARNED = record(
 )  # fmt: skip
 _DIAGNOSIS = record(
     "campaign robot verdict remarks not_measured",
-    needed=text("what would decide"), sentence=text("the answer in a sentence"),
+    needed=text("measurement that would decide"),
+    sentence=text("conclusion in a sentence"),
     effects=Listed(_EFFECT), alternatives=Listed(record("names probability")),
     probabilities=Each("probability"),
     best_by_score=text("effects of the best score", "effect"),
@@ -83,7 +84,7 @@ _DIAGNOSIS = record(
     ),
     setup_blunders=Listed(
         record("before after", kind=text("kind"), columns=text("columns", "column"),
-               sentence=text("what to look at"))
+               sentence=text("check of the set-up"))
     ), outliers=text("outliers", "row"),
     open=text("rows whose pose is undetermined", "row"),
     structure=Listed(
@@ -136,10 +137,11 @@ _READINGS_OF = record(
     largest_=number("largest", "rad or m"), sigma_=number("sigma", "rad or m", "bound"),
 )  # fmt: skip
 _TESTED = record(
-    testable=flag("testable"), why_=text("why not"), shows_=flag("would show"),
-    shows_at_=number("times the plausible size at which it shows"),
+    testable=flag("testable"), why_=text("reason if not testable"),
+    shows_=flag("detectable"),
+    shows_at_=number("multiple of the plausible size at which it is detectable"),
     strength_=number("non-centrality"),
-    left_by_registration_=number("share that the registration leaves"),
+    left_by_registration_=number("share not removed by the registration"),
     unknowns_=count("unknowns"), rank_=count("rank"),
 )  # fmt: skip
 _PAIRS = text("effects", "pair", "effect")
@@ -197,7 +199,7 @@ _SESSION = record(
     session=text("session"), setup_rows=count("set-up rows"),
     other_rows=count("other rows"), suffices=flag("set-up rows suffice"),
     open=text("undetermined parameters", "name"),
-    uncertainty=number("uncertainty left by the set-up rows", "m"),
+    uncertainty=number("uncertainty after the set-up rows", "m"),
     left_in_setup=number("residual of the set-up rows", "m"),
     held_in_setup=number("error of the set-up rows, robot as saved", "m"),
     left_behind=text("effects of other sessions", "effect"), error=_ERRORS,

@@ -1,4 +1,4 @@
-"""What ``--json`` of ``forcefit stiffness ...`` holds."""
+"""Records of the JSON of ``forcefit stiffness ...``."""
 
 from collections.abc import Mapping
 
@@ -46,7 +46,7 @@ _SOLIDS = record(
 _COMPARISON = record(
     "difference length slenderness", beam=LINK, fea=LINK,
     end_effect=number("end effect, times r / L", "1", "component"),
-    axes_turned=number("turn of the axes that fits better", "rad"),
+    axes_turned=number("turn of the beam's axes that fits better", "rad"),
     explanation=text("explanation"),
 )  # fmt: skip
 _OVER_SLENDERNESS = record(

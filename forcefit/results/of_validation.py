@@ -1,4 +1,4 @@
-"""What ``--json`` of cross-checks, ``study`` and ``report compare`` holds."""
+"""Records of the JSON of cross-checks, ``study`` and ``report compare``."""
 
 from collections.abc import Mapping
 
@@ -19,13 +19,13 @@ _POSE_CHECK = record(
     links=text("model of the links"), scales=Listed(_SCALE),
     added_scales=Listed(_SCALE), clearances=text("clearances"),
     slopes_=Each(number("slope")), limits_=Each(number("limit")),
-    unexplained_=Each(number("share without an explanation")),
+    unexplained_=Each(number("unexplained share")),
     optimality_gaps_=number("optimality gap", "1", "scale"),
     relative_energy_differences_=Each(number("difference", "1", "scale")),
     checks=Each(_CHECK),
     smallest_changes_noticed=Listed(
         record("name value", kind=text("kind"), relative=number("relative change"),
-               check=text("check that notices it"), unproved=flag("unproved"))
+               check=text("check that detects it"), unproved=flag("unproved"))
     ),
 )  # fmt: skip
 _BY_METHOD = Each(number("value"))
@@ -51,7 +51,7 @@ CROSSCHECK = Either((
 _COST = record(
     "reason?", rotation_="rotation", position_="position",
     energy_=number("relative energy"), matters_=flag("above a limit"),
-    pieces_=count("pieces that leave less"),
+    pieces_=count("pieces of each beam with errors below the limits"),
 )  # fmt: skip
 _LIMITS = record("position", energy=number("relative energy"))
 _SPREAD = record(median=number("median", ""), largest=number("largest", ""), at=POSE)

@@ -1,4 +1,4 @@
-"""What ``--json`` of every command holds: records of the table's quantities."""
+"""Records of the JSON of every command, composed of the table's quantities."""
 
 from collections.abc import Mapping
 

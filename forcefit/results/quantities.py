@@ -1,4 +1,4 @@
-"""The table of quantities: words, unit, symbol, meaning and dimensions of every result.
+"""Table of quantities: words, unit, symbol, meaning and dimensions of every result.
 
 A quantity has one name in Python, JSON, NetCDF files and tables.  ``--json`` outputs
 are composed of these names in :mod:`forcefit.results.outputs`.
@@ -27,13 +27,13 @@ class Quantity:
 
     Attributes:
         words: its name in reports and text, without article.
-        unit: SI; ``"1"`` for a pure number, ``"rad, m"`` of a screw's two halves, empty
-            where the result states it.
+        unit: SI; ``"1"`` for a pure number, ``"rad, m"`` for the two halves of a screw,
+            empty where the result states its unit.
         dims: its dimensions; those of :data:`LABELS` have a fixed length.
-        meaning: what exactly it is, where the words do not say it.
-        symbol: in the paper, where it has one.
+        meaning: its definition, where the words are not enough.
+        symbol: its symbol in the paper, if any.
         kind: of its values.
-        shown: display unit of text, where it is not SI.
+        shown: display unit in text, if not SI.
         digits: significant digits of text.
     """
 
@@ -48,7 +48,7 @@ class Quantity:
 
     @property
     def display_unit(self) -> str:
-        """Unit in which text states it."""
+        """Unit of its values in text."""
         return self.shown or self.unit
 
     @property
@@ -58,29 +58,29 @@ class Quantity:
 
 
 def number(words: str, unit: str = "1", *dims: str) -> Quantity:
-    """A number, or numbers over some dimensions."""
+    """Return a quantity of numbers."""
     return Quantity(words, unit, dims)
 
 
 def text(words: str, *dims: str, meaning: str = "") -> Quantity:
-    """A text, or texts over some dimensions."""
+    """Return a quantity of texts."""
     return Quantity(words, dims=dims, meaning=meaning, kind="string")
 
 
 def count(words: str, *dims: str, meaning: str = "") -> Quantity:
-    """An integer, or integers over some dimensions."""
+    """Return a quantity of integers."""
     return Quantity(words, dims=dims, meaning=meaning, kind="integer")
 
 
 def flag(words: str, *dims: str) -> Quantity:
-    """A truth value, or truth values over some dimensions."""
+    """Return a quantity of truth values."""
     return Quantity(words, dims=dims, kind="boolean")
 
 
 QUANTITIES: Mapping[str, Quantity] = {
     # robot, posture, load
     "robot": text("robot"),
-    "status": text("status", meaning="ok, or why there is no valid answer"),
+    "status": text("status", meaning="ok, or the kind of failure"),
     "reason": text("reason", meaning="explanation where the status is not ok"),
     "remarks": text("note", "remark"),
     "pose": Quantity("pose", "m, rad", meaning="nominal, of the platform, base axes"),
@@ -96,9 +96,9 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "nominal_mismatch": Quantity(
         "nominal closure error", meaning="largest closure error of the nominal robot, "
-        "rad or m, that rounded files leave",
+        "rad or m, due to rounded numbers of its file",
     ),
-    "state": text("state", meaning="in which the stiffness is taken"),
+    "state": text("state", meaning="nominal, contact or exact"),
     "load": Quantity(
         "load", "N m, N", _WRENCH, "on the platform at its origin, base axes", "w"
     ),
@@ -106,30 +106,37 @@ QUANTITIES: Mapping[str, Quantity] = {
     "freedoms": count("degrees of freedom", meaning="drives free"),
     "locked_freedoms": count("degrees of freedom with locked drives"),
     "overconstraint": count("redundant closure equations"),
-    "smallest_singular_value": Quantity("smallest singular value of the constraints"),
-    "point": Quantity("point", "m", ("axis",), "at which it is read, platform axes"),
+    "smallest_singular_value": Quantity(
+        "smallest singular value of the constraints", meaning="smallest nonzero one of "
+        "the constraint matrix, lengths over the robot's size",
+    ),
+    "point": Quantity(
+        "point", "m", ("axis",), "at which screws and wrenches are read; base axes for "
+        "a stiffness, platform axes for a pose error",
+    ),
     "direction": Quantity("direction", dims=_SCREW, meaning="unit screw, base axes"),
     "near_singularity": text(
-        "singularity near by", meaning="singularities near by, with the joints that "
-        "show them",
+        "nearby singularity", meaning="nearby singularities, with the joints that move",
     ),
     "singular_distance": Quantity(
         "distance from singularity", dims=("kind",),
         meaning="0 at a singularity of the kind, at most 1",
     ),
     "condition": Quantity(
-        "condition number", meaning="condition of the map from drives to platform"
+        "condition number", meaning="of the map from drives to platform"
     ),
     # forced assembly, problems (21), (22) and (27)
     "assemblable": flag("assembles by clearance alone, compliant joints rigid"),
     "assemblable_free": flag("assembles by clearance alone, compliant joints free"),
     "margin": Quantity(
         "zone margin, compliant joints rigid", meaning="factor on all clearances at "
-        "which it just assembles, compliant joints rigid", symbol="lambda",
+        "which it just assembles without force, compliant joints rigid",
+        symbol="lambda",
     ),
     "margin_free": Quantity(
         "zone margin, compliant joints free", meaning="factor on all clearances at "
-        "which it just assembles, compliant joints free about their own axis",
+        "which it just assembles without force, compliant joints free about their "
+        "own axis",
         symbol="lambda",
     ),
     "margin_bound": Quantity(
@@ -139,7 +146,8 @@ QUANTITIES: Mapping[str, Quantity] = {
         "bound of the margin, free", meaning="certified: the margin is at least this"
     ),
     "energy": Quantity(
-        "assembly energy", "J", meaning="least elastic energy that closes it, eq. (22)",
+        "assembly energy", "J", meaning="least elastic energy of the closed robot, "
+        "eq. (22)",
         symbol="E", digits=6,
     ),
     "potential": Quantity(
@@ -147,14 +155,14 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "energy_without_clearance": Quantity(
         "energy without clearances", "J",
-        meaning="least energy of closing if no joint had clearance",
+        meaning="least elastic energy of the closed robot if no joint had clearance",
     ),
     "platform_screw": Quantity(
         "platform error", "rad, m", _SCREW,
         "pose error at the platform's origin, base axes", "x", shown="mrad, mm"
     ),
     "reading": Quantity(
-        "reading", "rad, m", _SCREW, "what a measuring device reads at this pose",
+        "reading", "rad, m", _SCREW, "pose deviation that a measuring device reads",
         shown="mrad, mm"
     ),
     "clearance": Quantity(
@@ -198,28 +206,33 @@ QUANTITIES: Mapping[str, Quantity] = {
         "clearance excess", meaning="largest relative excess of a clearance"
     ),
     "duality_gap": Quantity(
-        "duality gap", "J", meaning="certified: energy is at most this too high"
+        "duality gap", "J", meaning="certified: the energy exceeds the minimum by at "
+        "most this",
     ),
     "relative_gap": Quantity("relative duality gap"),
-    "screw_rotation": Quantity("platform rotation known to", "rad", shown="mrad"),
-    "screw_translation": Quantity("platform translation known to", "m", shown="um"),
+    "screw_rotation": Quantity(
+        "certified error of the platform rotation", "rad", shown="mrad"
+    ),
+    "screw_translation": Quantity(
+        "certified error of the platform translation", "m", shown="um"
+    ),
     "screw_rotation_open": Quantity(
         "undetermined rotation", "rad",
-        meaning="rotation that clearances leave open at the same energy", shown="mrad"
+        meaning="free rotation within the clearances, at the same energy", shown="mrad"
     ),
     "screw_translation_open": Quantity(
         "undetermined translation", "m",
-        meaning="translation that clearances leave open at the same energy", shown="um"
+        meaning="free translation within the clearances, at the same energy", shown="um"
     ),
     "screw_rotation_error": Quantity(
-        "determined rotation known to", "rad",
-        meaning="certified, without the undetermined rotation", shown="mrad"
+        "certified error of the determined rotation", "rad",
+        meaning="without the undetermined rotation", shown="mrad"
     ),
     "screw_translation_error": Quantity(
-        "determined translation known to", "m",
-        meaning="certified, without the undetermined translation", shown="um"
+        "certified error of the determined translation", "m",
+        meaning="without the undetermined translation", shown="um"
     ),
-    "stationarity": Quantity("residual of equilibrium", meaning="relative"),
+    "stationarity": Quantity("equilibrium residual", meaning="relative"),
     "iterations": count("iterations"),
     "method": text("method", meaning="numerical method that found the result"),
     "free": count("free motions eliminated"),
@@ -256,11 +269,12 @@ QUANTITIES: Mapping[str, Quantity] = {
     "cuts": count("cutting planes"),
     "linearisation_rotation": Quantity(
         "linearisation error, rotation", "rad",
-        meaning="size of the platform's rotation, linear minus exact", shown="mrad"
+        meaning="magnitude of the platform's rotation, linear minus exact", shown="mrad"
     ),
     "linearisation_translation": Quantity(
         "linearisation error, translation", "m",
-        meaning="size of the platform's translation, linear minus exact", shown="um"
+        meaning="magnitude of the platform's translation, linear minus exact",
+        shown="um",
     ),
     "linearisation_energy": Quantity(
         "linearisation error, relative energy",
@@ -272,16 +286,18 @@ QUANTITIES: Mapping[str, Quantity] = {
         shown="MPa"
     ),
     "stress_error": Quantity(
-        "estimated relative error of the stress", meaning="by the mesh; a beam's "
-        "formulas have 0, links with an inner edge without a fillet infinity",
+        "estimated relative error of the stress", meaning="due to the mesh; 0 for beam "
+        "formulas, infinite for links with an inner edge without a fillet",
     ),
     "safety": Quantity("safety", meaning="yield strength over the largest stress"),
     "rotation": Quantity(
-        "platform rotation", "rad", meaning="size of the platform's rotation error",
+        "platform rotation", "rad", meaning="magnitude of the platform's rotation "
+        "error",
         shown="mrad",
     ),
     "translation": Quantity(
-        "platform translation", "m", meaning="size of the platform's translation error",
+        "platform translation", "m", meaning="magnitude of the platform's translation "
+        "error",
         shown="um"
     ),
     "rotation_lower": Quantity(
@@ -312,19 +328,19 @@ QUANTITIES: Mapping[str, Quantity] = {
         "along each axis, the others free",
     ),
     "free_motions": Quantity(
-        "free motions", "rad, m", ("motion", "screw"), "unit screws nothing resists"
+        "free motions", "rad, m", ("motion", "screw"), "unit screws without resistance"
     ),
     "rigid_wrenches": Quantity(
         "rigid wrenches", "N m, N", ("direction", "wrench_component"),
-        "unit wrenches that deform nothing",
+        "unit wrenches without deformation",
     ),
     "characteristic_length": Quantity("characteristic length", "m"),
     "eigen_stiffness": Quantity(
         "eigenstiffness", "N/m", ("eigen",),
-        "softest first, angles multiplied by the longest body",
+        "in ascending order; angles multiplied by the characteristic length",
     ),
     "stiffness_condition": Quantity(
-        "condition of the stiffness", meaning="stiffest over softest eigenstiffness"
+        "condition of the stiffness", meaning="largest over smallest eigenstiffness"
     ),
     "pitch": Quantity("pitch", "m/rad"),
     "screw": Quantity("screw", "rad, m", _SCREW),
@@ -383,7 +399,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "contact_length": Quantity("contact length", "m"),
     "free_motion": Quantity(
         "free motion", "rad, m", _SCREW,
-        "of the platform, that nothing resists: unit screws, else NaN",
+        "unit screw of the platform without resistance; NaN without one",
     ),
     "clearance_mixed": Quantity(
         "clearance mixed", meaning="1 where the random walk of the clearances mixed"
@@ -400,16 +416,17 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="share of the variance that involves a group",
     ),
     "failed_share": Quantity(
-        "share left out", meaning="base draws left out, for a draw compared has no "
-        "answer",
+        "share left out", meaning="share of base draws left out because a compared "
+        "draw has no answer",
     ),
     "part": Quantity(
-        "deviation of the platform", "rad, m", _SCREW,
-        "deviation of the platform's screw that involves a group, by component",
+        "deviation of the platform", "rad, m", ("component",),
+        "standard deviation of the platform's rotation and translation due to a group",
     ),
     "gain": Quantity(
-        "slope of the platform", "rad or m for each rad or m", _SCREW,
-        "exact slope of the platform's screw with the errors; NaN if rad and m",
+        "slope of the platform", "rad or m for each rad or m", ("component",),
+        "exact slope of the platform's rotation and translation with a group's errors; "
+        "NaN for a group of angles and lengths",
     ),
     "rank": count("possible ranks", "bound"),
     "postures": count("postures"),
@@ -443,12 +460,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def in_words(key: str) -> str:
-    """A key of the results in words; itself, spaced, where the table lacks it."""
+    """Return a key of the results in words; of a key not in the table, itself."""
     return QUANTITIES[key].words if key in QUANTITIES else key.replace("_", " ")
 
 
 def unit_of(key: str) -> str:
-    """SI unit of a key's numbers; empty for pure, mixed and unknown ones."""
+    """Return SI unit of a key's numbers; empty for pure, mixed and unknown ones."""
     unit = QUANTITIES[key].unit if key in QUANTITIES else ""
     mixed = unit == "1" or "," in unit or ".." in unit or " or " in unit
     return "" if mixed else unit

@@ -1,4 +1,4 @@
-"""Records: which quantities a result in JSON holds, and how they are nested."""
+"""Records: the quantities of a result in JSON, and their nesting."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ class Record:
     """An object whose keys are known.
 
     Attributes:
-        content: of each key.
+        content: content of each key.
         optional: keys that may be absent.
-        closed: whether no other keys may be there.
+        closed: whether other keys are forbidden.
     """
 
     content: Mapping[str, Content]
@@ -53,12 +53,12 @@ class Words:
 
 
 def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
-    """A record from names of the table of quantities, other records, and contents.
+    """Return a record from names of quantities, other records, and contents.
 
     Args:
-        names: between blanks; a ``?`` after a name, or an underscore after a key, marks
-            it as optional.
-        merged: records whose keys it also has.
+        names: separated by blanks; a ``?`` after a name, or an underscore after a key,
+            marks it as optional.
+        merged: records whose keys are added.
         content: of other keys.
 
     Returns:

@@ -1,7 +1,7 @@
 """JSON Schema (draft 2020-12) of outputs and input files, from their records.
 
-In outputs null may be in the place of everything but truth values: of a number that is
-not finite, and of a result that a failed computation lacks.
+Every value of an output but a truth value may be null: for a number that is not finite,
+or a result that a failed computation lacks.
 """
 
 from typing import Any
@@ -20,7 +20,7 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str, Any]:
-    """The schema of a record.
+    """Return the schema of a record.
 
     Args:
         content: usually a record.
@@ -37,7 +37,7 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
 
 
 def _without_null(schema: Any) -> Any:
-    """A schema that allows no null."""
+    """Return a schema that allows no null."""
     if isinstance(schema, list):
         return [_without_null(one) for one in schema]
     if not isinstance(schema, dict):
@@ -49,7 +49,7 @@ def _without_null(schema: Any) -> Any:
 
 
 def _schema(content: Content) -> dict[str, Any]:
-    """The schema of any content."""
+    """Return the schema of any content."""
     match content:
         case str():
             return _schema(QUANTITIES[content])
@@ -68,7 +68,7 @@ def _schema(content: Content) -> dict[str, Any]:
 
 
 def _object(content: Record) -> dict[str, Any]:
-    """The schema of an object whose keys are known."""
+    """Return the schema of an object whose keys are known."""
     one: dict[str, Any] = {
         "type": ["object", "null"],
         "properties": {key: _schema(inner) for key, inner in content.content.items()},
@@ -82,7 +82,7 @@ def _object(content: Record) -> dict[str, Any]:
 
 
 def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
-    """Values over some dimensions."""
+    """Return the schema of values over dimensions."""
     if not dims:
         return {"type": one.kind if one.kind == "boolean" else [one.kind, "null"]}
     length = len(LABELS.get(dims[0], ()))
@@ -92,7 +92,7 @@ def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _described(schema: dict[str, Any], one: Quantity) -> dict[str, Any]:
-    """A schema with the words, meaning and unit of a quantity."""
+    """Return a schema with the words, meaning and unit of a quantity."""
     words = f"{one.words}: {one.meaning}" if one.meaning else one.words
     unit = "" if one.unit in {"", "1"} or one.kind != "number" else f" [{one.unit}]"
     return schema | {"description": words + unit}

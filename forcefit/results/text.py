@@ -1,4 +1,4 @@
-"""Results as text: the table's quantities, one a line, and tables of numbers.
+"""Results as text: the table's quantities, one per line, and tables of numbers.
 
 The same lines are the short representation of an object and what a command prints.
 """
@@ -15,11 +15,11 @@ from forcefit.results.units import FACTORS
 
 
 def value_text(quantity: Quantity | str, value: Any) -> str:
-    """A value in the quantity's display unit.
+    """Return a value in the quantity's display unit.
 
     Args:
         quantity: or its name in the table.
-        value: a number, a vector, a text, a truth value, several of them, or None.
+        value: a number, vector, text or truth value, several of them, or None.
 
     Returns:
         Text with its unit; ``none`` where there is no such number.
@@ -52,17 +52,17 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
 
 
 def rounded_in(value: float, unit: str) -> float:
-    """A number in a display unit; below 1e-9 of it, rounding error, it is zero."""
+    """Return a number in a display unit; below 1e-9 of the unit it is zero."""
     return rounded(FACTORS.get(unit, 1.0) * value)
 
 
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A number in SI as text in a display unit, such as ``um``."""
+    """Return a number in SI as text in a display unit, such as ``um``."""
     return _with_unit(f"{rounded_in(value, unit):.{digits}g}", unit)
 
 
 def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
-    """Errors of readings, as far as they are known.
+    """Return the text of errors of readings; unknown ones are left out.
 
     Args:
         sizes: ``position`` [m], ``rotation`` [rad], ``normalised`` by sigma.
@@ -81,12 +81,12 @@ def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
 
 
 def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
-    """Words and values of some results.
+    """Return the words and values of results.
 
     Args:
         results: plain values of a command.
-        names: of quantities, between blanks; points lead into records.  One that is
-            absent, and the status ``ok``, have no line.
+        names: of quantities, separated by blanks; dots lead into records.  An absent
+            quantity and the status ``ok`` have no line.
 
     Returns:
         By the quantities' words.
@@ -103,7 +103,7 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
 
 
 def forced_lines(assembly: Any) -> dict[str, str]:
-    """Pose, load, energy and platform error of a forced assembly, as lines of text."""
+    """Return pose, load, energy and platform error of a forced assembly as text."""
     values = {
         "pose": assembly.posture.pose(),
         "energy": assembly.energy,
@@ -115,7 +115,7 @@ def forced_lines(assembly: Any) -> dict[str, str]:
 
 
 def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> str:
-    """A title and lines of words and values, aligned, then notes."""
+    """Return a title and lines of words and values, aligned, then notes."""
     width = max(map(len, lines), default=0)
     rows = [f"  {words:{width}}  {value}" for words, value in lines.items()]
     return "\n".join([title, *rows, *(f"note: {note}" for note in notes)])
@@ -124,10 +124,10 @@ def listing(title: str, lines: Mapping[str, str], notes: Sequence[str] = ()) -> 
 def table_lines(
     head: Sequence[str], rows: Mapping[str, Sequence[Any]], digits: int = 5
 ) -> list[str]:
-    """Rows of numbers under their heads, aligned.
+    """Return rows of numbers under column heads, aligned.
 
     Args:
-        head: of the names of the rows, then of each column, with its unit.
+        head: head of the row names, then of each column with its unit.
         rows: numbers, or texts, by name; one that is not finite is a dash.
         digits: significant ones.
 
@@ -147,10 +147,10 @@ def table_lines(
 
 
 def _cell(value: float, digits: int) -> str:
-    """A number of a table."""
+    """Return the text of a number in a table."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def _with_unit(text: str, unit: str) -> str:
-    """A text with its unit, if it has one."""
+    """Return a text with its unit, if it has one."""
     return text if unit in {"", "1"} else f"{text} {unit}"

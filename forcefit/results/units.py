@@ -1,4 +1,4 @@
-"""Display units: of a page by the size of its numbers, of text as the table says."""
+"""Display units: of a page by the size of its numbers, of text by the table."""
 
 import math
 from dataclasses import dataclass
@@ -38,14 +38,14 @@ class Shown:
 
 
 def shown_in(unit: str, size: float = 1.0) -> Shown:
-    """The unit in which sizes of an SI unit are read easily.
+    """Return the display unit for numbers of an SI unit.
 
     Args:
         unit: SI, such as ``"m"``; empty, ``"1"`` or ``"-"`` for a pure number.
         size: [unit] of the largest of the numbers.
 
     Returns:
-        The unit and its factor; SI itself for one without another usual unit.
+        The unit and its factor; SI where no other unit is usual.
     """
     if unit in {"", "1", "-"}:
         return Shown("", "", 1.0)
@@ -58,7 +58,7 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
 
 
 def number_text(value: float, unit: str = "", digits: int = 4) -> str:
-    """A number with its unit; in words where it is none."""
+    """Return the text of a number with its unit; none for NaN."""
     if math.isnan(value):
         return "none"
     if math.isinf(value):

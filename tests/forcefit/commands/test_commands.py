@@ -156,7 +156,7 @@ def test_exact_says_where_it_stands_beyond_a_critical_load(run, tmp_path):
     column.write_text(COLUMN)
     for load, status, said in (
         ("fx=-80", 0, ""),
-        ("fx=-90", 1, "the potential falls along a motion"),
+        ("fx=-90", 1, "the potential decreases along a motion"),
         ("fx=-90,fy=0.1", 0, "% of the motion: this may lie beyond a critical load"),
         ("fx=-20,fy=0.1", 0, ""),
     ):

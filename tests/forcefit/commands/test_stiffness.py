@@ -193,7 +193,7 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
     assert results["mesh"]["elements"] > 100
     assert results["mesh"]["volume"] == pytest.approx(np.pi * 0.04**2 * 0.452, rel=1e-4)
     assert results["mass"] == pytest.approx(2700 * np.pi * 0.04**2 * 0.452, rel=1e-4)
-    assert "the asked 0.005 was reached" in text
+    assert "the required 0.005 was reached" in text
 
 
 @pytest.mark.slow

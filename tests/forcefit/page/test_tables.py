@@ -17,7 +17,7 @@ def test_heads_take_the_focus_of_the_keyboard():
 
 
 def test_sentences_wrap_in_their_cells_and_numbers_and_names_do_not():
-    sentence = "anywhere, and compliant joints turn about their own axis"
+    sentence = "any position; compliant joints also turn about their axis"
     text = table(["", "", ""], [["leg1.loop2_platform", Value(1.0, "m"), sentence]])
     cells = re.findall(r"<td([^>]*)>([^<]*)", text)
     assert ["long" in attributes for attributes, _ in cells] == [
