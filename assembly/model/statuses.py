@@ -59,10 +59,10 @@ AMBIGUOUS = "ambiguous"
 OUTSIDE_LIBRARY = "outside_library"
 NOT_ENOUGH_ROWS = "not_enough_rows"
 DIAGNOSES = {
-    NONE_NEEDED: "the declared model is enough",
+    NONE_NEEDED: "the declared model suffices",
     EXPLAINED: "the declared model lacks the effects named",
     LEARNED: "the library lacks a function that was learned",
-    AMBIGUOUS: "the design cannot tell which effect it is",
+    AMBIGUOUS: "the design cannot distinguish effects",
     OUTSIDE_LIBRARY: "no effect of the library explains the residual",
-    NOT_ENOUGH_ROWS: "the rows are too few to tell a cause from chance",
+    NOT_ENOUGH_ROWS: "the rows are too few to distinguish a cause from chance",
 }

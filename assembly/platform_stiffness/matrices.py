@@ -266,7 +266,7 @@ class PlatformStiffness:
             (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`; in the
             state ``"exact"`` the effect of forces on rotating parts is missing in it.
             In the other states each is also the derivative of the compliance by the
-            logarithm of the part's own (Castigliano).
+            logarithm of the part's own compliance (Castigliano).
         """
         response = self.springs @ (self.signs[:, None] * self.root.T)
         shares: dict[Part, NDArray] = {}

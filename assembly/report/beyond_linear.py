@@ -4,16 +4,15 @@ import numpy as np
 
 from assembly.exact.exact import ExactAssembly
 
-# of the platform's motion, and of the energy or the potential: links that turn by 0.1
-# rad are off by less, and where clearances are taken up these are not
+# relative difference from the linear model, of the platform's motion and of the energy
+# or potential; links that turn by 0.1 rad differ by less
 _FAR = 0.3
 
 
 def far_from_linear(assembly: ExactAssembly) -> list[str]:
-    """A remark on a loaded robot that may stand beyond a critical load.
+    """Return a remark on a loaded robot that may be beyond a critical load.
 
-    It may be stable there, as a column is that has buckled, and nothing in its balance
-    shows that it has.
+    Its equilibrium may be stable, like that of a buckled column, and does not show it.
 
     Args:
         assembly: with finite motions.
@@ -33,6 +32,6 @@ def far_from_linear(assembly: ExactAssembly) -> list[str]:
     if not (off > _FAR * moved and energy > _FAR):
         return []
     return [
-        f"far from the linear model, by {100 * off / moved:.0f} % of the motion: this "
-        "may lie beyond a critical load (assembly deflection --state exact or --follow)"
+        f"the motion differs from the linear model by {100 * off / moved:.0f} %: the "
+        "load may be beyond critical (assembly deflection --state exact or --follow)"
     ]

@@ -1,4 +1,4 @@
-"""A load-deflection curve for machines and for people."""
+"""A load-deflection curve as plain values and as text."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,7 +24,7 @@ from stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ROWS = 25  # of the curve that people are shown
+_ROWS = 25  # largest number of rows in the text
 
 
 def deflection_of(
@@ -37,18 +37,18 @@ def deflection_of(
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
-    """Everything ``assembly deflection`` reports, as plain values.
+    """Return the results of ``assembly deflection`` as plain values.
 
     Args:
-        posture: where the robot stands.
+        posture: of the robot.
         component: of the load, 0 to 5.
         loads: [N m or N] its values in the order in which they act.
-        load: (6,) [N m, N] the rest of the load.
+        load: (6,) [N m, N] the constant part of the load.
         gravity: (3,) [m/s^2] base axes.
         state: ``"exact"`` with finite motions.
         follow: whether past limit points, by arc length, from the first to the last
             load; finite motions, clearances held at zero.
-        progress: called with what is done, how often, and how often at most.
+        progress: called with the kind of step, steps done, and steps at most.
 
     Returns:
         Curve and events; ``status`` is ``"ok"``, or says why there is none.
@@ -74,7 +74,7 @@ def deflection_of(
 
 
 def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
-    """A curve as plain values."""
+    """Return a curve as plain values."""
     return {
         "loads": curve.loads,
         "deflection": curve.deflection,
@@ -88,7 +88,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 
 def deflection_text(results: dict[str, Any]) -> str:
-    """A curve for people: a table and what happens on the way."""
+    """Return a curve as text: a table and its events."""
     head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head
@@ -117,7 +117,7 @@ def deflection_text(results: dict[str, Any]) -> str:
 
 
 def plot_deflection(results: dict[str, Any]) -> "Figure":
-    """Load over deflection, kinks marked.
+    """Plot load over deflection, with events marked.
 
     Args:
         results: of :func:`deflection_of`.

@@ -1,7 +1,7 @@
-"""The convex set of the pose errors that the platform can have.
+"""Convex set of the possible pose errors of the platform.
 
-It is approximated from inside, by the points that support it in many directions, and
-from outside, by the heights of its support function there.
+It is approximated from inside by support points in many directions, and from outside by
+the support function in these directions.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 @dataclass(frozen=True, eq=False)
 class ErrorBody:
-    """Rotation or translation errors the platform can have.
+    """Possible rotation or translation errors of the platform.
 
     Attributes:
         part: ``"rotation"`` or ``"translation"``.
@@ -38,17 +38,17 @@ class ErrorBody:
 
     @property
     def slack(self) -> float:
-        """[rad or m] most by which the outer polytope exceeds the inner."""
+        """[rad or m] largest distance of the outer polytope from the inner."""
         inner = (self.points @ self.directions.T).max(axis=0)
         return float(np.max(self.heights - inner))
 
     def contains(self, error: ArrayLike) -> bool:
-        """Whether an error (3,) is within all the heights: False proves it is not."""
+        """Return whether an error (3,) is within all heights; False is a proof."""
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
 
 
 def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:
-    """The set of errors, from its support functions.
+    """Return the set of errors, from its support functions.
 
     Args:
         reachable: of :func:`assembly.linear.reference.pose_error.reachable_screws`.
@@ -60,7 +60,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
     Raises:
         ValueError: the part is neither, or has no bound.
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
         raise ValueError(f"part is {part!r}, expected 'rotation' or 'translation'")
@@ -75,7 +75,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
 
 def _faces(points: NDArray) -> NDArray:
-    """Triangles of the convex hull; none where the points lie in a plane."""
+    """Return the triangles of the convex hull; none where the points lie in a plane."""
     try:
         return ConvexHull(points).simplices
     except QhullError:
@@ -83,7 +83,7 @@ def _faces(points: NDArray) -> NDArray:
 
 
 def even_directions(count: int) -> NDArray:
-    """Unit vectors spread evenly over the sphere, along a golden spiral.
+    """Return the unit vectors spread evenly over the sphere, along a golden spiral.
 
     Args:
         count: how many.

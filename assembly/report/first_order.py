@@ -1,4 +1,4 @@
-"""Whether first order decides at a posture, and what finite motions say there."""
+"""Validity of first order at a posture, and the solution of finite motions."""
 
 from typing import Any
 
@@ -15,17 +15,17 @@ from assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# of the energy: where finite motions change more of it, its first order says nothing
+# relative change of the energy by finite motions above which first order is invalid
 MOST_ENERGY = 0.5
-_LARGE = (
-    0.3  # [rad or lengths] motion that is not small; linear closures err by a tenth
-)
+# [rad or lengths] joint motion above which first order is invalid; at this size the
+# linear closures are wrong by a tenth
+_LARGE = 0.3
 
 
 def linearisation_of(
     assembly: Assembly, gravity: ArrayLike | None
 ) -> tuple[dict[str, Any], str]:
-    """Linear minus exact solution as plain values, and the exact one in words."""
+    """Return linear minus exact solution as plain values, and the exact one as text."""
     try:
         exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
@@ -36,12 +36,12 @@ def linearisation_of(
 def first_order_status(
     assembly: Assembly, linearisation: dict[str, Any], finite: str
 ) -> dict[str, str]:
-    """Status and reason of a solution that first order does not decide; else empty.
+    """Return status and reason where first order is invalid; else nothing.
 
     Args:
         assembly: of first order.
         linearisation: of :func:`linearisation_of`.
-        finite: its words.
+        finite: text of the exact solution.
 
     Returns:
         Keys of the public format.
@@ -63,7 +63,7 @@ def first_order_status(
 def posture_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Status and reason of a posture beyond the joints' limits, or singular.
+    """Return the status and reason of a posture beyond the joints' limits, or singular.
 
     Args:
         posture: of the robot.
@@ -81,7 +81,7 @@ def posture_status(
 def singular_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Status and reason where the posture is singular, with what finite motions say.
+    """Return status and reason at a singular posture, with the exact solution.
 
     Args:
         posture: of the robot.
@@ -101,7 +101,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """That first order is off by a share of the energy."""
+    """Return the reason where first order is wrong by a share of the energy."""
     return (
         f"first order decides nothing here: it is off by {100 * abs(change):.3g} % of "
         "the energy"
@@ -109,12 +109,12 @@ def off_by(change: float) -> str:
 
 
 def _singular(posture: Posture) -> bool:
-    """Whether a posture is singular."""
+    """Return whether a posture is singular."""
     return is_singular(posture.robot, posture.coordinates, posture.transforms)
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Energy and pose error with finite motions."""
+    """Return the text of energy and pose error with finite motions."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

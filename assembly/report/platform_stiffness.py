@@ -1,4 +1,4 @@
-"""The platform's stiffness for machines and for people, and who is to blame."""
+"""The platform's stiffness and the parts' shares of compliance, as values and text."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
+_SIDES = {"holding": "loading", "letting go": "unloading"}  # of a contact
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # parts in the table and in the chart; the rest are one row
+_SHOWN = 12  # parts in the table and the chart; the others share one row
 
 
 def stiffness_of(
@@ -43,10 +44,10 @@ def stiffness_of(
     length: float | None = None,
     direction: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Everything ``assembly stiffness`` reports, as plain values.
+    """Return the results of ``assembly stiffness`` as plain values.
 
     Args:
-        posture: where the robot stands.
+        posture: of the robot.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
         at: (3,) [m] of the platform, in its axes, where screws and wrenches are read.
@@ -87,7 +88,7 @@ def stiffness_of(
 def _tangents(
     posture: Posture, load: Any, gravity: Any, state: State
 ) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
-    """The platform's place, one tangent or both sides of a contact, and remarks."""
+    """Return the platform's pose, tangents of one or both sides, and remarks."""
     if state == "nominal":
         return posture.platform, [without_clearance(posture)], None
     if state == "contact":
@@ -105,7 +106,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Stiffness and shares along a turn or a shift."""
+    """Return the stiffness and shares along a rotation or translation."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -115,14 +116,14 @@ def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
 
 
 def virtual_clearances(posture: Posture) -> bool:
-    """Whether any joint of the robot has a clearance."""
+    """Return whether any joint of the robot has a clearance."""
     return any(frame.clearance is not None for frame in posture.robot.frames)
 
 
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """The tangent of (22): one, or two where a clearance just touches its bound."""
+    """Return tangent of (22): one, or two where a clearance just touches its bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["holding"]
@@ -136,7 +137,7 @@ def _in_contact(
 
 
 def _status(stiffness: PlatformStiffness) -> str:
-    """Whether the platform is held, and stable."""
+    """Return the status of a stiffness."""
     if not stiffness.stable:
         return UNSTABLE
     return FREE_MOTION if stiffness.free.shape[1] else "ok"
@@ -145,11 +146,11 @@ def _status(stiffness: PlatformStiffness) -> str:
 def stiffness_values(
     platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
-    """One stiffness as plain values; NaN and infinity stand for no number.
+    """Return one stiffness as plain values, NaN or infinite where undefined.
 
     Args:
         platform: of a posture.
-        point: (3,) [m] where to read it, base axes.
+        point: (3,) [m] at which it is read, base axes.
         length: [m] by which rotations are multiplied.
 
     Returns:
@@ -185,7 +186,7 @@ def stiffness_values(
 
 
 def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
-    """Shares along an axis by kind and frame."""
+    """Return the shares along an axis by kind and frame."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
     for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:
@@ -196,7 +197,7 @@ def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]
 
 
 def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
-    """Shares of every part in the six directions, largest first.
+    """Return the shares of every part in the six directions, largest first.
 
     Args:
         shares: of :func:`stiffness_values`.
@@ -210,16 +211,16 @@ def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
             for frame, share in shares[name].get(word, {}).items():
                 rows.setdefault(f"{frame} {kind}", [np.nan] * 6)[k] = share
         if "forces" in shares[name]:
-            rows.setdefault("forces already there", [np.nan] * 6)[k] = shares[name][
-                "forces"
-            ]
+            rows.setdefault("internal forces and loads", [np.nan] * 6)[k] = shares[
+                name
+            ]["forces"]
     return dict(
         sorted(rows.items(), key=lambda row: -np.nan_to_num(np.abs(row[1])).max())
     )
 
 
 def stiffness_text(results: dict[str, Any]) -> str:
-    """A stiffness for people: matrix, eigenstiffnesses, and the compliant parts."""
+    """Return a stiffness as text: matrix, eigenstiffnesses, compliant parts."""
     about = lines_of(results, "pose status reason")
     lines = [listing(results["robot"], about, results.get("remarks", ()))]
     if "compliance" not in results:
@@ -228,7 +229,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
     if "direction" in results:
         lines += _direction_lines(results["direction"])
     for side in results.get("contact", ()):
-        closed = f"{side['contacts']} closed clearances, {side['side']}:"
+        closed = f"{side['contacts']} closed clearances, {_SIDES[side['side']]}:"
         lines += ["", closed, *_state_lines(side)]
     if results.get("letting_go"):
         lines += ["", "unloading of clearances that touch their bound without a force:"]
@@ -237,7 +238,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """One state: K, what moves freely, eigenstiffnesses, centre."""
+    """Return lines of one state: K, free motions, eigenstiffnesses, centre."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
@@ -255,13 +256,13 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
     )
     if np.isfinite(values["centre"]).all():
         about |= lines_of(values, "centre")
-    units = "[N m/rad, N/rad, N m/m, N/m]; rigid where -"
+    units = "[N m/rad, N/rad, N m/m, N/m]; - where rigid"
     details = listing("", about).split("\n")[1:]
     return [f"stiffness K_C {units}", *table_lines(("", *SCREW), rows), *details]
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """The parts' shares in the compliance, in per cent."""
+    """Return the parts' shares in the compliance, in per cent."""
     rows = {
         name: [rounded(100 * value) for value in row]
         for name, row in largest_rows(share_rows(shares)).items()
@@ -271,7 +272,7 @@ def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _direction_lines(along: dict[str, Any]) -> list[str]:
-    """Stiffness along a direction, and the parts that deform most."""
+    """Return the stiffness along a direction, and the parts that deform most."""
     parts = sorted(
         (-share, f"{frame} {kind}")
         for kind, word in _KINDS.items()
@@ -286,7 +287,7 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
 
 
 def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
-    """The first rows of shares, and all others together.
+    """Return the first rows of shares, and the sum of all others.
 
     Args:
         rows: of :func:`share_rows`, the largest first.
@@ -303,7 +304,7 @@ def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
 
 
 def plot_shares(results: dict[str, Any]) -> "Figure":
-    """A bar chart of the parts' shares in the compliance along each direction.
+    """Return a bar chart of the parts' shares in the compliance along each direction.
 
     Args:
         results: of :func:`stiffness_of`.
@@ -322,6 +323,6 @@ def plot_shares(results: dict[str, Any]) -> "Figure":
         axes.bar(DIRECTIONS, height, bottom=bottom, label=plot_label(name))
         bottom = bottom + height
     axes.set_ylabel("share of the compliance [%]")
-    axes.set_title(plot_label(f"{results['robot']}: which part gives way"))
+    axes.set_title(plot_label(f"{results['robot']}: compliance of the parts"))
     axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

@@ -1,4 +1,4 @@
-"""Plots of the deformed robot, and of the body of its platform's possible errors.
+"""Plots of the deformed robot, and of the set of its possible platform errors.
 
 Functions take a result and return a plotter; none shows or saves.
 """
@@ -24,7 +24,7 @@ def plot_assembly(
     assumption: str = "budget",
     off_screen: bool = True,
 ) -> Any:
-    """Plot an assembled robot and, if asked, the body of its platform's errors.
+    """Plot an assembled robot and, if requested, the possible platform errors.
 
     Args:
         assembly: of the robot.
@@ -104,7 +104,7 @@ def robot_plotter(
 
 
 def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
-    """Short rods along the axes of all joints, at their nominal places."""
+    """Add short rods along the axes of all joints, at their nominal positions."""
     import pyvista
 
     for frame, T in zip(posture.robot.frames, posture.transforms, strict=True):
@@ -116,8 +116,8 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
 
 
 def _fill_window(plotter: Any) -> None:
-    """Point the camera at the middle of what is drawn, as near as all of it fits."""
-    camera, share = plotter.camera, 0.85  # of the window, for captions above and below
+    """Point the camera at the middle of the scene, which fills the window."""
+    camera, share = plotter.camera, 0.85  # of the window; captions are above and below
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
                         for bits in np.ndindex(2, 2, 2)])  # fmt: skip
@@ -139,7 +139,7 @@ def add_error_body(
         body: of the errors.
         origin: (3,) [m] of zero error, the platform's nominal origin.
         size: [m] of the largest error in the plot.
-        assumption: of problem (27), written below with the largest error.
+        assumption: of problem (27), stated in the caption with the largest error.
     """
     import pyvista
 
@@ -152,7 +152,7 @@ def add_error_body(
     plotter.add_mesh(solid, color="gold", opacity=0.6, point_size=6)
     unit, scale = ("mm", 1e3) if body.part == "translation" else ("mrad", 1e3)
     caption = (
-        f"gold: {body.part} errors possible ({assumption}), "
+        f"gold: possible {body.part} errors ({assumption}), "
         f"up to {largest * scale:.3g} {unit}"
     )
     plotter.add_text(caption, position="lower_left", font_size=9, name="body")
@@ -178,7 +178,7 @@ class DisplacedBodies:
 
 
 def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
-    """Displacements of all bodies, by the small screws along the tree.
+    """Return the displacements of all bodies, by the small screws along the tree.
 
     Args:
         assembly: of a robot of n frames.
@@ -203,7 +203,7 @@ def displaced_bodies(assembly: Assembly) -> DisplacedBodies:
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that keeps a plot readable.
+    """Return the largest of 1, 2, 5 times a power of ten that keeps a plot readable.
 
     Args:
         bodies: with their displacements.
@@ -222,7 +222,7 @@ def readable_factor(bodies: DisplacedBodies, size: float) -> float:
 
 
 def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
-    """(20, 3) points of a displaced body: a cubic, the deflection of a beam."""
+    """Return (20, 3) points of a displaced body: a cubic, the deflection of a beam."""
     a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
     b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):

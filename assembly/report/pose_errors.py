@@ -32,7 +32,7 @@ def pose_error_of(
     gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Results of ``assembly error`` as plain values.
+    """Return the results of ``assembly error`` as plain values.
 
     Args:
         posture: of the robot.
@@ -48,7 +48,7 @@ def pose_error_of(
         The keys of the public format; ``status`` as in :func:`solution_of`.
 
     Raises:
-        BadInput: assumption ``budget`` is asked under a load.
+        BadInput: assumption ``budget`` with a load.
     """
     loaded = bool(np.any(load) or np.any(gravity))
     if loaded and "budget" in (assumptions or ()):
@@ -97,7 +97,7 @@ def pose_error_of(
 
 
 def _bounds(bound: PoseError) -> dict[str, Any]:
-    """Both brackets of an assumption."""
+    """Return the bounds of an assumption."""
     return {
         "rotation": _bracket(bound.rotation_error, bound.rotation_screw),
         "translation": _bracket(bound.translation_error, bound.translation_screw),
@@ -110,7 +110,7 @@ def _support(
     assembly: Assembly, assumption: str, offset: NDArray, direction: ArrayLike,
     energy_budget: float = 0.05, **_: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """Largest error along a direction: certified, attained, and the screw there."""
+    """Return bounds of the largest error along a direction, and its screw."""
     reach = reachable_screws(assembly, assumption, energy_budget).at_point(offset)
     support = reach.support(direction)
     if support.height == np.inf:
@@ -120,12 +120,12 @@ def _support(
 
 
 def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
-    """Two bounds, and the platform screw that attains the lower."""
+    """Return two bounds, and the platform screw that attains the lower."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Bounds for people: a line for each assumption."""
+    """Return the bounds as text, a line for each assumption."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
@@ -138,11 +138,13 @@ def pose_error_text(results: dict[str, Any]) -> str:
         if "along" in bounds:
             turns = np.any(results["direction"][:3])
             part = "rotation" if turns else "translation"
-            lines[f"{assumption}, along it"] = _bounds_text(part, bounds["along"])
+            lines[f"{assumption}, along the direction"] = _bounds_text(
+                part, bounds["along"]
+            )
     return listing(results["robot"], lines, results.get("remarks", ()))
 
 
 def _bounds_text(part: str, bounds: dict[str, Any]) -> str:
-    """Two bounds of a rotation or translation."""
+    """Return two bounds of a rotation or translation."""
     low, high = bounds["lower"], bounds["upper"]
     return value_text(f"{part}_error", (low, high) if np.isfinite(high) else high)

@@ -36,11 +36,11 @@ from forcefit.results.text import lines_of, listing, value_text
 
 # numbers of a certificate, relative ones and the gap in J
 _PROOF = "closure_residual clearance_excess duality_gap stationarity iterations"
-_UNSTABLE = "the potential falls along a motion, as beyond a critical load"
+_UNSTABLE = "the potential decreases along a motion, as beyond a critical load"
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Margins of (21), compliant joints held and free, as plain values."""
+    """Return the margins of (21), compliant joints rigid and free, as plain values."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -55,12 +55,12 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Null where no factor assembles."""
+    """Return None where no factor assembles the robot."""
     return None if np.isinf(value) else value
 
 
 def zone_text(zone: dict[str, Any]) -> str:
-    """Margins for people; up to 1 it assembles by clearances alone."""
+    """Return the margins as text; up to 1 clearances alone suffice."""
     return listing("zone, eq. (21)", lines_of(zone, "margin margin_free status reason"))
 
 
@@ -69,7 +69,7 @@ def solution_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Results of ``assembly solve`` as plain values.
+    """Return the results of ``assembly solve`` as plain values.
 
     Args:
         posture: of the robot.
@@ -79,9 +79,9 @@ def solution_of(
     Returns:
         The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
         with the solution and the gap of its certificate as ``reason``; or
-        ``"singular"``, with the solution at first order, which decides nothing there,
-        and that of finite motions in ``reason``; or the kind of failure, and the
-        solution is then null.
+        ``"singular"``, with the solution at first order, which is invalid there, and
+        that of finite motions in ``reason``; or the kind of failure, and the solution
+        is then null.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -116,7 +116,7 @@ def solution_of(
             | _assembly_results(assembly, bound)
             | {"linearisation_error": linearisation, "worst_error": worst(assembly)}
             | proof_status("; ".join(unproved_parts))
-            # a robot without errors or loads stands there all the same
+            # without errors and loads the nominal posture is a solution
             | (first_order_status(assembly, linearisation, finite) if forced else {})
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -125,12 +125,12 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Status and reason of a solution with an incomplete proof; empty otherwise."""
+    """Return status and reason of a solution with an incomplete proof, else nothing."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
 def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
-    """Results of a solved assembly."""
+    """Return the results of a solved assembly."""
     certificate = {
         "closure_residual": assembly.closure_residual(),
         "reference_length": assembly.linearisation.size,
@@ -147,7 +147,7 @@ def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
 
 
 def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
-    """Energy, pose error, screws and wrenches of every frame and closure."""
+    """Return the energy, pose error, screws and wrenches of every frame and closure."""
     robot = assembly.posture.robot
     frames = {
         f.name: {
@@ -182,7 +182,7 @@ def exact_of(
     gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
-    """Results of ``assembly solve --state exact`` as plain values.
+    """Return the results of ``assembly solve --state exact`` as plain values.
 
     Args:
         posture: of the robot.
@@ -192,7 +192,7 @@ def exact_of(
 
     Returns:
         The keys of ``assembly solve`` for finite motions; ``status`` as there, or
-        ``"unstable"`` where the potential falls along a motion.
+        ``"unstable"`` where the potential decreases along a motion.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose()
@@ -225,7 +225,7 @@ def exact_of(
 
 
 def exact_text(results: dict[str, Any]) -> str:
-    """An exact solution for people."""
+    """Return an exact solution as text."""
     return listing(
         results["robot"],
         lines_of(results, "pose status reason energy platform_screw")
@@ -236,7 +236,7 @@ def exact_text(results: dict[str, Any]) -> str:
 
 
 def solution_text(results: dict[str, Any]) -> str:
-    """A solution for people.
+    """Return a solution as text.
 
     Args:
         results: of :func:`solution_of`.
@@ -257,7 +257,7 @@ def solution_text(results: dict[str, Any]) -> str:
 
 
 def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
-    """The linearisation error, linear minus exact, as lines of text."""
+    """Return the linearisation error, linear minus exact, as lines of text."""
     error = results.get("linearisation_error", {})
     if "rotation" not in error:
         words = "linearisation error"
@@ -270,7 +270,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """How well the platform's screw is known, and what clearances leave open."""
+    """Return lines on the screw's certified error and undetermined motion."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -287,25 +287,25 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Status and reason of a result that is not in order."""
+    """Return the status and reason of a result whose status is not ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def remark_lines(remarks: Sequence[str]) -> list[str]:
-    """Remarks on defaults of a robot's file, a line each."""
+    """Return the remarks on defaults of a robot's file, a line each."""
     return [f"note: {remark}" for remark in remarks]
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Certified bounds of the largest pose error, assumption ``frozen`` of (27).
+    """Return certified bounds of the largest pose error, assumption ``frozen`` of (27).
 
     Args:
-        assembly: at least energy.
+        assembly: the least-energy solution.
 
     Returns:
-        ``rotation`` [rad] and ``translation`` [m]: at most these; None where nothing
-        is proved.
+        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None where nothing is
+        proved.
     """
     try:
         bound = bound_pose_error(assembly, "frozen")

@@ -19,16 +19,15 @@ _SAMPLES = 9  # points along a body, enough for the cubic of a bent beam
 def robot_scene(
     assembly: Assembly, closing: NDArray | None, body: ErrorBody | None, caption: str
 ) -> str:
-    """An assembled robot, nominal and forced, as HTML.
+    """Return an assembled robot, nominal and forced, as HTML.
 
-    Displacements are linear in the exaggeration: those of small screws, a bent link the
-    cubic of a beam.
+    Displacements are small screws, linear in the exaggeration; a bent link is a cubic.
 
     Args:
         assembly: of a robot of n frames.
-        closing: (k, n, 4, 4) frames while a simulation closes it, None without.
-        body: of the errors its platform can have, None without.
-        caption: below it.
+        closing: (k, n, 4, 4) frames of a simulated closing, None without.
+        body: possible platform errors, None without.
+        caption: text below the figure.
 
     Returns:
         A figure of a page.
@@ -58,7 +57,7 @@ def robot_scene(
 
 
 def _body(assembly: Assembly, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
-    """A body: points along it, how far each is moved, and what it ends in."""
+    """Return a body: points along it, their displacements, and its joint."""
     robot = assembly.posture.robot
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
@@ -73,7 +72,7 @@ def _body(assembly: Assembly, bodies: DisplacedBodies, i: int) -> dict[str, Any]
 
 
 def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
-    """(k, 3) [m] displacements along a body: a cubic with the turns of its ends."""
+    """Return (k, 3) [m] displacements along a body: a cubic by its ends' rotations."""
     chord = bodies.ends[i] - bodies.starts[i]
     a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
@@ -88,7 +87,7 @@ def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
 
 
 def _forces(assembly: Assembly) -> list[dict[str, Any]]:
-    """Forces [N] that elastic links transmit at their tips, base axes."""
+    """Return the forces [N] that elastic links transmit at their tips, base axes."""
     posture = assembly.posture
     turned = posture.transforms[:, :3, :3] @ assembly.tip_wrenches[:, 3:, None]
     largest = float(np.abs(turned).max(initial=0.0))
@@ -102,10 +101,10 @@ def _forces(assembly: Assembly) -> list[dict[str, Any]]:
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """The errors the platform can have, around its origin."""
+    """Return the possible platform errors, around its origin."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
-    text = f"errors the platform can have, up to {sizes.max() * shown.factor:.4g}"
+    text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"
     return {
         "points": body.points, "faces": body.faces, "origin": origin,
         "text": f"{text} {shown.shown}",

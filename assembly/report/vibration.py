@@ -1,4 +1,4 @@
-"""Natural frequencies for machines and for people."""
+"""Natural frequencies as plain values and as text."""
 
 from typing import Any, Literal
 
@@ -15,10 +15,10 @@ from forcefit.results.display import numbers
 from forcefit.results.text import lines_of, listing
 
 _NOMINAL = (
-    "load and gravity are left out: these are the frequencies of the nominal robot; "
-    "with --state exact they count, and so does the stiffness that they give"
+    "these are the frequencies of the nominal robot, without load and gravity; "
+    "--state exact includes them and the stiffness due to them"
 )
-_NAMED = 3  # parts of a mode that people are told
+_NAMED = 3  # largest number of parts named for a mode
 
 
 def vibration_of(
@@ -28,10 +28,10 @@ def vibration_of(
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
-    """Everything ``assembly frequencies`` reports, as plain values.
+    """Return the results of ``assembly frequencies`` as plain values.
 
     Args:
-        posture: where the robot stands.
+        posture: of the robot.
         count: modes at most.
         load: (6,) [N m, N] on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] base axes.
@@ -75,7 +75,7 @@ def vibration_of(
 
 
 def vibration_text(results: dict[str, Any]) -> str:
-    """Frequencies for people, with the parts that bend most."""
+    """Return the frequencies as text, with the parts that deform most."""
     about = lines_of(results, "pose status reason state idle_motions")
     lines = [listing(results["robot"], about, results["remarks"])]
     for mode in results.get("modes", ()):
@@ -86,8 +86,8 @@ def vibration_text(results: dict[str, Any]) -> str:
 
 
 def _free(mode: dict[str, Any]) -> str:
-    """A mode without springs: the platform along a screw of 1 rad, or 1 m."""
+    """Return the text of a free motion, a platform screw of 1 rad or 1 m."""
     screw = np.asarray(mode["platform_screw"])
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
     unit = screw / (turn if turn > 1e-6 * shift else shift or 1.0)
-    return f"nothing resists: the platform along {numbers(unit)} [rad, m]"
+    return f"free motion of the platform along {numbers(unit)} [rad, m]"

@@ -13,7 +13,7 @@ _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
 def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str]:
-    """Wrenches through all frames and closures for people.
+    """Return the wrenches through all frames and closures as text.
 
     Args:
         frames: by name, of :func:`assembly.report.results.solution_of`.
@@ -26,7 +26,7 @@ def wrench_lines(frames: Mapping[str, Any], closures: Sequence[Any]) -> list[str
     tables = {
         "wrenches through the bodies, at each frame's origin in its axes":
             ("frame", {name: frame["wrench"] for name, frame in frames.items()}),
-        "the same where links under their own weight start": ("frame", starts),
+        "wrenches at the start of links under their own weight": ("frame", starts),
         "wrenches of the closures, at the platform's origin, base axes":
             ("closure", {" - ".join(c["frames"]): c["wrench"] for c in closures}),
     }  # fmt: skip

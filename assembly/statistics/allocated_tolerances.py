@@ -197,20 +197,20 @@ def allocation_text(results: dict[str, Any]) -> str:
     if check:
         one = check["yield"]
         lines.append(
-            f"{check['draws']} fresh draws at all postures: yield "
+            f"{check['draws']} new draws at all postures: yield "
             f"{one['probability']:.4f} ({one['lower']:.4f} to {one['upper']:.4f}), "
-            f"asked {results['yield']:g}: {check['verdict']}{_looks_text(check)}"
+            f"required {results['yield']:g}: {check['verdict']}{_looks_text(check)}"
         )
     return "\n".join(lines)
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """What clearances alone take of a limit."""
+    """Return a sentence on the share of a limit that clearances alone use."""
     reached, limit = (
         in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
     )
     return (
-        f"clearances alone take {reached} of the {limit} of {key} (at "
+        f"clearances alone use {reached} of the {limit} of {key} (at "
         f"{one['at']}): without them tolerances could be about "
         f"{one['looser_without']:.3g} times looser, at a price of about "
         f"{one['price_without']:.3g}"
@@ -222,7 +222,7 @@ def _looks_text(check: dict[str, Any]) -> str:
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (
-        f" (look {check['look']} of at most {check['most_looks']}, each at "
+        f" (test {check['look']} of at most {check['most_looks']}, each at "
         f"{check['confidence_of_a_look']:.2%}: {check['confidence']:.0%} for "
         f"all{undecided})"
     )

@@ -31,10 +31,10 @@ from assembly.statistics.linear_response import LinearResponse
 
 # values of the option --clearance and their meaning
 CLEARANCE_MODELS = {
-    "worst": "clearances anywhere they may be, the largest pose errors count, eq. (27)",
-    "uniform": "clearances uniform over all places they may be",
+    "worst": "largest pose errors over all positions in the clearances, eq. (27)",
+    "uniform": "positions uniform over all possible ones in the clearances",
     "contact": "clearances displaced to contact by a wrench of random direction",
-    "least": "clearances where the solution leaves them, one possible place of many",
+    "least": "positions of the least-energy solution, one of many possible ones",
 }
 CLEARANCE_STREAM = 1  # number of the stream of random numbers; 0 is the errors' stream
 

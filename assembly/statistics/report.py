@@ -45,7 +45,7 @@ def draws_page(
         HTML, which needs no other file.
     """
     goes = summary["assembles"]["forced"]
-    verdict = f"Of {summary['draws']} draws {_share_text(goes)} go together"
+    verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"
     if "within_limits" in summary:
         verdict += f"; {_share_text(summary['within_limits'])} keep all limits"
     return page(
@@ -57,10 +57,12 @@ def draws_page(
             about=f"{summary['draws']} draws, seed {summary['seed']}; pose errors: "
             f"clearance {summary['clearance']}: {summary['clearance_means']}.",
             body=[
-                section("How often", _yields(summary)),
+                section("Probabilities", _yields(summary)),
                 _perfect_parts(summary),
-                section("One of the worst", robot) if robot else "",
-                section("How large", _quantities(summary), _histograms(summary, data)),
+                section("A draw of large error", robot) if robot else "",
+                section(
+                    "Distributions", _quantities(summary), _histograms(summary, data)
+                ),
                 _importance(summary),
             ],
             assumed=_ASSUMED,
@@ -98,7 +100,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     if high95:
         answer = [part for one in high95 for part in (" and ", one)][1:]
         note = f"of the platform's error; clearance {summary['clearance']}."
-        tiles.append(Tile("95 % stay below", answer, [note]))
+        tiles.append(Tile("95 % quantile", answer, [note]))
     return tiles + tightening_tiles(summary)
 
 
@@ -218,4 +220,4 @@ def _importance(summary: Mapping[str, Any]) -> str:
         pieces.append(
             paragraph(f"{NOT_DISTINGUISHED[0].upper()}{NOT_DISTINGUISHED[1:]}.")
         )
-    return section("What governs it", *pieces) if pieces else ""
+    return section("Governing errors", *pieces) if pieces else ""

@@ -106,7 +106,7 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
     margins[at] = present["margins"]
     states = np.full(margins.shape, OUT_OF_REACH, dtype=object)
     states[at] = np.where(
-        np.asarray(present["margins"]) <= 1.0, "goes together", "needs force"
+        np.asarray(present["margins"]) <= 1.0, "assembles", "needs force"
     )
     axes = [
         (Axis(name, "m" if name.startswith("t") else "rad"), v)
@@ -114,5 +114,5 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
     ]
     title = f"{NAMES[present['quantity']]}, eq. (21)"
     layer = Layer("margin", title, "", margins)
-    caption = "Up to 1 it goes together by its clearances alone."
+    caption = "Up to 1 it assembles by its clearances alone."
     return value_map(axes, [layer], states.astype(str), caption)

@@ -37,9 +37,9 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 _ROUNDING = 1e-18  # relative to the largest value: smaller ones count as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
-    "forced": "goes together, by force if need be",
-    "rigid": "goes together by clearances alone, compliant joints rigid",
-    "rigid_compliant_free": "goes together by clearances alone, compliant joints free",
+    "forced": "assembles, by force if necessary",
+    "rigid": "assembles by clearances alone, compliant joints rigid",
+    "rigid_compliant_free": "assembles by clearances alone, compliant joints free",
 }
 
 

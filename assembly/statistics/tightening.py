@@ -51,19 +51,19 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
         )
         largest, (value, *_) = shares[0]
         each = "" if names[0] == largest else " each"
-        note = f"share of the {key}'s variance it has a part in."
+        note = f"share of the {key}'s variance that involves it."
         if len(names) > 1:
             note = f"{note[:-1]}; these draws do not distinguish: {_listed(names)}."
         answer = f"{names[0]}: {100 * value:.0f} %{each}"
-        tiles.append(Tile("What governs it", [answer], [note]))
+        tiles.append(Tile("Governing errors", [answer], [note]))
     if broken:
         tiles.append(_broken_tile(broken))
     elif summary.get("within_limits", {}).get("probability") == 1.0:
         note = f"all {summary['draws']} draws keep all limits."
-        tiles.append(Tile("What to tighten", ["nothing"], [note]))
+        tiles.append(Tile("Tolerance to tighten", ["nothing"], [note]))
     elif names:
         note = "not distinguished by these draws." if len(names) > 1 else ""
-        tiles.append(Tile("What to tighten", [_listed(names)], [note]))
+        tiles.append(Tile("Tolerance to tighten", [_listed(names)], [note]))
     return tiles
 
 
@@ -105,7 +105,7 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
     if largest:
         note.append(f" First: {largest}.")
     what = "the clearances" if key in POSE_ERRORS else "the design or its loads"
-    return Tile("What to tighten", [what], note)
+    return Tile("Tolerance to tighten", [what], note)
 
 
 def _listed(names: list[str]) -> str:

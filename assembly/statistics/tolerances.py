@@ -151,8 +151,8 @@ def present_text(results: dict[str, Any]) -> str:
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )
     lines = [
-        f"{results['postures']} postures, {results['assemblable_share']:.1%} go "
-        f"together; largest margin {results['largest_margin']:.4g} "
+        f"{results['postures']} postures, {results['assemblable_share']:.1%} "
+        f"assemble; largest margin {results['largest_margin']:.4g} "
         f"at {where or 'the origin'}",
         f"everywhere with all errors times {results['factor_on_errors']:.4g}",
     ]

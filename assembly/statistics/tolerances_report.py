@@ -49,7 +49,7 @@ def tolerances_page(
     if present is not None:
         share = 100 * present["assemblable_share"]
         sentences.append(
-            f"{share:.1f} % of {present['postures']} postures go together by "
+            f"{share:.1f} % of {present['postures']} postures assemble by "
             "clearances alone; all of them with the errors times "
             f"{present['factor_on_errors']:.4g}."
         )
@@ -81,17 +81,17 @@ def tolerances_page(
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
     """Return the largest margin, and the error that contributes most to it."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
-    note = f"at {at or 'the origin'} [m, rad]; 1 and less goes together."
+    note = f"at {at or 'the origin'} [m, rad]; it assembles up to 1."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
     if present["slopes"]:
         first = present["slopes"][0]
         share = f"{100 * first['share_of_margin']:.0f} %"
-        tiles.append(Tile("What governs it", [first["error"]], [f"{share} of it."]))
+        tiles.append(Tile("Governing error", [first["error"]], [f"{share} of it."]))
     factor = present["factor_on_errors"]
-    answer, note = f"all errors times {factor:.3g}", "then all postures fit."
+    answer, note = f"all errors times {factor:.3g}", "then all postures assemble."
     if factor >= 1.0:
-        answer, note = "nothing", "all postures fit with the errors there are."
-    return [*tiles, Tile("What to tighten", [answer], [note])]
+        answer, note = "nothing", "all postures assemble with the present errors."
+    return [*tiles, Tile("Tolerance to tighten", [answer], [note])]
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
@@ -148,17 +148,17 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
         why = "every tolerance may be the loosest allowed."
-        return Tile("What to tighten", ["nothing"], [why])
+        return Tile("Tolerance to tighten", ["nothing"], [why])
     most = max(one["share"] for one in tight)
     first = [one for one in tight if one["share"] >= (1.0 - _ALIKE) * most]
     share = f"{100 * most:.0f} % {_GOVERNED[allocation['cost']]}"
     if len(first) > 1:
         names = ", ".join(one["name"] for one in first)
-        return Tile("What to tighten", [names], [f"{share} each."])
+        return Tile("Tolerance to tighten", [names], [f"{share} each."])
     (one,) = first
     size = Value(one["tolerance"], one["unit"])
     return Tile(
-        "What to tighten", [one["name"]], [share, ", to plus or minus ", size, "."]
+        "Tolerance to tighten", [one["name"]], [share, ", to plus or minus ", size, "."]
     )
 
 

@@ -59,7 +59,7 @@ def _parts(robot: Robot, state: str) -> list[Part]:
 
 def _name(part: Part) -> str:
     """Return a part's label."""
-    return f"{part.frame} {part.kind}" if part.frame else "forces already there"
+    return f"{part.frame} {part.kind}" if part.frame else "internal forces and loads"
 
 
 def nominal_stiffnesses(

@@ -74,8 +74,8 @@ def test_the_lines_of_an_allocation():
         "price 20, no tolerances cost less than 19.5",
         "worst energy: 1.5 found, at most 1.75 proven, limit 2",
         "proven when scaled by 0.7500",
-        "500 fresh draws at all postures: yield 0.9900 (0.9760 to 0.9967), asked 0.9: "
-        "shown (look 2 of at most 4, each at 98.75%: 95% for all)",
+        "500 new draws at all postures: yield 0.9900 (0.9760 to 0.9967), required 0.9: "
+        "shown (test 2 of at most 4, each at 98.75%: 95% for all)",
     ]
 
 

@@ -243,7 +243,7 @@ def test_the_commands_from_files_to_figures(run, tmp_path, monkeypatch):
         figure = histogram_figure(data)
         assert len(figure.axes) == 8
         assert (
-            "pose errors: clearance worst: clearances anywhere" in figure.get_suptitle()
+            "pose errors: clearance worst: largest pose errors" in figure.get_suptitle()
         )
         assert "of the 200 of 200 draws that assemble" in figure.get_suptitle()
         assert sum(panel.get_title() == "clearance worst" for panel in figure.axes) == 2

@@ -112,7 +112,9 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
     assert units["translation_lower"] == "m"
     assert units["status"] == units["margin"] == "1"
     meaning = data["translation"].attrs["long_name"]
-    assert meaning.startswith("upper bound of the size of the platform's translation")
+    assert meaning.startswith(
+        "upper bound of the magnitude of the platform's translation"
+    )
     assert meaning.endswith("the largest pose errors count, eq. (27)")
     screw = data["platform_screw"]
     assert screw.dims == ("draw", "screw")

@@ -95,7 +95,7 @@ def test_the_advice_is_the_clearances_where_these_alone_break_the_limit(
         f"translation={limit}", "--report", page,
     )  # fmt: skip
     assert status == 0, err
-    answer, _ = tiles(page.read_text("utf-8"))["What to tighten"]
+    answer, _ = tiles(page.read_text("utf-8"))["Tolerance to tighten"]
     broken = limit < np.hypot(RADIAL, ARM * TILT)
     assert ("no tolerance of the errors meets it" in text) == broken
     assert answer == ("the clearances" if broken else "nothing")
@@ -119,7 +119,7 @@ def test_equal_legs_are_named_together_on_the_page(tmp_path, run):
     quantities = json.loads(written.read_text())["importance"]["quantities"]
     ranks = quantities["translation"]["rank"]
     assert {tuple(rank) for rank in ranks.values()} == {(1, 3)}
-    answer, _ = tiles(page.read_text("utf-8"))["What to tighten"]
+    answer, _ = tiles(page.read_text("utf-8"))["Tolerance to tighten"]
     assert answer == "elbow.RY of all legs"
 
 

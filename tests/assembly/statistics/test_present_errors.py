@@ -75,7 +75,7 @@ def test_the_lines_tell_the_five_largest_errors_and_where():
     }  # fmt: skip
     lines = present_text(results).splitlines()
     assert lines[:3] == [
-        "8 postures, 37.5% go together; largest margin 1.235 at tx = 0.25, tz = -0.5, "
+        "8 postures, 37.5% assemble; largest margin 1.235 at tx = 0.25, tz = -0.5, "
         "rz = 2e-09",
         "everywhere with all errors times 0.81",
         "  e0 = 0.0001 makes 50.0% of that margin",

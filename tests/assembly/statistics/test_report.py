@@ -65,7 +65,7 @@ def test_the_page_of_draws_is_their_summary(tmp_path, run):
     assert {sum(one["y"]) for one in bins} == {100}
     shares = summary["importance"]["quantities"]["translation"]["total_index"]
     largest = max(shares, key=lambda name: shares[name][0])
-    assert "What governs it" in page.read_text(encoding="utf-8")
+    assert "Governing errors" in page.read_text(encoding="utf-8")
     assert rows[largest][0].value == shares[largest][0]
     assert str(ERRORS.name) in " ".join(rows)  # with its digest
 

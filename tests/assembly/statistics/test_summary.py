@@ -214,7 +214,7 @@ def test_the_summary_s_lines_name_quantities_units_and_intervals():
     assert lines == [
         "40 draws; in brackets 90% intervals",
         "pose errors: clearance worst: anywhere",
-        f"goes together, by force if need be: {shown}",
+        f"assembles, by force if necessary: {shown}",
         f"margin above 1.5: {shown}",
         f"yield [clearance worst], all limits met: {shown}, 7 draws undecided",
         "of the 30 of 40 draws that assemble:",

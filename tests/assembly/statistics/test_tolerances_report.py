@@ -53,18 +53,18 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 def test_what_to_tighten_does_not_depend_on_a_bound_that_is_not_active(loosest):
     """Prices are 1 / 1e-3 and 1 / 1e-4: the length has 10 of 11 parts of the price."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
-    answer, note = tiles(page)["What to tighten"]
+    answer, note = tiles(page)["Tolerance to tighten"]
     assert (answer, note[:4]) == ("length", "91\u00a0%")
 
 
 def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
     """t dL/dt is the cost over the multiplier, whatever the tolerances are."""
     answer, note = tiles(shown([1e-3, 1e-4], [3.0, 1.0], cost="logarithm"))[
-        "What to tighten"
+        "Tolerance to tighten"
     ]
     assert (answer, note[:4]) == ("angle", "75\u00a0%")
     answer, _ = tiles(shown([1e-3, 1e-4], [1.0, 1.0], cost="logarithm"))[
-        "What to tighten"
+        "Tolerance to tighten"
     ]
     assert answer == "angle, length"
 
@@ -72,9 +72,9 @@ def test_with_a_logarithmic_price_the_costs_are_the_multipliers():
 def test_a_tolerance_at_its_loosest_is_not_to_be_tightened():
     """The angle costs more, and may not be looser: the length is to be tight."""
     both = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 0.1))
-    assert tiles(both)["What to tighten"][0] == "length"
+    assert tiles(both)["Tolerance to tighten"][0] == "length"
     none = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 1e-4))
-    assert tiles(none)["What to tighten"][0] == "nothing"
+    assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
 def test_bars_begin_at_zero_on_a_linear_axis():
@@ -117,7 +117,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert taken["reached"] == pytest.approx(RADIAL, rel=1e-3)
     assert taken["looser_without"] == pytest.approx(1.5, rel=1e-3)
     assert taken["price_without"] == pytest.approx(1.0 / LIMIT, rel=2e-3)
-    assert "clearances alone take 0.1 mm of the 0.3 mm of translation" in text
+    assert "clearances alone use 0.1 mm of the 0.3 mm of translation" in text
     content = page.read_text("utf-8")
     assert tiles(content)["Clearances take"][0] == "33\u00a0%"
     asked = {row[0].text: row[1] for row in parse(content).table("asked")[1:]}
@@ -125,7 +125,7 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert asked["errors"].text == "uniform within plus or minus their tolerance"
     assert asked["price"].text == "sum of cost / tolerance [rad or m]"
     assert asked["postures"].text == "1: tx=0.4"
-    assert asked["clearances"].text.startswith("clearance worst: clearances anywhere")
+    assert asked["clearances"].text.startswith("clearance worst: largest pose errors")
     assert asked["yield"].text == "1: every robot within tolerance"
 
 
@@ -137,7 +137,7 @@ def test_errors_that_fit_everywhere_leave_nothing_to_tighten():
     }  # fmt: skip
     results = {"robot": "bars", "postures": 2, "grid": "tx=0:1:1", "present": present}
     page = tolerances_page(results, Provenance())
-    assert tiles(page)["What to tighten"][0] == "nothing"
+    assert tiles(page)["Tolerance to tighten"][0] == "nothing"
     tight = present | {"factor_on_errors": 0.5, "assemblable_share": 0.0}
     page = tolerances_page(results | {"present": tight}, Provenance())
-    assert tiles(page)["What to tighten"][0] == "all errors times 0.5"
+    assert tiles(page)["Tolerance to tighten"][0] == "all errors times 0.5"

@@ -24,7 +24,7 @@ def run(name, *words):
 def test_the_papers_figure_is_drawn_in_both_conventions(tmp_path):
     """A coarse grid, part of the fine one: energies within the reference's."""
     said = run("paper_figure5.py", "--step", "0.2", "-o", tmp_path)
-    assert said.count("go together by clearances with compliant joints free") == 2
+    assert said.count("assemble by clearances with compliant joints free") == 2
     for signs in ("literal", "signed"):
         assert (tmp_path / f"figure5_{signs}.png").read_bytes().startswith(b"\x89PNG")
     least, _, most = re.findall(r"energy \[J\] +(\S+) / (\S+) / (\S+)", said)[0]

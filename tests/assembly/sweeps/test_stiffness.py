@@ -84,7 +84,7 @@ def test_a_tangent_is_that_of_the_point_s_errors_load_and_clearances(state):
     )  # fmt: skip
     np.testing.assert_allclose(data.share.sum("part"), 1.0)
     assert np.ptp(data.stiffness.values, axis=0).max() > 0.0
-    assert state != "exact" or "forces already there" in data.part.values
+    assert state != "exact" or "internal forces and loads" in data.part.values
 
 
 def test_a_tangent_names_the_motions_that_nothing_resists():
