@@ -10,7 +10,7 @@ Harwell-Boeing     Ansys (``HBMAT``): ``.matrix``; see
 user element       Abaqus and CalculiX, ``*SUBSTRUCTURE MATRIX OUTPUT``: ``.mtx``
 five columns       Abaqus ``*MATRIX OUTPUT``: node, direction, twice, and a value
 three columns      the same with ``FORMAT=COORDINATE``: row, column, value; CalculiX
-                   ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof`` beside them
+                   ``SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, with their ``.dof``
 DMIG               Nastran: ``.pch``, ``.dmig``; see
                    :mod:`stiffness.exchange.nastran_files`
 NumPy              ``.npy``, SciPy's sparse ``.npz``
@@ -107,8 +107,8 @@ def read_matrix(
             matrix, freedoms = _from_entries(path, entries)
         else:
             matrix, freedoms = _columns(path, text)
-    for beside in (path, mapped):
-        mapping = None if beside is None else Path(beside).with_suffix(".mapping")
+    for file in (path, mapped):
+        mapping = None if file is None else Path(file).with_suffix(".mapping")
         if freedoms is None and mapping is not None and mapping.exists():
             freedoms = _mapped(mapping, matrix.shape[0])
     return _checked(path, matrix, freedoms, nodes)

@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 # error of a peak over the disagreement around it: at most 1.6 for 9 shouldered bars in
 # tension, torsion and bending on their first meshes, 0.3 in the median
 SAFETY_FACTOR = 1.6
-_SMOOTH = np.cos(
-    np.radians(5.0)
-)  # patches that meet at a smaller angle form a smooth surface
-_OFF = 5e-3  # of a face's size; cubic faces follow a fillet to 1e-4
-ZONE = 0.9  # relative to the peak: larger stresses count as nearly as large
+# patches that meet at a smaller angle form a smooth surface
+_SMOOTH = np.cos(np.radians(5.0))
+# distance from the shape, relative to a face's size, above which a face does not follow
+# it; cubic faces follow a fillet to 1e-4
+_OFF = 5e-3
+ZONE = 0.9  # relative to the peak: smallest stress that counts as nearly as large
 
 
 def von_mises(stress: ArrayLike) -> NDArray:

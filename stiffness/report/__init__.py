@@ -1,4 +1,4 @@
-"""K_E shown, compared with a beam's, exported and kept in a library.
+"""Results on K_E: text, comparison with a beam, export, libraries.
 
 Begin at ``library.py`` for many links, at ``compare.py`` for one.
 """

@@ -6,9 +6,9 @@ share of its radius would be: K / K_beam = 1 + c r / L, whose c depends on the s
 and on Poisson's ratio only.  It vanishes as the link grows slender; a difference that
 does not vanish is an error of one of the two models.
 
-The commonest one is a section whose width and height are swapped, or an ``up`` left
-out: the beam is then turned about its own axis.  So the beam is turned by quarters, and
-if it agrees much better somewhere, that is said instead.
+The commonest one is a section whose width and height are swapped, or a missing ``up``:
+the beam is then turned about its own axis.  The beam is therefore also compared at
+turns of 90 degrees, and a turn with much better agreement is reported.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from forcefit.results.display import html_table, short_repr
 from stiffness.link import LinkStiffness, scaled
 from stiffness.screws import rotation_matrix, screw_map
 
-_MUCH_BETTER = 0.25  # of the largest difference, and no less than the mesh's error
-_TURNS = {90: "a quarter", 180: "half a turn", 270: "three quarters"}
+_MUCH_BETTER = 0.25  # largest share of the difference that a better turn leaves
+_TURNS = (90, 180, 270)  # [deg]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +57,9 @@ class LinkComparison:
 
     @property
     def better_turn(self) -> tuple[int, float]:
-        """A turn of the beam about base to tip that makes it agree much better.
+        """The turn of the beam about base to tip that agrees much better.
 
-        Its degrees, 0 if there is none, and the largest difference [1] it leaves.
+        Its angle [deg], 0 if there is none, and the largest remaining difference [1].
         """
         worst = float(np.abs(self.difference).max())
         axis = self.fea.tip - self.fea.base
@@ -70,7 +70,7 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # of turns that are the same but for the mesh and rounding, the smallest
+        # of turns that differ by mesh error and rounding only, the smallest
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
         better = remaining[best] < _MUCH_BETTER * worst and worst > noise
@@ -84,7 +84,7 @@ class LinkComparison:
             worst = 100 * np.abs(self.difference).max()
             swap = "" if angle == 180 else ", or width and height swapped"
             return (
-                f"The beam's axes look swapped: turned by {_TURNS[angle]} about base "
+                f"The beam's axes look swapped: turned by {angle} degrees about base "
                 f"to tip it would differ by {100 * remaining:.3g} % at most, not "
                 f"{worst:.3g} %.  Expected another up{swap}."
             )
@@ -93,19 +93,19 @@ class LinkComparison:
         turns, shifts = (" ".join(f"{v:.2f}" for v in part) for part in (c[:3], c[3:]))
         chord = float(np.linalg.norm(self.fea.tip - self.fea.base))
         bent = (
-            "  A solid's corner is stiffer than two beams that meet in a point: part "
-            "of c is no end effect."
+            "  A solid's corner is stiffer than two beams that meet in a point: c "
+            "includes more than the end effect."
         )
         return (
             f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
             f"K / K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
-            f"(translations); the mesh's error is worth {noise:.2f}."
+            f"(translations); the mesh error changes c by up to {noise:.2f}."
             f"{bent if self.length > 1.001 * chord else ''}"
         )
 
 
 def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
-    """[1] largest difference from the beam turned about the tip by a vector."""
+    """Return [1] largest difference from the beam turned about the tip by a vector."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
     K = A @ comparison.beam.stiffness @ A.T
@@ -145,7 +145,7 @@ def compare_link(
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
-    """Upper entries of a stiffness that are more than a thousandth of their scale.
+    """Return upper entries of a stiffness above a thousandth of their scale.
 
     Args:
         stiffness: (6, 6).

@@ -1,4 +1,4 @@
-"""Stiffnesses in the order and words of other programs."""
+"""Stiffnesses in the order and syntax of other programs."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 def translations_first(matrix: ArrayLike) -> NDArray:
-    """A stiffness or compliance in the order [T R] / [f m].
+    """Return a stiffness or compliance in the order [T R] / [f m].
 
     Args:
         matrix: (6, 6) in our order.
@@ -29,7 +29,7 @@ def translations_first(matrix: ArrayLike) -> NDArray:
 
 
 def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
-    """K_E as another program reads it, SI units.
+    """Return K_E as another program reads it, SI units.
 
     Args:
         program: ``"exudyn"``: ``stiffness`` of a RigidBodySpringDamper; ``"adams"``:
@@ -66,7 +66,7 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
 
 def library_csv(entries: Sequence[Entry]) -> str:
-    """A library as a table: a row an entry, parameters, then the upper half of K.
+    """Return a library as a table: per entry parameters, then the upper half of K.
 
     Args:
         entries: of one library.

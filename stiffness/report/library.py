@@ -1,6 +1,6 @@
-"""Link stiffnesses kept on disk, with where they came from.
+"""Libraries of link stiffnesses on disk, with their provenance.
 
-A library is a folder of one JSON file an entry.  An entry holds the stiffness, its
+A library is a folder with one JSON file per entry.  An entry holds the stiffness, its
 error, the mesh, the parameters and material it was made for, the geometry's digest, the
 program's version and the date.  :mod:`stiffness.report.library_build` makes them.
 """
@@ -48,7 +48,7 @@ class Entry:
 
 
 def read_entry(path: Path | str, key: str) -> Entry:
-    """One entry of a library.
+    """Read one entry of a library.
 
     Args:
         path: the library's folder.
@@ -71,7 +71,7 @@ def read_entry(path: Path | str, key: str) -> Entry:
 
 
 def _entry(file: Path) -> Entry:
-    """The content of an entry's file."""
+    """Return the content of an entry's file."""
     try:
         about = json.loads(read_text(file))
         if about.get("format") != FORMAT:
@@ -101,7 +101,7 @@ def _entry(file: Path) -> Entry:
 
 
 def read_compliance(path: Path | str, key: str) -> NDArray:
-    """Compliance of one entry.
+    """Return the compliance of one entry.
 
     Args:
         path: the library's folder.
@@ -117,7 +117,7 @@ def read_compliance(path: Path | str, key: str) -> NDArray:
 
 
 def read_library(path: Path | str) -> list[Entry]:
-    """All entries of a library, in the order of their keys.
+    """Read all entries of a library, in the order of their keys.
 
     Args:
         path: the folder.
@@ -138,7 +138,7 @@ def read_library(path: Path | str) -> list[Entry]:
 def look_up(
     entries: Sequence[Entry], wanted: Mapping[str, float], family: str = ""
 ) -> tuple[NDArray, NDArray]:
-    """Stiffness at wanted parameters, interpolated between a grid's entries.
+    """Return the stiffness at wanted parameters, interpolated between a grid's entries.
 
     Logarithms of the diagonal and the scaled rest are interpolated by polynomials of
     logarithms of the parameters, through up to four neighbours along each axis: links'
@@ -152,8 +152,8 @@ def look_up(
             family there is.
 
     Returns:
-        (6, 6) stiffness, and (6, 6) the sizes of its error: what it changes to leave
-        out the farthest entry used along each axis, and the entries' own errors.
+        (6, 6) stiffness, and (6, 6) estimate of its error: the change on leaving out
+        the farthest entry used along each axis, plus the entries' own errors.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries
@@ -199,8 +199,8 @@ def look_up(
 
 
 def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
-    """The entries of a family, or of the grid of a shape."""
-    # parts by themselves are beside any grid
+    """Return the entries of a family, or of the grid of a shape."""
+    # single parts belong to no grid
     families = sorted({e.about["family"] for e in entries if e.about.get("family")})
     grid = [entry for entry in entries if "surface" not in entry.about]
     if family and family not in families:
@@ -221,7 +221,7 @@ def _interpolated(
     at: Sequence[float],
     most: Sequence[int],
 ) -> NDArray:
-    """Tensor product of Lagrange's polynomials through the nearest values."""
+    """Return tensor product of Lagrange's polynomials through the nearest values."""
     chosen, weights = [], []
     for axis, value, count in zip(axes, at, most, strict=True):
         near = sorted(axis, key=lambda v: abs(np.log(v / value)))[: max(count, 1)]

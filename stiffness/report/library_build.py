@@ -31,15 +31,15 @@ _METHODS = ("beam", "fea")
 
 @dataclass(frozen=True)
 class Spec:
-    """What a library is to hold.
+    """Content of a library to build.
 
     Attributes:
         folder: of the library.
         shape: of all entries.
         method: ``"beam"`` or ``"fea"``.
         grid: values of each parameter: lengths [m], ``young`` [Pa], ...
-        accuracy: asked of finite elements.
-        links: parts given by their surface, beside the grid or in its stead.
+        accuracy: required relative error of finite elements.
+        links: parts given by their surface, in addition to the grid or instead of it.
     """
 
     folder: Path
@@ -50,7 +50,7 @@ class Spec:
     links: tuple[SurfaceLink, ...] = ()
 
     def points(self) -> list[dict[str, float]]:
-        """Every combination of the grid's values; none without a shape."""
+        """Return every combination of the grid's values; none without a shape."""
         if not self.shape:
             return []
         names = list(self.grid)
@@ -61,7 +61,7 @@ class Spec:
 
 
 def read_spec(path: Path | str) -> Spec:
-    """What a build file asks for.
+    """Read a build file.
 
     Args:
         path: TOML with ``library`` and ``accuracy``; ``shape``, ``method`` and a table
@@ -72,7 +72,7 @@ def read_spec(path: Path | str) -> Spec:
         The spec; the folder is relative to the file.
 
     Raises:
-        BadInput: the file, a name or a value is not proper.
+        BadInput: the file, a name or a value is invalid.
     """
     path = Path(path)
     table = read_toml(path)
@@ -97,7 +97,7 @@ def read_spec(path: Path | str) -> Spec:
         if not given or not all(_is_number(v) for v in given):
             raise grid_table.bad(name, "expected a finite number, or a list of them")
         if len(set(given)) != len(given):
-            raise grid_table.bad(name, "a value stands there twice")
+            raise grid_table.bad(name, "a value is given twice")
         grid[name] = tuple(sorted(float(v) for v in given))
     shape = table.text("shape")
     spec = Spec(
@@ -120,18 +120,18 @@ def read_spec(path: Path | str) -> Spec:
 
 
 def _is_number(value: object) -> bool:
-    """A number of a sane size, not true or false."""
+    """Return whether a value is a number of valid size, not a truth value."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
     return proper and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
-    """The parameters that are lengths."""
+    """Return the parameters that are lengths."""
     return {name: v for name, v in point.items() if name not in _MATERIAL}
 
 
 def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
-    """Name of an entry, the same for the same parameters.
+    """Return the name of an entry, unique to its parameters.
 
     Args:
         spec: of its library.
@@ -149,10 +149,10 @@ def build_library(
     workers: int = 1,
     update: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Compute the entries that are not there yet.
+    """Compute the missing entries.
 
     Args:
-        spec: what is wanted.
+        spec: content of the library.
         workers: processes.
         update: called with entries done and wanted.
 
@@ -191,7 +191,7 @@ def build_library(
 
 
 def _make_folder(folder: Path, write: bool = True) -> None:
-    """The folder of a library; without ``write`` only whether there can be one."""
+    """Make the folder of a library; without ``write`` only check that one can."""
     try:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -203,7 +203,7 @@ def _make_folder(folder: Path, write: bool = True) -> None:
 
 
 def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
-    """Name of an entry of either kind."""
+    """Return the name of an entry of the grid or of a surface."""
     if isinstance(wanted, SurfaceLink):
         return wanted.name
     return entry_key(spec, wanted)
@@ -238,7 +238,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
 
 
 def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """The link of one point, and its geometry's digest."""
+    """Return the link of one point, and its geometry's digest."""
     lengths, E, nu = _lengths(point), point["young"], point["poisson"]
     tip = np.array([0.0, 0.0, lengths["length"]])
     if spec.method == "beam":
@@ -260,7 +260,7 @@ def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, st
 
 
 def _program() -> str:
-    """Name and version of this program."""
+    """Return the name and version of this program."""
     try:
         return f"forcefit {version('forcefit')}"
     except PackageNotFoundError:

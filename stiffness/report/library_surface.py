@@ -2,8 +2,8 @@
 
 A family is a table of files and their sizes, between which ``look_up`` interpolates.
 
-Such an entry is kept as long as the surface file's content and everything else that was
-asked for are what it was made from, and made again when one of them changed.
+An entry is computed again when the content of its surface file or another setting
+changed.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class SurfaceLink:
-    """A part that a library is to hold.
+    """A part of a library to build.
 
     Attributes:
         name: its key in the library.
@@ -39,8 +39,8 @@ class SurfaceLink:
         density: [kg/m^3], 0 leaves mass and inertia out.
         unit: of the surface file.
         interface: one of :data:`stiffness.fem.condensation.KINDS`.
-        accuracy: [1] asked of every entry of K.
-        family: of parts that differ in their sizes, empty for a part by itself.
+        accuracy: [1] required relative error of every entry of K.
+        family: of parts that differ in their sizes, empty for a single part.
         sizes: [m] of a part of a family, by name.
         parts: of another material, as on the command line.
     """
@@ -66,10 +66,10 @@ class SurfaceLink:
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """All that the entry depends on, with the surface file's digest.
+        """Return all that the entry depends on, with the surface file's digest.
 
         Returns:
-            Plain values, the same for the same question.
+            Plain values, equal for equal settings.
 
         Raises:
             BadInput: the surface file cannot be read.
@@ -84,14 +84,14 @@ class SurfaceLink:
         given = {k: v for k, v in asdict(self).items() if k not in {"name", "surface"}}
         if not self.parts:
             del given["parts"]
-        if not self.family:  # a part by itself
+        if not self.family:  # a single part
             del given["family"], given["sizes"]
         if solid:
             given["solid"] = solid
         return given | {"surface_digest": hashlib.sha256(content).hexdigest()}
 
     def solve(self) -> LinkStiffness:
-        """The link by finite elements.
+        """Return the link by finite elements.
 
         Returns:
             The stiffness at the tip's centre, in the surface's axes.
@@ -118,7 +118,7 @@ class SurfaceLink:
 
 
 def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
-    """The tables ``[[link]]`` and ``[[family]]`` of a build file.
+    """Return the tables ``[[link]]`` and ``[[family]]`` of a build file.
 
     Args:
         root: the file's table.
@@ -128,7 +128,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
         The links, in order.
 
     Raises:
-        BadInput: a rule is broken, a file is missing, or a name stands there twice.
+        BadInput: a rule is broken, a file is missing, or a name is given twice.
     """
     links: dict[str, SurfaceLink] = {}
     for table in root.tables("link"):
@@ -148,7 +148,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
 
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
-    """One more link, of a name that none has."""
+    """Add a link; refuse a name that another one has."""
     if link.name in links:
         found = f"found {quoted(link.name)} twice, expected other names"
         raise table.bad("name", found)
@@ -156,7 +156,7 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 
 
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
-    """What tables of a link and of a family have in common."""
+    """Read the keys that tables of a link and of a family share."""
     from stiffness.fem.condensation import KINDS
     from stiffness.fem.part_text import read_parts
 
@@ -182,7 +182,7 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
 
 
 def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
-    """Parts of one kind: a CSV table of their files and sizes.
+    """Return the parts of one kind: a CSV table of their files and sizes.
 
     Args:
         common: what all have in common, by the family's name; its interfaces may name
@@ -193,7 +193,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
         A link for each row.
 
     Raises:
-        BadInput: the table, a file or an interface is not proper.
+        BadInput: the table, a file or an interface is invalid.
     """
     rows = read_rows(file)
     head = [cell.strip() for cell in rows[0]] if rows else []
@@ -228,7 +228,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
 
 
 def _size(place: str, name: str, cell: str) -> float:
-    """[m] of a cell."""
+    """Return the length [m] in a cell."""
     try:
         value = float(cell)
     except ValueError:
@@ -240,7 +240,7 @@ def _size(place: str, name: str, cell: str) -> float:
 
 
 def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
-    """An interface with its sizes put in."""
+    """Return an interface with the values of its sizes."""
     if not isinstance(interface, str):
         return interface
     for name, value in sizes.items():
@@ -249,11 +249,11 @@ def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
 
 
 def is_current(file: Path, link: SurfaceLink) -> bool:
-    """Whether an entry is there and was made from what is asked for now.
+    """Return whether an entry exists and was computed with the present settings.
 
     Args:
         file: of the entry.
-        link: what is asked for.
+        link: the requested link.
 
     Returns:
         False also for a file that is damaged.

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 def plot_comparison(comparison: LinkComparison) -> "Figure":
-    """K_E by finite elements and by a beam, and their difference, entry by entry.
+    """Plot K_E by finite elements and by a beam, and their difference, by entry.
 
     Args:
         comparison: of one link by two methods.
 
     Returns:
-        The figure: a bar pair for each entry that matters, and the map of differences.
+        The figure: a pair of bars for each significant entry, and a map of differences.
     """
     from matplotlib.figure import Figure
 
@@ -54,7 +54,7 @@ def plot_comparison(comparison: LinkComparison) -> "Figure":
 
 
 def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
-    """Entries larger than a thousandth of their scale, as bars of each link."""
+    """Plot entries larger than a thousandth of their scale, as bars of each link."""
     entries = entries_that_matter(links[0].stiffness)
     width = 0.8 / len(links)
     for k, link in enumerate(links):
@@ -72,13 +72,13 @@ def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
 
 
 def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
-    """How far finite elements are from the beam, over L / r, with the fitted ends.
+    """Plot the difference of finite elements and beam over L / r, with the fit.
 
     Args:
         sweep: one section at several lengths.
 
     Returns:
-        The figure: a curve for each entry that matters, bars the meshes' error.
+        The figure: a curve for each significant entry, with error bars of the meshes.
     """
     from matplotlib.figure import Figure
 
@@ -107,9 +107,7 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     axes.axhline(0, color="0.7", lw=0.8)
     axes.set_xlabel("L / r")
     axes.set_ylabel("finite elements minus beam [% of sqrt(K_ii K_jj)]")
-    axes.set_title(
-        "What held ends add: K / K_beam = 1 + c r / L + d (r / L)²", fontsize=11
-    )
+    axes.set_title("End effect: K / K_beam = 1 + c r / L + d (r / L)²", fontsize=11)
     axes.legend(fontsize=8)
     return figure
 
@@ -122,18 +120,19 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Von Mises stress of one wrench from base to tip, the evaluated region in white.
+    """Plot the von Mises stress of one wrench from base to tip.
 
     Args:
         everywhere: the influence at all nodes, also at the interfaces.
         peak: of the wrench.
         base: (3,) [m].
         tip: (3,) [m].
-        section: of a beam to plot beside it.
+        section: of a beam to plot too.
         up: (3,) the section's z.
 
     Returns:
-        The figure: a dot a node, the beam's largest stress in each section as a line.
+        The figure: a dot for each node, the beam's largest stress in each section as a
+        line; the evaluated region is white.
     """
     from matplotlib.figure import Figure
 
@@ -160,7 +159,7 @@ def plot_stress(
         axes.plot(1e3 * x, line, color="C0", label="beam formula")
         top = max(top, line.max())
     axes.set_ylim(0, 1.3 * top)
-    axes.set_xlabel("from base to tip [mm]; shaded: too near to a clamped edge")
+    axes.set_xlabel("from base to tip [mm]; shaded: not evaluated (clamped edge)")
     axes.set_ylabel("von Mises stress [MPa]")
     axes.legend(fontsize=8)
     return figure

@@ -1,4 +1,4 @@
-"""A link's stiffness as plain values for a file, and as text for a reader."""
+"""A link's stiffness as plain values and as text."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def link_results(link: LinkStiffness) -> dict[str, Any]:
-    """The object that ``--json`` writes for one link.
+    """Return the object that ``--json`` writes for one link.
 
     Args:
         link: a link.
@@ -45,13 +45,13 @@ def link_results(link: LinkStiffness) -> dict[str, Any]:
 
 
 def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
-    """The object that ``--json`` writes for a beam beside finite elements.
+    """Return the object that ``--json`` writes for a beam and finite elements.
 
     Args:
         comparison: of one link by two methods.
 
     Returns:
-        Both links, their difference entry by entry, and what explains it.
+        Both links, their difference entry by entry, and its explanation.
     """
     return {
         "beam": link_results(comparison.beam),
@@ -66,13 +66,13 @@ def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
 
 
 def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
-    """The object that ``--json`` writes for a sweep over slenderness.
+    """Return the object that ``--json`` writes for a sweep over slenderness.
 
     Args:
         sweep: one section at several lengths.
 
     Returns:
-        Both stiffnesses at each length, their differences, and what explains them.
+        Both stiffnesses at each length, their differences, and the explanation.
     """
     return {
         "size": sweep.comparisons[0].size,
@@ -92,10 +92,10 @@ def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
 
 
 def stress_results(peak: "PeakStress") -> dict[str, Any]:
-    """The object that ``--json`` writes for the peak stress of a wrench.
+    """Return the object that ``--json`` writes for the peak stress of a wrench.
 
     Args:
-        peak: by finite elements, perhaps with the beam's beside it.
+        peak: by finite elements, and by the beam formula if a section is known.
 
     Returns:
         Values, places and the region they are from.
@@ -118,7 +118,7 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
 
 
 def link_text(link: LinkStiffness) -> str:
-    """A link for a reader: its stiffness, how good it is, its mesh.
+    """Return a link as text: its stiffness, estimated error and mesh.
 
     Args:
         link: a link.
@@ -132,10 +132,10 @@ def link_text(link: LinkStiffness) -> str:
     if not link.mesh:
         return "\n".join(lines)
     mesh = link.mesh
-    asked = "reached" if mesh["reached"] else "NOT reached within the budget"
+    outcome = "reached" if mesh["reached"] else "NOT reached within the budget"
     lines += [
         f"largest relative error: {link.relative_error_estimate:.2g} (estimate); "
-        f"the asked {mesh['accuracy']:g} was {asked}",
+        f"the required {mesh['accuracy']:g} was {outcome}",
         f"mesh: {mesh['elements']} elements, {mesh['unknowns']} unknowns, "
         f"volume {mesh['volume']:.6g} m^3 (surface {mesh['surface_volume']:.6g}), "
         f"{'closed' if mesh['closed'] else 'OPEN'}, "
@@ -155,7 +155,7 @@ def link_text(link: LinkStiffness) -> str:
         )
     if mesh.get("drawn_out"):
         lines.append(
-            "the bar's section was drawn out: its elements are long on purpose"
+            "the bar's section was extruded: its elements are long by intention"
         )
     lines += [f"repaired: {repair}" for repair in mesh["repairs"]]
     if link.mass > 0:
@@ -165,7 +165,7 @@ def link_text(link: LinkStiffness) -> str:
 
 
 def comparison_text(comparison: LinkComparison) -> str:
-    """A beam beside finite elements, for a reader.
+    """Return a comparison of beam and finite elements as text.
 
     Args:
         comparison: of one link by two methods.
@@ -187,7 +187,7 @@ def comparison_text(comparison: LinkComparison) -> str:
 
 
 def sweep_text(sweep: "SlendernessSweep") -> str:
-    """A sweep over slenderness for a reader.
+    """Return a sweep over slenderness as text.
 
     Args:
         sweep: one section at several lengths.
@@ -212,10 +212,10 @@ def sweep_text(sweep: "SlendernessSweep") -> str:
 
 
 def stress_text(peak: "PeakStress") -> str:
-    """The peak stress of a wrench, for a reader.
+    """Return the peak stress of a wrench as text.
 
     Args:
-        peak: by finite elements, perhaps with the beam's beside it.
+        peak: by finite elements, and by the beam formula if a section is known.
 
     Returns:
         Lines of text.
@@ -223,7 +223,7 @@ def stress_text(peak: "PeakStress") -> str:
     lines = [
         f"largest von Mises stress {_megapascals(peak.von_mises, peak.place)}",
         f"estimated error of the mesh: {_stress_error(peak)}",
-        f"looked at: {peak.region}",
+        f"evaluated region: {peak.region}",
     ]
     if peak.beam is not None:
         lines += [
@@ -234,7 +234,7 @@ def stress_text(peak: "PeakStress") -> str:
 
 
 def _stress_error(peak: "PeakStress") -> str:
-    """A stress's estimated error, or why there is none."""
+    """Return a stress's estimated error, or why there is none."""
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
@@ -242,13 +242,13 @@ def _stress_error(peak: "PeakStress") -> str:
 
 
 def _megapascals(stress: float, place: NDArray) -> str:
-    """A stress and where it is."""
+    """Return the text of a stress and its location."""
     where = ", ".join(f"{v:.4g}" for v in np.where(np.abs(place) < 1e-9, 0, place))
     return f"{value_text('von_mises', stress)} at ({where}) m"
 
 
 def matrix_text(stiffness: NDArray) -> str:
-    """A stiffness with its rows and columns named.
+    """Return a stiffness with its rows and columns named.
 
     Args:
         stiffness: (6, 6).
@@ -260,7 +260,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Lines of a 6 by 6 matrix, rounding noise as zero."""
+    """Return the lines of a 6 by 6 matrix, rounding noise as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)

@@ -37,11 +37,11 @@ class SlendernessSweep:
     """One section at several lengths, by beam and by finite elements.
 
     Attributes:
-        comparisons: a beam beside finite elements, shortest first.
+        comparisons: of beam and finite elements, shortest first.
         end_effect: (6, 6) [1] c, for K scaled by sqrt(K_ii K_jj) of the beam.
-        end_effect_error: (6, 6) [1] what the meshes' estimated errors are worth in c.
+        end_effect_error: (6, 6) [1] error of c due to the meshes' estimated errors.
         second: (6, 6) [1] d.
-        residual: (n, 6, 6) [1] differences that c and d leave.
+        residual: (n, 6, 6) [1] differences minus the fit.
     """
 
     comparisons: tuple[LinkComparison, ...]
@@ -59,7 +59,7 @@ class SlendernessSweep:
 
     @property
     def explanation(self) -> str:
-        """What the ends add, in words."""
+        """The end effect, in words."""
         c, error = np.diag(self.end_effect), np.diag(self.end_effect_error)
         turns, shifts = (" ".join(f"{v:.3f}" for v in part) for part in (c[:3], c[3:]))
         left = 100 * np.abs(self.residual).max()
@@ -67,8 +67,8 @@ class SlendernessSweep:
         return (
             f"Held faces cannot warp or shrink: K / K_beam = 1 + c r / L + d (r / L)^2 "
             f"with c = {turns} (rotations), {shifts} (translations), +- "
-            f"{error.max():.2g} by the meshes.  Left over: {left:.2g} % at most, where "
-            f"the meshes are good to {mesh:.2g} %."
+            f"{error.max():.2g} by the meshes.  The residual is at most {left:.2g} %, "
+            f"the estimated mesh error {mesh:.2g} %."
         )
 
 
@@ -91,7 +91,7 @@ def sweep_slenderness(
         nu: [-] Poisson's ratio.
         ratios: L / r, two or more, r as in
             :attr:`stiffness.beam.sections.Section.size`.
-        accuracy: [1] asked of finite elements.
+        accuracy: [1] required relative error of finite elements.
         interface: of the solid's ends.
         update: called with lengths done and wanted.
 

@@ -199,7 +199,7 @@ def test_what_is_not_there_is_named(spec, tmp_path):
         (("radius", "radios"), 'unknown length "radios"'),
         (("0.01", "-0.01"), "radius: found -0.01, expected a length > 0"),
         (("0.01", '"a"'), "expected a finite number, or a list"),
-        (("[0.2, 0.3]", "[0.2, 0.2]"), "a value stands there twice"),
+        (("[0.2, 0.3]", "[0.2, 0.2]"), "a value is given twice"),
         (("young = 6e10", ""), "young: missing"),
         (('"beam"', '"bem"'), '"beam"'),
         (('shape = "round"', 'shape = "tube"'), "inner_radius: missing"),

@@ -276,7 +276,9 @@ def test_a_section_turned_by_a_quarter_is_told_apart_from_held_ends(axis):
         turned = compare_link(beam, solid, 0.03)
         assert turned.better_turn == (90, pytest.approx(0.02))
         assert np.abs(turned.difference).max() > 5
-        assert "axes look swapped: turned by a quarter about base" in turned.explanation
+        assert (
+            "axes look swapped: turned by 90 degrees about base" in turned.explanation
+        )
         assert "Held faces" not in turned.explanation
         assert comparison_results(turned)["axes_turned"] == 90
 
