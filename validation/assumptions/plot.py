@@ -56,6 +56,6 @@ def platform_cost_figure(
         middle = [100 * np.nanmedian(costs.by_link[name]) for name in links]
         panels[-1].barh(names, middle, color="C0")
     panels[-1].set_xlabel(
-        "that link alone a beam [%]" + (", median and largest" if many else "")
+        "only that link a beam [%]" + (", median and largest" if many else "")
     )
     return figure

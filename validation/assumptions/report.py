@@ -1,4 +1,4 @@
-"""What assumptions cost, for machines and for people."""
+"""Errors due to the model's assumptions, as plain values and as text."""
 
 import math
 from collections import Counter
@@ -13,19 +13,19 @@ from validation.assumptions.over_poses import CostsOverPoses
 from validation.assumptions.platform_cost import PlatformCosts
 from validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
-# what each figure of the platform's compliance compares
+# models compared by each figure of the platform's compliance
 COMPARED = {
     "beams": "beams, not solids",
     "meshed": "meshed K_E, not solids",
-    "ends": "rigid ends, not spread",
+    "ends": "rigid ends, not wrenches spread over them",
 }
 _LIMITS = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
-_NAMED = 3  # links that people are told
+_NAMED = 3  # largest number of links named in the text
 _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Costs at one pose: [rad], [m], [-]; where not known, the reason."""
+    """Return the errors at one pose [rad], [m], [-], or the reason for none."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -33,7 +33,7 @@ def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Costs at every pose, and over all of them median and largest."""
+    """Return the errors at every pose, and their median and largest values."""
     poses: list[dict[str, Any]] = []
     for asked, why in zip(costs.asked, costs.unreached, strict=True):
         row: dict[str, Any] = {"asked": asked, "status": "ok"}
@@ -55,7 +55,7 @@ def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
-    """Costs at the i-th pose reached."""
+    """Return the errors at the i-th pose reached."""
     platform: dict[str, Any] = {"reason": costs.platform}
     if isinstance(costs.platform, PlatformCosts):
         platform = _platform(costs.platform, lambda values: values[i])
@@ -64,7 +64,7 @@ def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
 
 
 def _values(cost: Cost | str) -> dict[str, Any]:
-    """One cost, or the reason why there is none."""
+    """Return one error, or the reason why there is none."""
     if isinstance(cost, str):
         return {"reason": cost}
     values = {k: v for k, v in vars(cost).items() if v is not None}
@@ -72,7 +72,7 @@ def _values(cost: Cost | str) -> dict[str, Any]:
 
 
 def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
-    """The platform's compliance: [-], largest along any wrench."""
+    """Return errors of the platform's compliance [-], largest along any wrench."""
     return {
         "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
         "by_link": {name: shown(values) for name, values in costs.by_link.items()},
@@ -81,7 +81,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
 
 
 def _spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
-    """Median and largest of what is known, and where that is."""
+    """Return the median and largest finite value, and the pose of the largest."""
     known = np.isfinite(values)
     if not known.any():
         return {"median": np.nan, "largest": np.nan, "at": None}
@@ -92,7 +92,7 @@ def _spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
 
 
 def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
-    """One assumption over the poses: its costs, and why others are not known."""
+    """Return one assumption's errors over the poses, and reasons for missing ones."""
     pairs = [
         (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
     ]
@@ -107,26 +107,30 @@ def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
 
 
 def costs_text(costs: CostsOverPoses) -> str:
-    """Costs at one pose, a line each."""
-    lines = [f"{costs.robot.name}: what assumptions cost"]
+    """Return the errors at one pose, a line each."""
+    lines = [f"{costs.robot.name}: errors due to the model's assumptions"]
     for name, cost in costs.costs[0].items():
         if isinstance(cost, str):
             lines.append(f"{name:>30}: {cost}")
             continue
-        mark = "  beyond 20 um or 1 %" if cost.matters else ""
+        mark = "  above 20 um or 1 %" if cost.matters else ""
         lines.append(
             f"{name:>30}: {1e6 * cost.position:8.3g} um  {1e6 * cost.rotation:8.3g} "
             f"urad  {_energy_text(cost.energy)}{mark}"
-            + (f"; {cost.pieces} pieces leave less" if mark and cost.pieces else "")
+            + (
+                f"; below with {cost.pieces} pieces per beam"
+                if mark and cost.pieces
+                else ""
+            )
         )
     return "\n".join([*lines, *_platform_lines(costs)])
 
 
 def over_poses_text(costs: CostsOverPoses) -> str:
-    """Costs over all poses: a line each, median, largest, and where it is."""
+    """Return the errors over all poses: a line each, median, largest, and its pose."""
     count = len(costs.reached)
     lines = [
-        f"{costs.robot.name}: what assumptions cost over {count} of "
+        f"{costs.robot.name}: errors due to the model's assumptions over {count} of "
         f"{len(costs.asked)} poses, median and largest"
     ]
     for name in costs.assumptions:
@@ -139,7 +143,7 @@ def over_poses_text(costs: CostsOverPoses) -> str:
             lines.append(
                 f"{name:>30}: {1e6 * position['median']:8.3g} "
                 f"{1e6 * position['largest']:8.3g} um  {100 * energy['median']:8.3g} "
-                f"{_energy_text(energy['largest'])}; beyond 20 um or 1 % at "
+                f"{_energy_text(energy['largest'])}; above 20 um or 1 % at "
                 f"{row['matters']} of {row['known']}, most at "
                 f"{_pose_text(position['at'])}"
             )
@@ -147,14 +151,14 @@ def over_poses_text(costs: CostsOverPoses) -> str:
 
 
 def _energy_text(share: float) -> str:
-    """A relative difference of energies; without any there is none."""
+    """Return the text of a relative difference of energies."""
     if math.isnan(share):
         return "no energy is stored"
     return f"{100 * share:8.3g} % of the energy"
 
 
 def _platform_lines(over: CostsOverPoses) -> list[str]:
-    """The platform's compliance; of many poses the median and the largest."""
+    """Return lines on the platform's compliance; of many poses median and largest."""
     costs = over.platform
     if isinstance(costs, str):
         return [f"{'stiffness by solids':>30}: {costs}"]
@@ -165,23 +169,25 @@ def _platform_lines(over: CostsOverPoses) -> list[str]:
     ]
     rows = {text: getattr(costs, name) for name, text in COMPARED.items()}
     for name in list(costs.by_link)[:_NAMED]:
-        rows[f"{name} alone a beam"] = costs.by_link[name]
+        rows[f"only {name} a beam"] = costs.by_link[name]
     for text, values in rows.items():
         row = _spread(values, over.reached)
         middle = f"{100 * row['median']:8.3g} " if many else ""
         place = f" at {_pose_text(row['at'])}" if many else ""
         lines.append(f"{text:>30}: {middle}{100 * row['largest']:8.3g} %{place}")
-    lines.append(f"{'the meshes themselves':>30}: {100 * costs.mesh_error:8.3g} %")
+    lines.append(f"{'estimated mesh error':>30}: {100 * costs.mesh_error:8.3g} %")
     free = int(np.isnan(costs.beams).sum())
     if free:
-        lines.append(f"at {free} poses a motion of the platform is free: not compared")
+        lines.append(f"not compared at {free} poses, where the platform moves freely")
     if costs.left:
-        lines.append(f"without a shape, as declared: {', '.join(costs.left)}")
+        lines.append(
+            f"links without a shape, stiffness as declared: {', '.join(costs.left)}"
+        )
     return lines
 
 
 def _pose_text(asked: _Pose | None) -> str:
-    """Such as ``tx=0.1, tz=-0.5``; nowhere without a number."""
+    """Return the text of a pose, such as ``tx=0.1, tz=-0.5``; ``-`` for none."""
     if asked is None:
         return "-"
     return ", ".join(f"{name}={value:.6g}" for name, value in asked.items())

@@ -48,7 +48,7 @@ def text(carried: CarriedRobot) -> str:
     lines = []
     if carried.fit.machine.numbers:
         lines.append(
-            f"the robot's own {len(carried.fit.machine.numbers)} numbers: fitted too, "
+            f"the robot's {len(carried.fit.machine.numbers)} parameters: fitted too, "
             f"with {carried.fit.widened:.3g} times their covariance as prior"
         )
     for one in carried.sessions:
@@ -57,18 +57,19 @@ def text(carried: CarriedRobot) -> str:
         lines.append(f"  others, as carried over: {readings_text(vars(one.error))}")
         lines.append(f"  others, declared robot: {readings_text(vars(one.declared))}")
         lines.append(
-            f"  open by the set-up rows: {in_unit(one.uncertainty, 'um')}; "
-            f"their own error is {in_unit(one.left, 'um')}, "
-            f"{in_unit(one.held, 'um')} from the robot as saved"
+            f"  uncertainty after the set-up rows: {in_unit(one.uncertainty, 'um')}; "
+            f"their residual: {in_unit(one.left, 'um')}, by the robot as saved "
+            f"{in_unit(one.held, 'um')}"
         )
         lines += [
-            f"  left behind, of the session it was learned in: {title}"
+            f"  not carried over, an effect of an earlier session: {title}"
             for title in one.left_behind
         ]
         if not one.suffices:
             lines.append(
-                f"  the set-up rows do not suffice: they leave {', '.join(one.open_)} "
-                "open; expected rows elsewhere, and in other orientations"
+                "  the set-up rows do not suffice to determine "
+                f"{', '.join(one.open_)}; expected rows at other places, in other "
+                "orientations"
             )
         elif not one.better:
             lines.append("  worse than the declared robot: it does not carry over")

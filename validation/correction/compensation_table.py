@@ -149,7 +149,7 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",
-        "expected": "to be expected",
+        "expected": "expected",
     }  # fmt: skip
     for key, words in says.items():
         size = table["error"][key]
@@ -159,8 +159,8 @@ def summary_text(compensation: Compensation, table: Mapping[str, Any]) -> str:
             lines.append(f"{words}: {readings_text(size)}")
     if table["error"]["expected"]["position"] is None:
         lines.append(
-            "to be expected: what the robot's diagnosis left (--diagnosed says it); "
-            "the file states no uncertainty"
+            "expected: the residual of the robot's diagnosis (see --diagnosed); the "
+            "file states no uncertainty"
         )
     if table["not_measured"]:
         lines.append(

@@ -152,7 +152,7 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
     angles = compare_signatures(columns)
     return matrix(
         angles.shared, angles.names, "share of the row that the column can imitate",
-        "1: whatever the row's effect does, the column's can do as well.", around=False,
+        "1: the column's effect can reproduce every effect of the row's.", around=False,
     )  # fmt: skip
 
 

@@ -23,10 +23,10 @@ from validation.diagnosis.next_measurement import load_text
 from validation.diagnosis.sentence import calibration_text, open_text
 
 _ASSUMED = (
-    "Held-out rows chose and fitted nothing; errors before and after are theirs.",
-    "Readings scatter as their sigma states, unless the noise below says otherwise.",
-    "An effect that is none of the library shows as a function learned, or as outside "
-    "the library; effects that the design cannot tell apart are named together.",
+    "Errors before and after are of held-out rows, which chose and fitted nothing.",
+    "The noise of the readings is their stated sigma, unless stated otherwise below.",
+    "An effect that the library lacks is found as a learned function, or as outside "
+    "the library; effects that the design cannot distinguish are named together.",
 )
 NOWHERE = Provenance()
 Table = dict[str, Any]
@@ -43,7 +43,7 @@ def write_report(
     Args:
         diagnosis: the diagnosis.
         path: of the page.
-        tally: how often it is right on this design, if that was simulated.
+        tally: simulated success rate on this design, if it was computed.
         provenance: command and files.
 
     Raises:
@@ -57,40 +57,43 @@ def report_page(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> str:
-    """The page as HTML with its charts inside; see :func:`write_report`."""
-    campaign, told = diagnosis.campaign, results.table(diagnosis, tally)
+    """Return the page as HTML with its charts inside; see :func:`write_report`."""
+    campaign, answer = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
-        section("Before and after", figures.error_chart(diagnosis)),
+        section("Errors before and after", figures.error_chart(diagnosis)),
         section(
-            "Models, and what each reduces",
+            "Models and error reduction",
             figures.sequence_chart(diagnosis),
-            _steps(told),
+            _steps(answer),
         ),
-        *_section(
-            "The robot where the error is largest", figures.worst_robot(diagnosis)
-        ),
-        *_section("Learned", _learned(told)),
-        *_section(*_parameters(told)),
-        section("Where the residual is", figures.vector_charts(diagnosis)),
+        *_section("The robot at the largest error", figures.worst_robot(diagnosis)),
+        *_section("Learned functions", _learned(answer)),
+        *_section(*_parameters(answer)),
+        section("Residual of the rows", figures.vector_charts(diagnosis)),
         section(
-            "What it varies with",
+            "Variation of the residual",
             figures.covariate_charts(diagnosis),
-            *_structure(told),
+            *_structure(answer),
         ),
-        section("Which effect", figures.probability_chart(diagnosis), _sets(told)),
         section(
-            "What this design can tell apart", figures.confounding_chart(diagnosis)
+            "Probability of the effects",
+            figures.probability_chart(diagnosis),
+            _sets(answer),
         ),
-        *_next(told),
+        section(
+            "Effects that this design distinguishes",
+            figures.confounding_chart(diagnosis),
+        ),
+        *_next(answer),
         section("Noise and outliers", *map(paragraph, _noise(diagnosis))),
     ]
     if tally is not None:
-        told_tally = paragraph(calibration_text(tally))
-        body.append(section("How often this is right", told_tally))
+        tally_text = paragraph(calibration_text(tally))
+        body.append(section("Simulated success rate", tally_text))
     return page(
         Page(
             title=f"Diagnosis of {campaign.name}",
-            verdict=told["sentence"],
+            verdict=answer["sentence"],
             good=diagnosis.verdict in {EXPLAINED, LEARNED, NONE_NEEDED},
             tiles=_tiles(diagnosis),
             about=f"{len(campaign)} rows, robot {campaign.robot.name}; "
@@ -98,18 +101,18 @@ def report_page(
             body=body,
             assumed=_ASSUMED,
             provenance=provenance,
-            results=told,
+            results=answer,
         )
     )
 
 
 def _section(title: str, content: str) -> list[str]:
-    """A section, unless it is empty."""
+    """Return a section, unless it is empty."""
     return [section(title, content)] if content else []
 
 
 def _tiles(diagnosis: Diagnosis) -> list[Tile]:
-    """Verdict, error before and after, the likeliest effect, what to measure."""
+    """Return verdict, error before and after, likeliest effect, next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
     for kind, unit in (("position", "m"), ("rotation", "rad")):
@@ -120,93 +123,97 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
             ], ["before and after, on held-out rows."]))  # fmt: skip
     names = " + ".join(diagnosis.effects) or "nothing"
     likely = max(diagnosis.probability.values(), default=0.0)
-    tiles.append(Tile("Likeliest cause", [names.replace("_", " ")],
-                      [f"probability of an effect up to {likely:.3f}."]))  # fmt: skip
+    tiles.append(Tile("Most probable cause", [names.replace("_", " ")],
+                      [f"largest probability of an effect {likely:.3f}."]))  # fmt: skip
     if diagnosis.next is not None:
-        tiles.append(Tile("Measure next", [diagnosis.next.why]))
+        tiles.append(Tile("Next measurement", [diagnosis.next.why]))
     return tiles
 
 
-def _steps(told: Table) -> str:
-    """Table of the model sequence."""
+def _steps(answer: Table) -> str:
+    """Return the table of the model sequence."""
     rows: list[list[Cell]] = [
         [row["term"], f"{row['unknowns']:.0f}",
          Value(row["kept_aside_rms"], row["unit"], 3),
          Value(row["kept_aside_sigma"], "", 3)]
-        for row in told["ladder"]
+        for row in answer["ladder"]
     ]  # fmt: skip
-    return table(["model", "unknowns", "rms held out", "sigma"], rows, "steps")
+    return table(["model", "unknowns", "held-out rms", "sigma"], rows, "steps")
 
 
-def _sets(told: Table) -> str:
-    """Table of the sets of effects."""
+def _sets(answer: Table) -> str:
+    """Return the table of the sets of effects."""
     rows: list[list[Cell]] = [
         [" + ".join(one["names"]) or "none", one["probability"]]
-        for one in told["alternatives"]
+        for one in answer["alternatives"]
     ]
     return table(["set of effects", Column("probability", digits=3)], rows)
 
 
-def _learned(told: Table) -> str:
-    """Table of the functions learned."""
+def _learned(answer: Table) -> str:
+    """Return the table of the functions learned."""
     rows = [
         [f"{one['where']} {', '.join(one['components'])}", ", ".join(one["variables"]),
          one["form"], one["formula"]]
-        for one in told["learned"]
+        for one in answer["learned"]
     ]  # fmt: skip
     head = ["where", "of", "form", "value [rad, m, per N m or N]"]
     return table(head, rows) if rows else ""
 
 
-def _parameters(told: Table) -> tuple[str, str]:
-    """Title and table of the best set's numbers."""
+def _parameters(answer: Table) -> tuple[str, str]:
+    """Return the title and table of the best set's parameters."""
     rows: list[list[Cell]] = [
         [f"{effect['name']}: {p['name']}", Value(p["value"], p["unit"], 6),
          Value(p["std"], p["unit"], 2),
          *(Value(end, p["unit"], 6) for end in p["interval_90"])]
-        for effect in told["effects"] for p in effect["parameters"]
+        for effect in answer["effects"] for p in effect["parameters"]
     ]  # fmt: skip
-    title = "Parameters, if so" if told["verdict"] == AMBIGUOUS else "Parameters"
+    title = (
+        "Parameters of the best set" if answer["verdict"] == AMBIGUOUS else "Parameters"
+    )
     head = ["parameter", "value", "standard deviation", "at least (90 %)", "at most"]
-    listed = told["verdict"] in results.LISTED
+    listed = answer["verdict"] in results.LISTED
     return title, table(head, rows, "parameters") if listed else ""
 
 
-def _structure(told: Table) -> list[str]:
-    """Table of what the residual varies with."""
+def _structure(answer: Table) -> list[str]:
+    """Return the table of variables with which the residual varies."""
     rows: list[list[Cell]] = [
         [t["against"], f"{100 * t['share']:.0f} %", f"{t['probability']:.1g}"]
-        for t in told["structure"]
+        for t in answer["structure"]
     ]
     if not rows:
         return []
     return [
-        paragraph("What is left after the best set of effects varies with:"),
-        table(["against", "share of its square", "by chance"], rows),
+        paragraph("The residual after the best set of effects varies with:"),
+        table(
+            ["variable", "share of the squared residual", "probability by chance"], rows
+        ),
     ]
 
 
-def _next(told: Table) -> list[str]:
-    """What to measure next."""
-    following = told["next_measurement"]
+def _next(answer: Table) -> list[str]:
+    """Return the section on the next measurement."""
+    following = answer["next_measurement"]
     if following is None:
         return []
     rows = [[k, f"{v:.6g}"] for k, v in following["configuration"].items()]
     rows.append(["load [N m, N]", load_text(following["load"])])
     rows += [[k, f"{v:g}"] for k, v in following["covariates"].items()]
     commands = table(["command", "value"], rows)
-    return [section("Measure next", paragraph(f"{following['why']}."), commands)]
+    return [section("Next measurement", paragraph(f"{following['why']}."), commands)]
 
 
 def _noise(diagnosis: Diagnosis) -> list[str]:
-    """How the noise was judged, and which rows were left out."""
+    """Return sentences on the noise and on outliers."""
     lack = diagnosis.lack
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
-    repeats = "no repeats to judge it by"
+    repeats = "there are no repeats"
     if lack.repeats_freedom:
-        repeats = f"{lack.repeats:.2f} between repeats"
+        repeats = f"between repeats {lack.repeats:.2f} times"
     texts = [
-        f"What is left is {lack.rms:.2f} of the stated sigma (probability "
+        f"The residual is {lack.rms:.2f} times the stated sigma (probability "
         f"{lack.probability:.2g} by chance); {repeats}.",
         f"Left out as outliers: {', '.join(far) or 'none'}.",
     ]

@@ -1,4 +1,4 @@
-"""A diagnosis for machines, in the public format."""
+"""A diagnosis as plain values, in the public format."""
 
 import math
 from dataclasses import asdict
@@ -19,13 +19,13 @@ from validation.diagnosis.sequence import LEARNED
 
 # verdicts that list effects
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # of an unknown known: its frame is not listed
+_HARDLY = 0.05  # combinations determined; frames with fewer are not listed
 _INTERVAL = 1.645  # standard deviations of a normal distribution: 90 % lie within
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """The diagnosis in the public format, with a tally if one was simulated."""
+    """Return the diagnosis in the public format, with a tally if one was simulated."""
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -90,12 +90,12 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def _plain(one: Any) -> dict[str, Any] | None:
-    """A dataclass as plain values, if there is one."""
+    """Return a dataclass as plain values, if there is one."""
     return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The model sequence in the public format, rms in m or, without positions, rad."""
+    """Return the model sequence; rms in m or, without positions, in rad."""
     rows = []
     for step in diagnosis.sequence:
         error = step.error
@@ -112,15 +112,16 @@ def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
-    """Geometric errors, or springs, of all frames in the public format.
+    """Return the geometric errors, or springs, of all frames in the public format.
 
     Args:
         diagnosis: a diagnosis.
         name: ``"geometry"`` or ``"springs"``.
 
     Returns:
-        Sizes of the prior, how many combinations the readings say, and every unknown
-        with the share that they say; None if the machine is as declared.
+        Prior standard deviations, the number of combinations that the readings
+        determine, and every unknown with its determined share; None if the machine is
+        as declared.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -146,21 +147,21 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         "parameters": [
             {
                 "frame": frames[i].name, "component": READING[axis],
-                "value": float(v), "std": float(s), "identified": float(told),
+                "value": float(v), "std": float(s), "identified": float(identified),
                 "unit": _UNITS[name][axis // 3],
             }
-            for i, axis, v, s, told
+            for i, axis, v, s, identified
             in zip(part.frame, part.axis, fit.x[own], fit.std[own], share, strict=True)
         ],
     }  # fmt: skip
 
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Effects of the machine found with their parameters, as in the public format.
+    """Return the effects found with their parameters, in the public format.
 
     Returns:
-        Of an effect that the robot's file declares, the value is what the saved robot
-        has; what was declared and the difference found are given with it.
+        The effects; of one that the robot's file declares, the value of the saved
+        robot, the declared value and the difference.
     """
     bare, shown = diagnosis.campaign.robot.without_effects(), []
     for one in diagnosis.fit.effects:
@@ -181,7 +182,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
-    """A parameter of the machine, with what was declared if it was."""
+    """Return a parameter of the machine, with its declared value if any."""
     found = {"declared": p.declared, "difference": p.difference, "corrected": p.value}
     return {
         "name": p.name, "value": p.value, "std": p.std,
@@ -192,7 +193,7 @@ def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
 
 
 def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Geometric errors and springs, where no effect of the library is named."""
+    """Return geometric errors and springs, where no effect of the library is named."""
     if diagnosis.effects or diagnosis.fit.unknowns.functions:
         return []
     found = [(words, small(diagnosis, name)) for name, words in WORDS.items()]
@@ -206,7 +207,7 @@ def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """What was learned, in the public format: a function of a robot file each."""
+    """Return the learned functions in the public format."""
     sequence = diagnosis.sequence
     places = [k for k, s in enumerate(sequence) if s.term == LEARNED]
     places = places or [len(sequence) - 1]

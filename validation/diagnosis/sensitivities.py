@@ -45,7 +45,7 @@ _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """How readings respond to a component at any place; the rows' variables."""
+    """Derivatives of readings with a component at any place; the rows' variables."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
         """Store R rows as declared, and their response."""

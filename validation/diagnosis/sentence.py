@@ -25,8 +25,8 @@ WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 def sentence(diagnosis: Diagnosis) -> str:
     """Return the sentences that the evidence supports."""
     if diagnosis.setup:
-        said = "; ".join(one.sentence for one in diagnosis.setup)
-        return f"The campaign is set up wrongly: {said}"
+        faults = "; ".join(one.sentence for one in diagnosis.setup)
+        return f"The campaign is set up wrongly: {faults}"
     where = {  # rows of the errors before and after
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
@@ -40,8 +40,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     both = f"{kept}, {after:.2f}{unsure} after ({noise:.3g} is noise)"
     if diagnosis.verdict == NONE_NEEDED:
         return (
-            "The declared model is enough: the residual is noise as far as this design "
-            f"can tell ({before} on {where})."
+            "The declared model suffices: this design cannot distinguish the residual "
+            f"from noise ({before} on {where})."
         )
     if diagnosis.verdict == EXPLAINED:
         small = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
@@ -49,19 +49,19 @@ def sentence(diagnosis: Diagnosis) -> str:
         return f"The declared model lacks {names}; {both}."
     if diagnosis.verdict == LEARNED:
         names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
-        return f"The library lacks what was learned: {names}; {both}."
+        return f"The declared model lacks {names} (with learned functions); {both}."
     if diagnosis.verdict == AMBIGUOUS:
         sets = " or ".join(
             " + ".join(names) or "nothing" for names, _ in diagnosis.alternatives[:4]
         )
-        return f"This design cannot tell which effect it is: {sets}; {kept}."
+        return f"This design cannot distinguish these effects: {sets}; {kept}."
     if diagnosis.verdict == NOT_ENOUGH_ROWS:
-        return f"These rows are too few to tell a cause from chance; {both}."
+        return f"These rows are too few to distinguish a cause from chance; {both}."
     seen = ", ".join(t.against for t in diagnosis.trends[:3])
-    varies = f", which vary with {seen}" if seen else ""
+    varies = f", which varies with {seen}" if seen else ""
     return (
-        "No effect of the library explains the residual: of the fitted rows "
-        f"{diagnosis.lack.rms:.2f} sigma stay{varies}; {both}."
+        "No effect of the library explains the residual of the fitted rows, "
+        f"{diagnosis.lack.rms:.2f} sigma{varies}; {both}."
     )
 
 
@@ -77,10 +77,14 @@ def calibration_text(tally: Calibration) -> str:
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
 
-    named = "" if math.isnan(tally.right) else f"; {100 * tally.right:.0f} % named it"
+    named = (
+        ""
+        if math.isnan(tally.right)
+        else f"; {100 * tally.right:.0f} % named the effects"
+    )
     return (
         f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
-        f"{counts(tally.without)}; with what was found {counts(tally.with_found)}"
+        f"{counts(tally.without)}; with the effects found {counts(tally.with_found)}"
         f"{named}; false claims {100 * tally.false_claims:.1f} %"
     )
 

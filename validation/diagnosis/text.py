@@ -14,52 +14,58 @@ Table = dict[str, Any]
 
 
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
-    """The diagnosis for a terminal."""
-    told = table(diagnosis, tally)
-    lines = [f"{told['campaign']}: {told['verdict']}", told["sentence"], ""]
-    for effect in told["effects"]:
+    """Return the diagnosis for a terminal."""
+    answer = table(diagnosis, tally)
+    lines = [f"{answer['campaign']}: {answer['verdict']}", answer["sentence"], ""]
+    for effect in answer["effects"]:
         lines += _effect_lines(effect)
     for name in (GEOMETRY, SPRINGS):
-        lines += _small_lines(told[name], name)
-    for function in told["learned"]:
+        lines += _small_lines(answer[name], name)
+    for function in answer["learned"]:
         lines += _function_lines(function)
     lines += ["", "sets of effects, by probability:"]
-    for one in told["alternatives"]:
+    for one in answer["alternatives"]:
         lines.append(
             f"  {one['probability']:6.3f}  {' + '.join(one['names']) or 'none'}"
         )
-    lines += ["", *_error_lines(told), "", *_sequence_lines(told), *told["remarks"]]
-    said = {
-        "what would decide": told["needed"],
-        "not measured": ", ".join(told["not_measured"]),
+    lines += [
+        "",
+        *_error_lines(answer),
+        "",
+        *_sequence_lines(answer),
+        *answer["remarks"],
+    ]
+    notes = {
+        "measurement that would decide": answer["needed"],
+        "not measured": ", ".join(answer["not_measured"]),
     }
-    for what, words in said.items():
+    for what, words in notes.items():
         lines += ["", f"{what}: {words}"] if words else []
-    lines += told["noise_scale"]["findings"]
-    if told["noise_in_time"] is not None:
-        share, constant = (told["noise_in_time"][k] for k in ("share", "constant"))
+    lines += answer["noise_scale"]["findings"]
+    if answer["noise_in_time"] is not None:
+        share, constant = (answer["noise_in_time"][k] for k in ("share", "constant"))
         lines += [
             "",
             f"noise is correlated in time: {100 * share:.0f} % of its variance "
-            f"over {constant:.3g} s; the effects' intervals are wider for it",
+            f"over {constant:.3g} s; the intervals of the effects include it",
         ]
-    if told["outliers"]:
-        lines += ["", f"left out as outliers: {', '.join(told['outliers'])}"]
-    if told["open"]:
+    if answer["outliers"]:
+        lines += ["", f"left out as outliers: {', '.join(answer['outliers'])}"]
+    if answer["open"]:
         lines += ["", open_text(diagnosis.open)]
-    for trend in told["structure"]:
+    for trend in answer["structure"]:
         lines.append(
-            f"left varies with {trend['against']}: {100 * trend['share']:.0f} %"
+            f"residual varies with {trend['against']}: {100 * trend['share']:.0f} %"
         )
-    if told["next_measurement"] is not None:
-        lines += ["", *_next_lines(told["next_measurement"])]
+    if answer["next_measurement"] is not None:
+        lines += ["", *_next_lines(answer["next_measurement"])]
     if tally is not None:
         lines += ["", calibration_text(tally)]
     return "\n".join(lines)
 
 
 def _effect_lines(effect: Table) -> list[str]:
-    """An effect with its parameters; geometry and springs have lines of their own."""
+    """Return lines on an effect; geometry and springs have their own lines."""
     if "combinations" in effect:
         return []
     there = f" in session {effect['session']}" if "session" in effect else ""
@@ -75,7 +81,7 @@ def _effect_lines(effect: Table) -> list[str]:
 
 
 def _small_lines(one: Table | None, name: str) -> list[str]:
-    """Geometry or springs in a few lines."""
+    """Return lines on the geometric errors or springs."""
     if one is None:
         return []
     sizes = ", ".join(
@@ -84,30 +90,30 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
     frames = sorted(one["frames"], key=lambda f: -f["identifiable"])[:6]
     where = ", ".join(f"{f['frame']} {f['identifiable']:.1f}" for f in frames)
     return [
-        f"{WORDS[name]}  (size {sizes or 'as the tolerances say'})",
-        f"  {one['identifiable']:.1f} of {one['unknowns']} known: {where}",
+        f"{WORDS[name]}  (prior std {sizes or 'by the tolerances'})",
+        f"  {one['identifiable']:.1f} of {one['unknowns']} determined: {where}",
     ]
 
 
 def _function_lines(one: Table) -> list[str]:
-    """A function learned, in two to four lines."""
+    """Return a function learned, in two to four lines."""
     formula, parts = one["formula"], one["parts_of_range"]
     short = formula if len(formula) < 160 else f"{formula[:157]}..."
     lines = [f"learned: {one['label']}", f"  {short}"]
     if parts is not None:
         lines.append(
-            "  predicted in parts of {variable} left out: {after:.3g} sigma, "
-            "without it {without:.3g}".format(**parts)
+            "  error in left-out parts of the range of {variable}: {after:.3g} sigma, "
+            "without the function {without:.3g}".format(**parts)
         )
     if one["equivalent_places"]:
-        lines.append(f"  {len(one['equivalent_places'])} other places do as well")
+        lines.append(f"  {len(one['equivalent_places'])} other places fit equally well")
     return lines
 
 
-def _error_lines(told: Table) -> list[str]:
-    """A table of the errors before and after, and of the saved robot."""
-    error, held = told["error"], told["held_out"]
-    noise = {**error["noise"], "normalised": told["noise_scale"]["normalised"]}
+def _error_lines(answer: Table) -> list[str]:
+    """Return a table of the errors before and after, and of the saved robot."""
+    error, held = answer["error"], answer["held_out"]
+    noise = {**error["noise"], "normalised": answer["noise_scale"]["normalised"]}
     columns = error["before"], error["after"], noise, error["saved"]
     lines = [
         f"errors on {held['words']}; saved: on all rows",
@@ -117,16 +123,16 @@ def _error_lines(told: Table) -> list[str]:
         row = [errors[name] for errors in columns]
         cells = [f"{v:>12.3g}" if math.isfinite(v) else f"{'-':>12}" for v in row]
         lines.append(f"{f'{name} [{unit}]':<20}{''.join(cells)}")
-    if set(told["outliers"]) & set(held["ids"]):
+    if set(answer["outliers"]) & set(held["ids"]):
         cut = [error["with_outliers"][k]["normalised"] for k in ("before", "after")]
         cells = [f"{v:>12.3g}" for v in (*cut, noise["normalised"])]
         lines.append(f"{'with outliers':<20}{''.join(cells)}")
     return lines
 
 
-def _sequence_lines(told: Table) -> list[str]:
-    """The model sequence, judged on the held-out rows."""
-    rows, last = told["ladder"], math.nan
+def _sequence_lines(answer: Table) -> list[str]:
+    """Return the model sequence, judged on the held-out rows."""
+    rows, last = answer["ladder"], math.nan
     unit = rows[-1]["unit"]
     lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
     for row in rows:
@@ -140,7 +146,7 @@ def _sequence_lines(told: Table) -> list[str]:
 
 
 def _next_lines(one: Table) -> list[str]:
-    """The measurement that would decide."""
+    """Return the measurement that would decide."""
     where = ", ".join(f"{k}={v:.4g}" for k, v in one["configuration"].items())
     covariates = "".join(f", {k} {v:g}" for k, v in one["covariates"].items())
     return [

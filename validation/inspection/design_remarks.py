@@ -49,7 +49,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
     if absent:
-        text = f"Never measured: {absent}. What only they would show is lost."
+        text = f"Never measured: {absent}. Effects that only they show cannot be found."
         remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]
@@ -98,8 +98,8 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
         remarks.append(Remark("configurations", LOST, text))
     if visits.order == "back to back" and count > 1:
         text = (
-            "Every configuration was measured in one go: whatever changes with time "
-            "looks like an effect of the configuration."
+            "Every configuration was measured without a break: changes with time "
+            "look like effects of the configuration."
         )
         remarks.append(Remark("configurations", LOST, text))
     return remarks
@@ -110,9 +110,8 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was ever applied: compliance and clearances show at most "
-            "through the machine's own weight and inner forces, a wrong load not at "
-            "all."
+            "No load was applied: compliance and clearances show at most through the "
+            "machine's own weight and internal forces, a wrong load not at all."
         )
         return [Remark("load", LOST, text)]
     remarks = []
@@ -121,14 +120,14 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     twice = int((np.bincount(kinds) > 1).sum())
     if len(np.unique(loads.round(9), axis=0)) == 1:
         text = (
-            "One load in every row: what it does cannot be told from errors that are "
-            "there without it, nor a compliance that hardens from one that does not."
+            "One load in every row: its effect cannot be distinguished from errors "
+            "without load, nor a stiffening compliance from a linear one."
         )
         remarks.append(Remark("load", LOST, text))
     elif twice == 0:
         text = (
             "No configuration was measured under two loads: what the load does and "
-            "what the configuration does are told apart by the model alone."
+            "what the configuration does are distinguished by the model alone."
         )
         remarks.append(Remark("load", CAREFUL, text))
     else:
@@ -156,7 +155,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
         what = (
             "thermal expansion looks exactly like longer links"
             if value
-            else "thermal expansion leaves no trace"
+            else "thermal expansion has no effect"
         )
         text = f"The temperature stayed at {value:+.3g} K in every row: {what}."
         return [Remark("temperature", LOST, text)]
@@ -186,7 +185,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
     if not both:
         text = (
             "No configuration was approached from both sides: friction and the "
-            "configuration are told apart by the model alone."
+            "configuration are distinguished by the model alone."
         )
         return [Remark("approach", CAREFUL, text)]
     return [

@@ -1,4 +1,4 @@
-"""An inspection of a campaign in words and lines."""
+"""An inspection of a campaign as text."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from validation.inspection.repeats import RepeatNoise
 
 
 def inspection_text(inspection: Inspection) -> str:
-    """An inspection for people."""
+    """Return an inspection as text."""
     c = inspection.campaign
     kinds = row_counts(c.configuration)
     lines = [
@@ -32,7 +32,7 @@ def inspection_text(inspection: Inspection) -> str:
         "",
         *_separability_lines(inspection),
     ]
-    heads = {LOST: "What this campaign cannot tell:", CAREFUL: "Be careful:"}
+    heads = {LOST: "This campaign cannot determine:", CAREFUL: "Warnings:"}
     for weight, head in heads.items():
         remarks = [f"  {r.text}" for r in inspection.remarks if r.weight == weight]
         lines += ["", head, *remarks] if remarks else []
@@ -40,11 +40,11 @@ def inspection_text(inspection: Inspection) -> str:
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:
-    """Which effects would show, and which look alike."""
+    """Return lines on detectable effects, and on effects that look alike."""
     s = inspection.separability
     lines = ["Effects, at plausible sizes, in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
-    lines.append(f"  would show: {', '.join(shown) or 'none'}")
+    lines.append(f"  detectable: {', '.join(shown) or 'none'}")
     small = s.traced & ~s.visible
     weak = [
         f"{n} (at {s.shows_at[i]:.2g} times that size)"
@@ -52,26 +52,26 @@ def _separability_lines(inspection: Inspection) -> list[str]:
         if small[i]
     ]
     if weak:
-        lines.append(f"  would show only if larger: {', '.join(weak)}")
+        lines.append(f"  detectable only if larger: {', '.join(weak)}")
     none = [n for n, traced in zip(s.names, s.traced, strict=True) if not traced]
     if none:
-        lines.append(f"  leaves no trace: {', '.join(none)}")
+        lines.append(f"  without effect on the readings: {', '.join(none)}")
     for name, why in inspection.signatures.untestable.items():
         lines.append(f"  not testable: {name}: {why}")
     for group in s.classes():
-        lines.append(f"  cannot be told apart: {', '.join(group)}")
+        lines.append(f"  cannot be distinguished: {', '.join(group)}")
     for a, b in s.imitated():
-        lines.append(f"  whatever {a} does, {b} can do as well")
+        lines.append(f"  {b} can reproduce every effect of {a}")
     by_first: dict[str, list[str]] = {}
     for a, b in s.overlapping():
         by_first.setdefault(a, []).append(b)
     for a, others in by_first.items():
-        lines.append(f"  some of what {a} does looks like: {', '.join(others)}")
+        lines.append(f"  {a} is partly reproduced by: {', '.join(others)}")
     return lines
 
 
 def _reading_lines(c: Campaign) -> list[str]:
-    """One line for each component measured."""
+    """Return a line for each component measured."""
     lines = []
     for name, entry in reading_counts(c).items():
         if entry["measured"]:
@@ -86,7 +86,7 @@ def _reading_lines(c: Campaign) -> list[str]:
 
 
 def _load_lines(c: Campaign) -> list[str]:
-    """Levels and sizes of the load."""
+    """Return the levels and sizes of the load."""
     t = load_counts(c)
     return [
         f"load: {t['levels']} levels, up to {t['force'][1]:.4g} N and "
@@ -95,7 +95,7 @@ def _load_lines(c: Campaign) -> list[str]:
 
 
 def _covariate_lines(c: Campaign) -> list[str]:
-    """Range of each covariate."""
+    """Return a line with the range of each covariate."""
     return [
         f"{name}: {t['range'][0]:.4g} ... {t['range'][1]:.4g}, {t['levels']} levels"
         for name, t in covariate_counts(c).items()
@@ -103,7 +103,7 @@ def _covariate_lines(c: Campaign) -> list[str]:
 
 
 def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
-    """Noise from repeats over the stated one, by component, and suspects."""
+    """Return lines on the noise from repeats, by component, and suspects."""
     if noise is None:
         return []
     low, high = noise.interval
@@ -122,5 +122,7 @@ def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
             )
     for s in noise.suspects:
         who = " or ".join(c.ids[i] for i in s.rows)
-        lines.append(f"  suspect: {who}, {s.component}, {abs(s.size):.1f} deviations")
+        lines.append(
+            f"  suspect: {who}, {s.component}, {abs(s.size):.1f} standard deviations"
+        )
     return lines

@@ -95,12 +95,12 @@ def _assembly_text(results: StudyResults) -> str:
     assert assembly is not None
     if not by_force(results):
         if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-            return "It goes together without force, and needs no clearance for it"
-        text = "It goes together by its clearances alone"
+            return "It assembles without force, and needs no clearance"
+        text = "It assembles by its clearances alone"
         return text + (
             "" if zone["assemblable"] else " if its compliant joints turn freely"
         )
-    text = f"It goes together only by force: {assembly.energy:.4g} J"
+    text = f"It assembles only by force: {assembly.energy:.4g} J"
     if zone["margin_free"] is not None:
         text += f", its clearances being {zone['margin_free']:.3g} times too small"
     return text
@@ -111,14 +111,13 @@ def _pose_error_text(results: StudyResults) -> str:
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-    at_rest = (
-        f"with clearances resting at least energy it is {_pose_text(turn, shift)} away."
-    )
+    at_rest = f"in the least-energy solution it is {_pose_text(turn, shift)} away."
     if worst["pose"] is None:
-        return f"How far clearances let its platform go could not be bounded; {at_rest}"
+        return f"Its pose error within the clearances could not be bounded; {at_rest}"
     bound = _bound_text(worst["pose"])
     sentence = [
-        f"Wherever its clearances rest, its platform is {bound} from the nominal pose"
+        f"For all positions within the clearances its platform is {bound} from the "
+        "nominal pose"
     ]
     if worst["map"] is not None:
         over = worst["map"]
@@ -152,7 +151,7 @@ def _bound_text(bounds: dict[str, float]) -> str:
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Sizes of a pose error [rad, m] in mm and mrad."""
+    """Return the sizes of a pose error [rad, m] in mm and mrad."""
     return f"{in_unit(translation, 'mm', 3)} and {in_unit(rotation, 'mrad', 3)}"
 
 
@@ -169,8 +168,8 @@ def covered(results: StudyResults) -> list[str]:
     verdicts = results.verdicts
     if verdicts.get("reference") in _OUTCOMES and results.reference is not None:
         names = [
-            _CHECKED[name] for name, said in results.reference["checks"].items()
-            if said != "no signal"
+            _CHECKED[name] for name, outcome in results.reference["checks"].items()
+            if outcome != "no signal"
         ]  # fmt: skip
         phrases.append(
             f"{', '.join(names)} by the printed problems in cvxpy: "
@@ -187,7 +186,7 @@ def covered(results: StudyResults) -> list[str]:
 def _checks_text(results: StudyResults) -> str:
     """Return a sentence on the independent checks, their results and missing checks."""
     phrases, missing = covered(results), results.unchecked
-    text = "No independent check was asked for."
+    text = "No independent check was requested."
     if phrases:
         text = f"Checked independently: {'; '.join(phrases)}."
         if worst_clearance(results)["pose"] is not None:

@@ -15,8 +15,8 @@ from stiffness.screws import WRENCH
 
 # quantities shown as maps: name in the results, words
 MAPPED = {
-    "translation_error": "largest shift, eq. (27), clearances anywhere",
-    "rotation_error": "largest turn, eq. (27), clearances anywhere",
+    "translation_error": "largest translation, eq. (27), over all clearances",
+    "rotation_error": "largest rotation, eq. (27), over all clearances",
     "energy": "energy, eq. (22)",
     "margin_free": "zone margin, compliant joints free",
     "margin": "zone margin, eq. (21)",
@@ -53,13 +53,14 @@ def mapped(maps: Any) -> Iterator[Mapped]:
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
     if "deflection" in maps:
-        for part, half, unit in (
-            ("shift", slice(3, 6), "m"), ("turn", slice(0, 3), "rad")
-        ):  # fmt: skip
+        for part, name, half, unit in (
+            ("shift", "translation", slice(3, 6), "m"),
+            ("turn", "rotation", slice(0, 3), "rad"),
+        ):
             size = np.sqrt((maps["deflection"].isel(screw=half) ** 2).sum(
                 "screw", skipna=False
             ))  # fmt: skip
-            words = f"{part} by load and weight, clearances at least energy"
+            words = f"{name} by load and weight, least-energy solution"
             yield Mapped(f"deflection_{part}", words, unit, size)
     if "stiffness" in maps:
         for name in WRENCH:

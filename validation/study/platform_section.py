@@ -37,15 +37,13 @@ def platform_section(stiffness: dict[str, Any]) -> str:
         "<h2>Stiffness of the platform K_C</h2><p>Of the nominal robot with its "
         "clearances held at zero, at the platform's origin in base axes [N m/rad, "
         "N/rad, N m/m, N/m]"
-        + (f"; {free} motions that nothing resists" if free else "")
+        + (f"; {free} free motions" if free else "")
         + ".</p>"
         + table(["", *SCREW], rows)
         + f"<p>Eigen-stiffnesses [N/m], angles times "
         f"{stiffness['characteristic_length']:.4g} m: {eigen}.</p>"
-        "<p>Which part gives way: shares in the compliance along each axis [%], the "
-        "largest first.</p>"
-        + table(["part", *DIRECTIONS], blame)
-        + _chart(dict(shares))
+        "<p>Shares of the parts in the compliance along each axis [%], the largest "
+        "first.</p>" + table(["part", *DIRECTIONS], blame) + _chart(dict(shares))
     )
 
 

@@ -29,11 +29,11 @@ from validation.study.service_section import service_section, service_tile
 from validation.study.study import StudyResults, points_solved
 
 _ASSUMED = (
-    "Small screws: the closures are linear in them; the linearisation error and the "
-    "cross-check show what that costs at these errors.",
+    "Motions are small: closures are linear in them; the linearisation error and the "
+    "cross-check show the error of this assumption.",
     "Links are elastic between their ends; no contact stiffness, friction, temperature "
     "or dynamics.",
-    "The cross-check leaves the clearances out on both sides.",
+    "Both models of the cross-check have no clearances.",
     "Between the points of a grid nothing is certified.",
 )
 
@@ -65,7 +65,7 @@ def write_study(results: StudyResults) -> Path:
 
 
 def results_table(results: StudyResults) -> dict[str, Any]:
-    """The results of a study, as plain values."""
+    """Return the results of a study, as plain values."""
     table: dict[str, Any] = {
         "program": f"forcefit {version('forcefit')}",
         "title": results.study.title,
@@ -93,7 +93,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
 
 
 def map_summary(maps: Any) -> dict[str, Any]:
-    """Least, median and largest value of each map, and the counts of the statuses."""
+    """Return least, median, largest value of each map, and counts of statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
     for one in mapped(maps):
@@ -106,7 +106,7 @@ def map_summary(maps: Any) -> dict[str, Any]:
 
 
 def report_page(results: StudyResults) -> str:
-    """The page as HTML, which needs no other file."""
+    """Return the page as HTML, which needs no other file."""
     study, robot = results.study, results.robot
     body = [
         unchecked_section(results),
@@ -144,14 +144,14 @@ def report_page(results: StudyResults) -> str:
 
 
 def _good(results: StudyResults) -> bool | None:
-    """Whether it is what one hopes for; neither where force must close it."""
+    """Return whether the result is favourable; None where force must close it."""
     if not results.passed:
         return False
     return None if by_force(results) else True
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
-    """Worst case, what governs it, what to tighten, the force, the checks."""
+    """Return worst case, governing part, tolerance to tighten, force, checks."""
     if results.assembly is None:
         return [Tile("Assembly", [results.solution["status"]])]
     worst = worst_clearance(results)
@@ -159,7 +159,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
     if worst["pose"] is not None:
         over = worst["map"]
         tiles.append(Tile("Certified worst case", _bound(worst["pose"]), [
-            "Wherever its clearances rest, at this pose",
+            "Over all positions within the clearances, at this pose",
             *(["; over the map ", *_bound(over)] if over is not None else []), ".",
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
@@ -174,7 +174,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """The largest force through a body, and the couple where it is a couple."""
+    """Return the largest force and the largest moment through a body."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
@@ -183,14 +183,14 @@ def _force_tile(assembly: Assembly) -> Tile:
         row = largest_row(sizes)
         names.append(assembly.posture.robot.frames[row].name)
         shown += [" and " if shown else "", Value(float(sizes[row]), unit)]
-    return Tile("Force and couple to close it", shown, [
-        f"largest, at {names[0]} and {names[1]}; energy ",
+    return Tile("Force and moment of assembly", shown, [
+        f"largest through a body, at {names[0]} and {names[1]}; energy ",
         Value(assembly.energy, "J"), ".",
     ])  # fmt: skip
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """The part whose imperfection costs most, and what is won by removing it."""
+    """Return the part with the largest share of the error, and the gain without it."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])
@@ -202,15 +202,15 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
     won = 1 - best["translation"] / whole
     if won < 0.01:
         none = "No single part: each alone changes it by less than 1 %."
-        return [Tile("What governs it", ["many parts"], [none])]
+        return [Tile("Governing part", ["many parts"], [none])]
     further = ", ".join(
         f"{one['part']} ({one['what']}, {_percent(one['translation'] / whole)})"
         for one in known[1:4]
         if one["translation"] < 0.99 * whole
     )
     return [
-        Tile("What governs it", [best["part"]], [f"its {best['what']}."]),
-        Tile("What to tighten", [f"{best['part']}: {-100 * won:.0f} %"], [
+        Tile("Governing part", [best["part"]], [f"its {best['what']}."]),
+        Tile("Tolerance to tighten", [f"{best['part']}: {-100 * won:.0f} %"], [
             f"without its {best['what']} the worst case is ",
             Value(best["translation"], "m"), f"; then {further}." if further else ".",
         ]),
@@ -218,11 +218,11 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """A change in per cent."""
+    """Return a change in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"
 
 
 def _bound(bounds: dict[str, float]) -> list[str | Value]:
-    """A pose error that is not exceeded."""
+    """Return an upper bound of a pose error."""
     return [Value(bounds["translation"], "m", 3), " and ",
             Value(bounds["rotation"], "rad", 3)]  # fmt: skip

@@ -21,9 +21,9 @@ from validation.study.headline import WORST, worst_clearance
 from validation.study.study import StudyResults
 
 _CLEARANCE_OF = {
-    "frozen": "anywhere while no deformation changes",
-    "free": "anywhere, and compliant joints turn about their own axis",
-    "budget": "anywhere, and springs too, with 5 % more than the least energy",
+    "frozen": "any position without a change of deformation",
+    "free": "any position; compliant joints also turn about their axis",
+    "budget": "any position and deformation of at most 5 % more than the least energy",
 }
 _POSE = ("rad", "rad", "rad", "m", "m", "m")
 _PARTS = ("translation", "rotation")
@@ -34,20 +34,19 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 def unchecked_section(results: StudyResults) -> str:
     """Return section on checks that were not done, and the reasons."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
-    return section("What could not be checked", table(["check", "why"], rows)) if (
-        rows
-    ) else ""  # fmt: skip
+    if not rows:
+        return ""
+    return section("Checks that could not be made", table(["check", "reason"], rows))
 
 
 def robot_section(results: StudyResults) -> str:
-    """Return the forced robot, to be turned and closed."""
+    """Return the section with the scene of the forced robot."""
     if results.assembly is None or "picture" not in results.study.checks:
         return ""
     caption = (
-        "Nominal (grey) and forced robot, its clearances at least energy. Red: elastic "
-        "links; blue: rigid bodies; orange: driven joints; yellow: the errors that "
-        f"clearances leave its platform (assumption {WORST}), as exaggerated as the "
-        "rest."
+        "Nominal (grey) and forced robot of least energy. Red: elastic links; blue: "
+        "rigid bodies; orange: driven joints; yellow: possible platform errors within "
+        f"the clearances (assumption {WORST}), with the same exaggeration."
     )
     if results.closing is not None:
         caption += " The closing is simulated without clearances."
@@ -84,14 +83,14 @@ def governing_section(results: StudyResults) -> str:
         head += [f"largest {in_words(part)}", "change"]
     flat = [[*row[:2], *(cell for pair in row[2:] for cell in pair)] for row in rows]
     return section(
-        "What governs the worst case",
+        "Parts that govern the worst case",
         paragraph(
             "The certified bound at this pose is ", Value(worst["translation"], "m"),
             " and ", Value(worst["rotation"], "rad"),
-            ". Here it is with one imperfection removed. Errors may cancel each "
-            "other; then it rises.",
+            ". The table gives it with one imperfection removed. Errors may cancel "
+            "each other; the bound then rises.",
         ),
-        table(head, flat, "what governs"),
+        table(head, flat, "governing parts"),
     )  # fmt: skip
 
 
@@ -125,7 +124,7 @@ def solution_section(results: StudyResults) -> str:
     if solution["status"] == "ok":
         rows.append(["energy, eq. (22)", Value(solution["energy"], "J", 9)])
         for k, value in enumerate(solution["platform_screw"]):
-            quantity = f"platform error {SCREW[k]}, clearances at least energy"
+            quantity = f"platform error {SCREW[k]}, least energy"
             rows.append([quantity, Value(value, _POSE[k], 6)])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {in_words(key)}", _number(value, unit_of(key))])
@@ -146,8 +145,8 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
     return [
-        ["linearisation error, turn", Value(turn, "rad", 3)],
-        ["linearisation error, shift", Value(shift, "m", 3)],
+        ["linearisation error, rotation", Value(turn, "rad", 3)],
+        ["linearisation error, translation", Value(shift, "m", 3)],
         ["linearisation error, energy", f"{100 * error['relative_energy']:+.3g} %"],
     ]
 
@@ -167,11 +166,12 @@ def _pose_error(results: StudyResults) -> str:
         for assumption, bounds in results.error.items()
     ]
     head: list[str | Column] = [
-        "assumption", Column("turn at least", "rad", 6), Column("at most", "rad", 6),
-        Column("shift at least", "m", 6), Column("at most", "m", 6), "clearances",
+        "assumption",
+        Column("rotation at least", "rad", 6), Column("at most", "rad", 6),
+        Column("translation at least", "m", 6), Column("at most", "m", 6), "clearances",
     ]  # fmt: skip
     return paragraph(
-        "Largest error of the platform's pose, problem (27), between certified bounds."
+        "Certified bounds of the platform's largest pose error, problem (27)."
     ) + table(head, rows, "pose errors")
 
 
@@ -196,7 +196,7 @@ def _wrenches(results: StudyResults) -> str:
 
 
 def reference_section(results: StudyResults) -> str:
-    """Return the printed problems solved again."""
+    """Return the section on the problems of the paper, solved in cvxpy."""
     reference, solution = results.reference, results.solution
     title = "The same problems as printed, in cvxpy"
     if reference is None:
@@ -214,8 +214,8 @@ def reference_section(results: StudyResults) -> str:
     return section(
         title,
         paragraph(
-            "Every screw of every frame a variable, every constraint an equation of "
-            f"the paper; differences must stay below {reference['tolerance']:g}."
+            "Every screw of every frame is a variable, every constraint an equation of "
+            f"the paper; differences must be below {reference['tolerance']:g}."
         ),
         table(["", "reduced problem", "cvxpy", "relative difference"], rows),
     )
@@ -241,7 +241,7 @@ def stiffness_section(results: StudyResults) -> str:
         paragraph(
             f"Link {name}{shared}, {count} cubic tetrahedra, estimated error "
             f"{100 * compared['relative_error_estimate']:.2g} %. A solid held at a "
-            "rigid face is stiffer than a beam by about r/L of itself, and a beam "
+            "rigid face is stiffer than a beam by a share of about r/L, and a beam "
             "without shear (Euler-Bernoulli) is stiffer than one with it: a few per "
             "cent between the columns are physics, not an error."
         ),
@@ -264,13 +264,13 @@ def _stiffness_unit(i: int, j: int) -> str:
 
 
 def _significant(K: NDArray) -> NDArray:
-    """Return the (6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
+    """Return (6, 6) bool: entries above a thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
 
 
 def crosscheck_section(results: StudyResults) -> str:
-    """Return VJM against the multibody simulation."""
+    """Return the section on the multibody simulation."""
     check, title = results.crosscheck, "Against a multibody simulation"
     if check is None:
         if not results.crosscheck_failure:
@@ -290,7 +290,7 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _slope_chart(check: Any) -> str:
-    """Return differences against the scale of the errors, beside a line of slope 2."""
+    """Return differences against the scale of the errors, with a line of slope 2."""
     scales = np.asarray(check.scales)
     traces: list[dict[str, Any]] = []
     for name, values in check.metric.differences.items():
@@ -313,7 +313,7 @@ def _slope_chart(check: Any) -> str:
 def _slope_text(slope: float) -> str:
     """Return the slope measured, if there is one."""
     if np.isnan(slope):
-        return "Nothing separates the two here, so there is no slope."
+        return "The two models do not differ here, so there is no slope."
     return f"Measured: {slope:.3f}."
 
 

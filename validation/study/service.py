@@ -149,7 +149,7 @@ def over_grid(
         moved = data["platform_screw"] - maps["platform_screw"]
         new["deflection"] = moved.assign_attrs(
             units="rad, m", long_name="platform's screw with load and weight minus "
-            "without, clearances at least energy",
+            "without, least-energy solution",
         )  # fmt: skip
         new["loaded_status"] = data["status"]
     return maps.assign(new)

@@ -37,7 +37,7 @@ def _loaded(service: dict[str, Any]) -> list[str]:
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
         f"Load on the platform [{load}] N m, N at its origin, gravity [{weight}] "
-        "m/s^2, both in base axes; clearances at least energy. The certified bounds "
+        "m/s^2, both in base axes; least-energy solution. The certified bounds "
         "above are without them."
     )
     if "deflection" not in service:
@@ -75,7 +75,7 @@ def service_tile(service: dict[str, Any] | None) -> list[Tile]:
     if "deflection" in service:
         screw = np.asarray(service["deflection"])
         turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-        note = "The platform's motion at this pose, clearances at least energy."
+        note = "The platform's motion at this pose, least-energy solution."
         motion: list[str | Value] = [
             Value(shift, "m", 3),
             " and ",

@@ -123,7 +123,7 @@ def test_the_command_names_the_link_that_costs_most(run, tmp_path):
     assert status == 0
     assert answer["platform"]["compliance"]["meshed"] < 1e-9
     assert next(iter(answer["platform"]["by_link"])) == "stout"
-    assert "that link alone a beam" in picture.read_text()
+    assert "only that link a beam" in picture.read_text()
 
 
 def test_the_command_over_poses_gives_median_largest_and_where(run, tmp_path):

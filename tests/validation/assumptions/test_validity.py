@@ -273,7 +273,7 @@ def test_the_command_says_which_assumptions_matter(tmp_path):
     assert costs["disc and cone, not two bushes"]["matters"]
     assert "--solids" in costs["beams, not solids"]["reason"]
     assert "no beam with a density" in costs["weight at the links' ends"]["reason"]
-    assert "beyond 20 um or 1 %" in outcome.output
+    assert "above 20 um or 1 %" in outcome.output
 
 
 @pytest.mark.usefixtures("coarse_solids")

@@ -55,7 +55,7 @@ def test_a_longer_link_and_a_zero_are_undone_as_by_hand(tmp_path, run):
     words = ["compensate", robot, table, "-o", str(out), *options]
     code, text, error = run("validation", *words)
     assert (code, error) == (0, "")
-    assert "to be expected" in text
+    assert "expected: " in text
     for row, (q1, q2) in zip(rows_of(out), [(0.3, 0.9), (-0.2, 1.2)], strict=True):
         x = cos(q1) + 0.8 * cos(q1 + q2)
         y = sin(q1) + 0.8 * sin(q1 + q2)

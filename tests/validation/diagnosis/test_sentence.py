@@ -54,11 +54,11 @@ def test_a_calibration_is_said_in_shares():
     )  # fmt: skip
     assert calibration_text(tally) == (
         "simulated on this design, 20 campaigns each: with noise alone explained 1, "
-        "none_needed 19; with what was found ambiguous 2, explained 18; 85 % named it; "
-        "false claims 2.5 %"
+        "none_needed 19; with the effects found ambiguous 2, explained 18; "
+        "85 % named the effects; false claims 2.5 %"
     )
     unnamed = calibration_text(replace(tally, right=float("nan")))
-    assert "named it" not in unnamed
+    assert "named the" not in unnamed
 
 
 def test_a_compliance_is_said_to_be_times_the_wrench():
@@ -71,13 +71,13 @@ def test_a_compliance_is_said_to_be_times_the_wrench():
 
 
 SAID = [
-    ({"verdict": "none_needed"}, "is noise as far as this design can tell (7.00 sigma"),
+    ({"verdict": "none_needed"}, "distinguish the residual from noise (7.00 sigma"),
     ({"verdict": "explained"}, "lacks a and b and springs; on held-out rows the"),
     ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
     ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on held"),
-    ({"verdict": "outside_library"}, "sigma stay, which vary with x0, x1, x2; on held"),
-    ({"verdict": "outside_library", "trends": ()}, "rows 2.50 sigma stay; on held"),
-    ({"verdict": "not_enough_rows"}, "too few to tell a cause from chance; on held"),
+    ({"verdict": "outside_library"}, "sigma, which varies with x0, x1, x2; on held"),
+    ({"verdict": "outside_library", "trends": ()}, "rows, 2.50 sigma; on held"),
+    ({"verdict": "not_enough_rows"}, "distinguish a cause from chance; on held"),
 ]  # fmt: skip
 
 

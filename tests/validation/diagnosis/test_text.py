@@ -108,7 +108,9 @@ def test_components_that_no_row_has_are_named(shown):
 
 
 def test_rows_that_would_decide_are_said(shown):
-    assert "what would decide: 16 configurations" in shown(needed="16 configurations")
+    assert "measurement that would decide: 16 configurations" in shown(
+        needed="16 configurations"
+    )
 
 
 def test_noise_is_said_where_it_scatters_more_or_time_correlates(shown):
@@ -134,7 +136,7 @@ def test_what_is_left_and_what_to_measure_is_said_last(shown):
     )  # fmt: skip
     assert "odd" in said
     assert any("free in 1 of 4 rows" in line for line in said)
-    assert "left varies with cov.bed: 42 %" in said
+    assert "residual varies with cov.bed: 42 %" in said
     assert said[-2:] == [
         "measure next: q.one=0.5; load fx=10, temperature 5",
         "  a and b differ",
@@ -160,8 +162,9 @@ def test_effects_and_functions_are_listed_with_their_numbers(shown):
     assert said[2:] == [
         "learned: tool tx, ty of q.one",
         f"  {'x' * 157}...",
-        "  predicted in parts of q.j1 left out: 1.25 sigma, without it 5",
-        "  2 other places do as well",
+        "  error in left-out parts of the range of q.j1: 1.25 sigma, "
+        "without the function 5",
+        "  2 other places fit equally well",
     ]
 
 

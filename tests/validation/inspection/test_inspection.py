@@ -88,7 +88,7 @@ SAYINGS = {
         "temperature lost: The temperature stayed at +6 K in every row: thermal "
         "expansion looks exactly like longer links."),
     "calibrated": ({"temperature": np.zeros(60)},
-        "stayed at +0 K in every row: thermal expansion leaves no trace."),
+        "stayed at +0 K in every row: thermal expansion has no effect."),
     "too even": ({"temperature": np.linspace(0, 0.1, 60)},
         "temperature careful: The temperature varied by 0.1 K: even aluminium would "
         "move the platform by 2.4e-06 m at most, less than one sigma."),
@@ -121,7 +121,7 @@ def test_a_sound_design_is_called_sound(rng):
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
         "load careful: No configuration was measured under two loads: what the load "
-        "does and what the configuration does are told apart by the model alone."
+        "does and what the configuration does are distinguished by the model alone."
     ]
 
 
@@ -274,8 +274,8 @@ def test_the_command_writes_everything(tmp_path, rng, run):
     status, out, _ = run("validation", "inspect", tmp_path / "arm")
     assert status == 0
     alike = "thermal_expansion, delayed_expansion, link_length"
-    assert f"cannot be told apart: {alike}" in out
-    assert "What this campaign cannot tell:" in out
+    assert f"cannot be distinguished: {alike}" in out
+    assert "This campaign cannot determine:" in out
 
 
 def test_the_command_refuses_what_is_no_campaign(tmp_path, run):
