@@ -50,8 +50,10 @@ def main():
     for place, part in data.groupby(CLEARANCE):
         print_errors(float(place), part.squeeze())
     near = data["singular_distance"].min(["tx", "ty", "draw", CLEARANCE])
-    said = ", ".join(f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values)
-    print(f"least distances to singularities in the square: {said}")
+    distances = ", ".join(
+        f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values
+    )
+    print(f"least distances to singularities in the square: {distances}")
     figure = ff.figure_of(data, {CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 

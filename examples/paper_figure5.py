@@ -70,17 +70,17 @@ def print_table(signs, data, column):
     """Print least, median and largest value of each map, and of the reference."""
     reached = data["status"] == "ok"
     inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
-    print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % go "
-          "together by clearances with compliant joints free")  # fmt: skip
+    print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % "
+          "assemble by clearances with compliant joints free")  # fmt: skip
     for name, factor, unit, *reference in ROWS:
         values = data[name]
         if "bound" in values.dims:
             values = values.sel(bound="upper")
         values = factor * values.values[np.isfinite(values.values)]
         found = (values.min(), np.median(values), values.max())
-        said = " / ".join(f"{v:.3g}" for v in found)
+        shown = " / ".join(f"{v:.3g}" for v in found)
         expected = " / ".join(f"{v:.3g}" for v in reference[column])
-        print(f"  {name + ' [' + unit + ']':32s} {said:24s} reference {expected}")
+        print(f"  {name + ' [' + unit + ']':32s} {shown:24s} reference {expected}")
 
 
 if __name__ == "__main__":

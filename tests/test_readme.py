@@ -26,7 +26,7 @@ def test_the_python_example_runs_and_is_short():
     zone, energy, *_ = lines = done.stdout.splitlines()
     assert len(lines) == 4
     # an example in which nothing is forced would show nothing
-    assert zone.startswith("goes together by clearance: False, margin ")
+    assert zone.startswith("assembles by clearance: False, margin ")
     assert float(energy.split()[1]) > 1.0  # mJ
 
 

@@ -51,21 +51,25 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
         BadInput: a joint moves about or along another axis than its z axis.
     """
     root = ET.parse(path).getroot()
-    links = {said(link, "name"): link for link in root.findall("link")}
-    above = {said(j, "link", "child"): j for j in root.findall("joint")}
+    links = {attribute(link, "name"): link for link in root.findall("link")}
+    above = {attribute(j, "link", "child"): j for j in root.findall("joint")}
     chain = []
     while tip in above:
         chain.append(above[tip])
-        tip = said(above[tip], "link", "parent")
+        tip = attribute(above[tip], "link", "parent")
     frames, parent = [], "base"
     for joint in reversed(chain):
-        name, kind, place = said(joint, "name"), said(joint, "type"), _origin(joint)
-        inertial = links[said(joint, "link", "parent")].find("inertial")
+        name, kind, place = (
+            attribute(joint, "name"),
+            attribute(joint, "type"),
+            _origin(joint),
+        )
+        inertial = links[attribute(joint, "link", "parent")].find("inertial")
         mass, centre = 0.0, np.zeros(3)
         if inertial is not None:
-            mass = float(said(inertial, "value", "mass"))
+            mass = float(attribute(inertial, "value", "mass"))
             centre = np.linalg.solve(place, _origin(inertial))[:3, 3]
-        if kind != "fixed" and said(joint, "xyz", "axis") != "0 0 1":
+        if kind != "fixed" and attribute(joint, "xyz", "axis") != "0 0 1":
             raise BadInput(f"{path}: joint {name}: expected its axis to be 0 0 1")
         frames.append(
             Frame(
@@ -74,10 +78,12 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
             )
         )  # fmt: skip
         parent = name
-    return Robot(said(root, "name"), parent, tuple(frames), (), "from a URDF")
+    return Robot(attribute(root, "name"), parent, tuple(frames), (), "from a URDF")
 
 
-def said(element: ET.Element, key: str, inside: str = "", default: str = "") -> str:
+def attribute(
+    element: ET.Element, key: str, inside: str = "", default: str = ""
+) -> str:
     """Return an attribute of an element, or of an element inside it."""
     found = element.find(inside) if inside else element
     return default if found is None else found.get(key) or default
@@ -85,8 +91,8 @@ def said(element: ET.Element, key: str, inside: str = "", default: str = "") -> 
 
 def _origin(element: ET.Element) -> NDArray:
     """Return (4, 4) transform of an ``origin``; roll, pitch, yaw about fixed axes."""
-    xyz = [float(x) for x in said(element, "xyz", "origin", "0 0 0").split()]
-    rpy = said(element, "rpy", "origin", "0 0 0").split()
+    xyz = [float(x) for x in attribute(element, "xyz", "origin", "0 0 0").split()]
+    rpy = attribute(element, "rpy", "origin", "0 0 0").split()
     r, p, y = (float(x) for x in rpy)
     turn = rotation_matrix([[0, 0, y], [0, p, 0], [r, 0, 0]])
     return transform(xyz, turn[0] @ turn[1] @ turn[2])

@@ -76,7 +76,7 @@ def error(
     along: AlongOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute certified bounds of the largest pose error, problem (27)."""
+    """Bound the largest pose error, problem (27)."""
     from assembly.linear.reference.pose_error import ASSUMPTIONS
     from assembly.model.largest import LARGEST_LENGTH
     from assembly.model.statuses import OK

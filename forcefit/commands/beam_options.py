@@ -100,6 +100,6 @@ class BeamOptions:
 
 
 def beam_name(theory: str) -> str:
-    """Name of a result of a beam theory."""
+    """Return the name of a beam theory in results."""
     names = {"timoshenko": "Timoshenko beam", "euler": "Euler-Bernoulli beam"}
     return names[theory]

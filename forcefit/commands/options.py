@@ -132,7 +132,7 @@ def parse_load(texts: list[str] | None, option: str = "--load") -> list[float] |
 
     Args:
         texts: such as ``["fx=10,mz=1"]``; components not named are zero.
-        option: their name, for messages.
+        option: name of the option, for messages.
 
     Returns:
         Six numbers [N m, N].
@@ -172,7 +172,7 @@ def parse_vector(texts: list[str] | None, option: str) -> list[float] | None:
 
     Args:
         texts: such as ``["z=-9.81"]``.
-        option: their name, for messages.
+        option: name of the option, for messages.
 
     Returns:
         The numbers along x, y and z.
@@ -197,7 +197,7 @@ def parse_state(
     """Return the state in which K_C is taken, from ``--state``.
 
     Args:
-        text: what was given.
+        text: value of the option.
         valid: states that the command knows.
 
     Returns:
@@ -422,7 +422,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
 
     Args:
         option: for the message.
-        text: what was given.
+        text: value of the option.
 
     Returns:
         (3,) of any length but zero.
@@ -455,7 +455,7 @@ def parse_sizes(option: str, text: str, unit: str) -> list[float]:
 
     Args:
         option: for the message.
-        text: what was given.
+        text: value of the option.
         unit: for the message.
 
     Returns:

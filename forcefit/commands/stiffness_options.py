@@ -121,7 +121,7 @@ def tell_progress() -> None:
 def parse_interfaces(
     base: str | None, tip: str | None
 ) -> "tuple[Interface, Interface]":
-    """Both interfaces of the options."""
+    """Return the interfaces of ``--base`` and ``--tip``."""
     from stiffness.surface.interface import parse_interface
 
     if base is None or tip is None:

@@ -176,14 +176,14 @@
     const slider = (word, most, step, value) => {
       const range = element("input", "", { type: "range", min: 0, max: most, step,
         value, ariaLabel: word });
-      const text = element("label", `${word} `), told = element("output");
-      text.append(range, told);
+      const text = element("label", `${word} `), readout = element("output");
+      text.append(range, readout);
       controls.append(text);
       range.addEventListener("input", () => paint());
-      return [range, told];
+      return [range, readout];
     };
     const most = 2 * spec.exaggeration;
-    const [larger, told] = slider("exaggeration", most, most / 200, spec.exaggeration);
+    const [larger, readout] = slider("exaggeration", most, most / 200, spec.exaggeration);
     larger.className = "exaggeration";
     let closing = null;
     if (steps) {
@@ -273,7 +273,7 @@
     }
     async function paint() {
       const k = Number(larger.value);
-      told.textContent = ` × ${number(k)}`;
+      readout.textContent = ` × ${number(k)}`;
       const step = closing && Number(closing.value) < steps ? Number(closing.value)
         : null;
       const spans = spec.box.map(([low, high]) => (high - low) / size);
