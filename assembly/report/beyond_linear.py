@@ -32,6 +32,6 @@ def far_from_linear(assembly: ExactAssembly) -> list[str]:
     if not (off > _FAR * moved and energy > _FAR):
         return []
     return [
-        f"the motion differs from the linear model by {100 * off / moved:.0f} %: the "
-        "load may be beyond critical (assembly deflection --state exact or --follow)"
+        f"the motion differs from the linear model by {100 * off / moved:.0f} %; this "
+        "may be beyond a critical load (assembly deflection --state exact, --follow)"
     ]

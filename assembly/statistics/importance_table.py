@@ -219,8 +219,8 @@ def importance_text(report: Mapping[str, Any]) -> str:
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws, clearances "
-        f"{report['clearance']} in the shares, least in what moves the platform (its "
-        "slopes are exact):"
+        f"{report['clearance']} in the shares, least in the motion of the platform "
+        "(its slopes are exact):"
     ]
     for name, one in quantities.items():
         if "reason" in one:

@@ -143,7 +143,7 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
     if of_joints:
         head: list[str | Column] = ["clearance", "its part", Column("share")]
         pieces.append(table(head, of_joints, "clearances"))
-    return section("What perfect parts reach", *pieces)
+    return section("Results with perfect parts", *pieces)
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:

@@ -224,7 +224,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     lines += perfect_text(summary)
     lines.append(f"of the {assembled} of {draws} draws that assemble:")
     if not assembled:
-        lines[-1] += " nothing to say"
+        lines[-1] += " no results"
     for key, results in summary["quantities"].items():
         if "mean" in results:
             often = _named(results["most_probable"]["value"], results["unit"])

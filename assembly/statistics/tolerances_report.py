@@ -15,7 +15,7 @@ from forcefit.page.tables import Cell, Column, Value, table
 _LISTED = 20  # errors in a table of shares
 _ALIKE = 0.01  # relative to the largest share: shares as close are equal
 _ASSUMED = (
-    "Limits hold at the postures of the grid; between them nothing is said.",
+    "Limits hold at the postures of the grid; nothing is known between them.",
     "Errors are independent and keep within their tolerances.",
     "Small screws: the closures are linear in the errors.",
 )
@@ -139,7 +139,9 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
     for key, one in allocation["perfect_parts"].items():
         if one["reached"] > 0.0:
             answer = f"{100 * one['reached'] / one['limit']:.0f} %"
-            tiles.append(Tile("Clearances take", [answer], [f"of the limit of {key}."]))
+            tiles.append(
+                Tile("Used by clearances", [answer], [f"of the limit of {key}."])
+            )
     return [*tiles, _tighten_tile(allocation)]
 
 
@@ -190,7 +192,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
         ["postures", f"{results['postures']}: {results['grid']}"],
         ["draws", f"{allocation['draws']}, seed {allocation['seed']}{fresh}"],
     ]
-    return section("What was asked", table(["asked", ""], rows, "what was asked"))
+    return section("Requirements", table(["requirement", ""], rows, "requirements"))
 
 
 def _allocation_section(allocation: Mapping[str, Any]) -> str:
@@ -254,11 +256,23 @@ def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
         for key, one in taken.items()
     ]  # fmt: skip
     one = max(taken.values(), key=lambda v: v["reached"] / v["limit"])
-    head = ["quantity", "limit", "clearances take", "left for errors", "at [m, rad]"]
+    head = [
+        "quantity",
+        "limit",
+        "used by clearances",
+        "remaining for errors",
+        "at [m, rad]",
+    ]
     looser, price = Value(one["looser_without"], "", 3), Value(one["price_without"])
     text = paragraph(
         "Without clearances all tolerances could be about ", looser, " times looser, "
         "at a price of about ", price, ": pose errors by clearances and by errors add "
         "up, nearly.",
     )  # fmt: skip
-    return [section("What clearances take", table(head, rows, "clearances"), text)]
+    return [
+        section(
+            "Share of the limits used by clearances",
+            table(head, rows, "clearances"),
+            text,
+        )
+    ]

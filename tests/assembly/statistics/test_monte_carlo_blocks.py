@@ -115,11 +115,11 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
     assert meaning.startswith(
         "upper bound of the magnitude of the platform's translation"
     )
-    assert meaning.endswith("the largest pose errors count, eq. (27)")
+    assert meaning.endswith("all positions in the clearances, eq. (27)")
     screw = data["platform_screw"]
     assert screw.dims == ("draw", "screw")
     assert list(screw["screw"].values) == ["RX", "RY", "RZ", "TX", "TY", "TZ"]
-    assert "one possible place of many" in screw.attrs["long_name"]
+    assert "one of many possible ones" in screw.attrs["long_name"]
     attributes = data.attrs
     assert (attributes["robot"], attributes["seed"]) == ("arm", 9)
     assert (attributes["margins"], attributes["stress"]) == (1, 1)

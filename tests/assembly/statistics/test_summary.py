@@ -235,6 +235,6 @@ def test_a_limit_on_what_was_not_computed_is_refused(key):
 def test_where_no_draw_assembles_only_margins_are_told():
     text = summary_text(summarise(draws(margin=[2.0, 3, 4], status=[1, 1, 1])))
     assert text.splitlines()[-2:] == [
-        "of the 0 of 3 draws that assemble: nothing to say",
+        "of the 0 of 3 draws that assemble: no results",
         "margin of all 3 draws: median 3 (-inf to inf), 95 % below 3.9 (3 to inf)",
     ]

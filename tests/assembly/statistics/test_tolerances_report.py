@@ -119,8 +119,8 @@ def test_the_page_says_what_was_asked_and_what_clearances_take(tmp_path, run):
     assert taken["price_without"] == pytest.approx(1.0 / LIMIT, rel=2e-3)
     assert "clearances alone use 0.1 mm of the 0.3 mm of translation" in text
     content = page.read_text("utf-8")
-    assert tiles(content)["Clearances take"][0] == "33\u00a0%"
-    asked = {row[0].text: row[1] for row in parse(content).table("asked")[1:]}
+    assert tiles(content)["Used by clearances"][0] == "33\u00a0%"
+    asked = {row[0].text: row[1] for row in parse(content).table("requirement")[1:]}
     assert asked["platform translation, at most"].value == LIMIT
     assert asked["errors"].text == "uniform within plus or minus their tolerance"
     assert asked["price"].text == "sum of cost / tolerance [rad or m]"

@@ -179,8 +179,8 @@ def test_of_draws_none_of_which_assemble_nothing_is_said():
     said = summarise(run_draws(Experiment(home_posture(robot), sources), 20))
     lines = summary_text(said).splitlines()
     (last,) = [line for line in lines if "draws that assemble" in line]
-    assert last == "of the 0 of 20 draws that assemble: nothing to say"
-    assert sum("nothing to say" in line for line in lines) == 1
+    assert last == "of the 0 of 20 draws that assemble: no results"
+    assert sum("no results" in line for line in lines) == 1
     assert said["assembles"]["forced"]["probability"] == 0.0
 
 
