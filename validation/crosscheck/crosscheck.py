@@ -190,7 +190,7 @@ class Crosscheck:
             )
         added = len(self.pairs) - self.asked
         if added:
-            lines.append(f"scales added to tell: {added}")
+            lines.append(f"scales added: {added}")
         lines += resolution_text(self.resolutions)
         return "\n".join([*lines, verdict_text(self)])
 

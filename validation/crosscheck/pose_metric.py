@@ -189,7 +189,7 @@ class PoseMetric:
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]
         if shares:
             remaining = ", ".join(shares)
-            lines.append(f"left against the model with finite rotations: {remaining}")
+            lines.append(f"difference from the exact model that remains: {remaining}")
         if self.pairs[0].simulated.held:
-            lines.append("held in all models by 0.01 N m/rad: motions that are free")
+            lines.append("free motions are held by 0.01 N m/rad in all models")
         return lines

@@ -22,7 +22,7 @@ from validation.crosscheck.crosscheck import Crosscheck, attempt
 _VERDICTS = {
     PASSED: "passed",
     NOT_DECIDED: "NOT DECIDED",
-    NO_SIGNAL: "NOT CHECKED, nothing stands out of the noise",
+    NO_SIGNAL: "NOT CHECKED, no difference exceeds the noise",
 }
 
 

@@ -151,9 +151,9 @@ def verdict_text(comparison: Judged) -> str:
     texts = {
         PASSED: "passed",
         FAILED: "FAILED",
-        NOT_DECIDED: "NOT DECIDED: the errors are too large for these scales; ask "
-        "for smaller ones",
-        NO_SIGNAL: "NOT CHECKED: nothing stands out of the noise; a robot without "
+        NOT_DECIDED: "NOT DECIDED: the errors are too large for these scales; use "
+        "smaller ones",
+        NO_SIGNAL: "NOT CHECKED: no difference exceeds the noise; a robot without "
         "errors and load compares zero with zero",
     }
     outcome = verdict(comparison)

@@ -214,8 +214,8 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
         together = correlation(x, y)
         if abs(together) > _TOGETHER:
             text = (
-                f"{a} and {b} vary together (correlation {together:+.2f}): what one "
-                "does looks much like what the other does."
+                f"{a} and {b} vary together (correlation {together:+.2f}): their "
+                "effects look alike."
             )
             remarks.append(Remark("covariates", CAREFUL, text))
     return remarks

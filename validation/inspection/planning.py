@@ -269,7 +269,9 @@ def text(planned: Planned) -> str:
     """Return the text of a plan, with the five pairs hardest to separate."""
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
-    lines.append("hardest to tell apart, with as many random rows in brackets [sigma]:")
+    lines.append(
+        "least distinguishable pairs, in brackets of as many random rows [sigma]:"
+    )
     for pair in shown["pairs"][:5]:
         sizes = [np.sqrt(pair[key]) for key in ("planned", "random")]
         lines.append(

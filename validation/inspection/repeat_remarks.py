@@ -79,7 +79,7 @@ def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
     if 2 * np.count_nonzero(np.diff(rows) == 1) >= len(rows) - 1:
         text = (
             "Readings far from their repeats follow each other in time: something "
-            "changed quickly then, they are hardly single mistakes."
+            "changed quickly; they are not likely to be single mistakes."
         )
         return [Remark("suspects", CAREFUL, text)]
     if len(suspects) == MOST:

@@ -150,7 +150,7 @@ def test_a_sound_model_is_left_alone(diagnosed):
     assert found.before == found.after
     assert found.before.normalised == pytest.approx(1.0, abs=0.25)
     assert table(found)["effects"] == []
-    assert "enough" in sentence(found)
+    assert "suffices" in sentence(found)
 
 
 def test_two_effects_are_named_together(diagnosed, tmp_path):

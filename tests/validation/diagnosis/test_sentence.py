@@ -73,8 +73,8 @@ def test_a_compliance_is_said_to_be_times_the_wrench():
 SAID = [
     ({"verdict": "none_needed"}, "distinguish the residual from noise (7.00 sigma"),
     ({"verdict": "explained"}, "lacks a and b and springs; on held-out rows the"),
-    ({"verdict": "learned"}, "was learned: a and b and t0 and t1 and t2 and t3; on"),
-    ({"verdict": "ambiguous"}, "effect it is: a or nothing or a + b or c; on held"),
+    ({"verdict": "learned"}, "lacks a and b and t0 and t1 and t2 and t3 (with"),
+    ({"verdict": "ambiguous"}, "these effects: a or nothing or a + b or c; on held"),
     ({"verdict": "outside_library"}, "sigma, which varies with x0, x1, x2; on held"),
     ({"verdict": "outside_library", "trends": ()}, "rows, 2.50 sigma; on held"),
     ({"verdict": "not_enough_rows"}, "distinguish a cause from chance; on held"),

@@ -81,7 +81,7 @@ def sound(rng, **changes):
 STILL = np.zeros((60, 6))
 ALWAYS = np.tile([0, 0, 0, 0, 0, -50.0], (60, 1))
 SAYINGS = {
-    "no load": ({"loads": STILL}, "load lost: No load was ever applied"),
+    "no load": ({"loads": STILL}, "load lost: No load was applied"),
     "one load": ({"loads": ALWAYS}, "load lost: One load in every row"),
     "no thermometer": ({"temperature": None}, "temperature lost: No cov.temperature"),
     "constant": ({"temperature": np.full(60, 6.0)},
@@ -102,7 +102,7 @@ SAYINGS = {
     "in a row": ({"repeat": np.repeat(np.arange(20), 3)},
         "repeats careful: Repeats were measured in a row"),
     "in one go": ({"repeat": np.repeat(np.arange(20), 3)},
-        "configurations lost: Every configuration was measured in one go"),
+        "configurations lost: Every configuration was measured without a break"),
     "one configuration": ({"repeat": np.zeros(60, dtype=int)},
         "configurations lost: One configuration only"),
     "few repeats": ({"repeat": np.r_[np.arange(58), 0, 1]},
