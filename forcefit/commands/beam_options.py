@@ -47,7 +47,9 @@ class BeamOptions:
         if self.section_text is not None:
             if given:
                 name = next(iter(given)).replace("_", "-")
-                raise BadInput(f"--section: says it all, --{name} does not go with it")
+                raise BadInput(
+                    f"--section: found with --{name}, expected one of the two"
+                )
             constants = parse_assignments([self.section_text], "--section")
             check_section("--section", constants)
             return constants
@@ -57,7 +59,7 @@ class BeamOptions:
                 "give either --radius, or --width and --height, or --section"
             )
         if rectangle and "inner_radius" in given:
-            raise BadInput("--inner-radius: goes with --radius, not with a rectangle")
+            raise BadInput("--inner-radius: found with a rectangle, expected --radius")
         for name in ("width", "height") if rectangle else ("radius",):
             if name not in given:
                 raise BadInput(f"--{name}: missing; a rectangle has both")

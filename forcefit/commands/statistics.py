@@ -344,7 +344,7 @@ def tolerances(
         elif asked_plan is None:
             raise BadInput(
                 f"{machine.name}: its frames have no errors to judge; give them a "
-                "geometric_error, or ask for tolerances with --plan"
+                "geometric_error, or give a --plan of tolerances"
             )
         if asked_plan is not None:
             whose = identity_of(postures, asked_plan, fresh)

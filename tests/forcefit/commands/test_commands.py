@@ -157,7 +157,7 @@ def test_exact_says_where_it_stands_beyond_a_critical_load(run, tmp_path):
     for load, status, said in (
         ("fx=-80", 0, ""),
         ("fx=-90", 1, "the potential decreases along a motion"),
-        ("fx=-90,fy=0.1", 0, "%: the load may be beyond critical"),
+        ("fx=-90,fy=0.1", 0, "%; this may be beyond a critical load"),
         ("fx=-20,fy=0.1", 0, ""),
     ):
         found, out, _ = run(

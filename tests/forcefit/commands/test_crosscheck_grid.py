@@ -104,5 +104,5 @@ def test_a_pose_where_nothing_is_compared_is_not_passed():
     assert [row["passed"] for row in rows] == [None, False, False]
     assert not poses_table(rows)["passed"]
     said = poses_text(rows).splitlines()
-    assert said[1].endswith("NOT CHECKED, nothing stands out of the noise")
+    assert said[1].endswith("NOT CHECKED, no difference exceeds the noise")
     assert said[-1] == "0 of 2 reachable poses passed"

@@ -86,7 +86,7 @@ def test_beam_options_reach_the_formula(options, section, axis, theory):
         (["--width", "1"], "--height: missing"),
         (
             ["--width", "1", "--height", "1", "--inner-radius", "0.1"],
-            "goes with --radi",
+            "found with a rectangle",
         ),
         (["--radius", "1", "--length", "inf"], "--length: found inf"),
         (["--radius", "1", "--young", "-1"], "--young: found -1"),

@@ -129,7 +129,10 @@ def test_without_poissons_ratio_tension_has_no_ends():
         (["--radius", "0.02", "--ratios", "0,5"], "--ratios: found 0"),
         (["--section", "width=1,height=1,web=.1,flange=.1"], "found a section of"),
         (["--section", "radius=1,rdius=2"], 'unknown "rdius"; did you mean "radius"'),
-        (["--section", "radius=1", "--radius", "1"], "--radius does not go with it"),
+        (
+            ["--section", "radius=1", "--radius", "1"],
+            "found with --radius, expected one",
+        ),
         (["--section", "width=1"], "--section: found width, expected one of"),
     ],
 )
