@@ -225,12 +225,12 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="free translation within the clearances, at the same energy", shown="um"
     ),
     "screw_rotation_error": Quantity(
-        "certified error of the determined rotation", "rad",
-        meaning="without the undetermined rotation", shown="mrad"
+        "certified rotation error", "rad",
+        meaning="of the platform, without the undetermined rotation", shown="mrad"
     ),
     "screw_translation_error": Quantity(
-        "certified error of the determined translation", "m",
-        meaning="without the undetermined translation", shown="um"
+        "certified translation error", "m",
+        meaning="of the platform, without the undetermined translation", shown="um"
     ),
     "stationarity": Quantity("equilibrium residual", meaning="relative"),
     "iterations": count("iterations"),

@@ -89,7 +89,7 @@ def test_the_picture_shows_the_body_and_says_its_size():
     said = plotter.actors["body"].GetText(0)
     pixels = plotter.screenshot(return_img=True).astype(int)
     plotter.close()
-    assert said.startswith("gold: translation errors possible (frozen), up to 0.38")
+    assert said.startswith("gold: possible translation errors (frozen), up to 0.38")
     gold = (pixels[..., 0] > 150) & (pixels[..., 1] > 110) & (pixels[..., 2] < 110)
     assert gold.sum() > 500
 

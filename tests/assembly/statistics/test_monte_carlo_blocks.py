@@ -129,7 +129,7 @@ def test_a_data_set_of_draws_says_what_was_solved(arm):
     assert "stiffness" not in attributes
     least = run_draws(arm, 3)["translation"].attrs["long_name"]
     assert least.startswith(
-        "size of the platform's translation error; clearances where"
+        "magnitude of the platform's translation error; positions of"
     )
 
 
