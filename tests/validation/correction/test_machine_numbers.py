@@ -9,8 +9,8 @@ from assembly.files.robot_file import read_robot
 from assembly.measurement.predict import predict as predict_rows
 from assembly.model.function import Function
 from tests.campaigns_for_tests import campaign_of
+from tests.elastic_arm_for_tests import arm, with_errors
 from tests.validation.diagnosis.test_sessions import FRAMES, measured
-from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.carried_file import save
 from validation.correction.carrying import carry
@@ -150,7 +150,7 @@ def test_slopes_of_functions_are_what_a_small_change_does(
     where, component, kind, tmp_path
 ):
     """By differences of the predicting function, under load, a device anywhere."""
-    robot, rng = arm(), np.random.default_rng(2)
+    robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
         lines.append(",".join(map(str, [f"m{i}", *q[:3], *(40 * q[3:])])))

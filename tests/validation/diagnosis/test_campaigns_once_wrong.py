@@ -15,10 +15,12 @@ from validation.diagnosis.saving import save
 
 CASES = DATA.parent / "cases" / "campaigns"
 PRACTICE = DATA / "practice"
-NAMES = (
+FOLDERS = [CASES / name for name in (
     "ax_cum", "crash_singular", "crash_sizes", "declared_effect", "fb_gear", "fb_wear",
     "few_8", "hx_play", "hyst", "points_in_one_go", "zonly",
-)  # fmt: skip
+)] + [PRACTICE / name for name in (
+    "p02_self_weight", "p04_drive_compliance_encoder_offset", "p05_outside",
+)]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -41,35 +43,20 @@ def effect(found, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
-def test_the_saved_robot_is_the_one_that_is_printed_and_never_a_worse_one(
-    name, diagnosed, tmp_path
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
+    folder, diagnosed, tmp_path
 ):
-    """Without a traceback; by the file and the command that reads it."""
-    found = diagnosed(CASES / name)
+    found = diagnosed(folder)
     if not found.better:
         assert found.verdict != "explained"
         return
     save(found, tmp_path / "robot.toml")
-    data = read_commands(CASES / name, read_robot(tmp_path / "robot.toml"))
+    data = read_commands(folder, read_robot(tmp_path / "robot.toml"))
     told = predict(replace(data, registration="known").take(~found.outliers))
     assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
     assert found.after.normalised < found.before.normalised
     assert found.sequence[-1].error.normalised == found.after.normalised
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [
-    "p02_self_weight", "p04_drive_compliance_encoder_offset", "p05_outside",
-])  # fmt: skip
-def test_robots_of_another_program_s_campaigns_are_saved_as_printed(
-    name, diagnosed, tmp_path
-):
-    found = diagnosed(PRACTICE / name)
-    save(found, tmp_path / "robot.toml")
-    data = read_commands(PRACTICE / name, read_robot(tmp_path / "robot.toml"))
-    told = predict(replace(data, registration="known").take(~found.outliers))
-    assert told.error.normalised == pytest.approx(found.saved.normalised, rel=1e-4)
 
 
 @pytest.mark.slow

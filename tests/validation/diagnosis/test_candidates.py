@@ -7,7 +7,6 @@ import pytest
 
 from assembly.effects.functions import AXES
 from assembly.files.robot_file import read_robot
-from assembly.model.robot import BeamLink, Frame, Robot
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.campaigns_for_tests import ARM
 from validation.campaign.campaign_file import read_commands
@@ -45,13 +44,6 @@ def sensitivities(tmp_path):
 def one_at(components, shape=LINE):
     part = CandidatePart("reading", components, "q.one")
     return Candidate((part,), "screw", shape)
-
-
-def test_numbers_of_a_function_are_zero_until_they_are_found():
-    shape = CandidateShape("step", ("size",), (("at", 0.5),))
-    (function,) = one_at(("tx",), shape).functions()
-    assert function.parameters == {"size": 0.0, "at": 0.5}
-    assert (function.where, function.variables) == ("reading", ("q.one",))
 
 
 def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities):
@@ -97,20 +89,6 @@ def test_components_that_are_not_seen_are_left_out(sensitivities):
     assert s.fitted(one_at(("tx", "rz")), np.zeros(4), np.full(4, 1e-4)) == []
 
 
-def arm(drives, beams):
-    """A chain of so many drives and, behind them, of so many beams along x."""
-    beam = BeamLink({"radius": 0.03}, 70e9, 0.33)
-    frames, parent = [], "base"
-    for k in range(drives):
-        turning = {"joint": "revolute", "actuated": True}
-        frames.append(Frame(f"j{k}", parent, **turning))
-        parent = f"j{k}"
-    for k in range(beams):
-        frames.append(Frame(f"b{k}", parent, [0.5, 0, 0], link=beam))
-        parent = f"b{k}"
-    return Robot("arm", parent, tuple(frames))
-
-
 @pytest.mark.parametrize("axis", range(6))
 def test_what_a_component_does_by_place(axis):
     """A base swings the tip about its origin; a spring gives by its wrench."""
@@ -130,17 +108,6 @@ def test_what_a_component_does_by_place(axis):
     load[:, :3] += np.cross(place, load[:, 3:])
     soft = s.sensitivity("drive", name, "compliance")
     np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
-
-
-@pytest.mark.parametrize("units", [1e-6, 1.0, 1e6])
-def test_a_column_has_mean_square_one_in_any_unit(units):
-    heat = units * np.array([3.0, -1, 2, 0.5, 4, -2, 1, 0.1])
-    campaign = bar(temperature=heat)
-    conditions = conditions_of(campaign)
-    s = Sensitivities(conditions, responses(conditions))
-    columns, _ = s.basis(("cov.temperature",), CandidateShape("powers", ("1",)))
-    expected = heat / np.sqrt(np.mean(heat**2))
-    np.testing.assert_allclose(columns[:, 0], expected, rtol=1e-12)
 
 
 def test_what_was_varied_and_is_known_in_every_row_may_count():

@@ -45,10 +45,12 @@ def test_a_length_is_claimed_from_one_chance_in_a_thousand(times, claimed, sign)
     assert first(fit) == claimed
 
 
-def test_a_stiffness_that_nothing_softens_is_no_effect():
-    """At its lower bound, zero: there is no parameter to be told."""
+def test_drive_that_turns_against_its_load_is_rigid_and_no_effect():
+    """The compliance is at its lower bound, zero: no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
+    assert fit.x == pytest.approx([0.0], abs=1e-9)
+    assert fit.robot.effects == {}
     assert numbers(fit) == []
     assert not first(fit)
     assert first(machine(gives_way(30.0, 2e5), SOFTER, start=1e-6))

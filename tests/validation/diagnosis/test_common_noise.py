@@ -8,8 +8,8 @@ import pytest
 from assembly.measurement.predict import with_second_order
 from assembly.robots import three_rrr
 from tests.bar_for_tests import BEAM, LONGER, along, bar, machine
+from tests.elastic_arm_for_tests import arm, with_errors
 from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_points
-from tests.validation.diagnosis.test_simulated import arm
 from validation.campaign.campaign import number_rows
 from validation.diagnosis.columns import Columns
 from validation.diagnosis.derivatives import Derivatives
@@ -93,17 +93,6 @@ def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
     assert len(told) == any(sizes)
 
 
-def test_points_measured_at_once_are_drawn_together():
-    """Of 600 rows some 500 score functions first: all three of a measurement."""
-    campaign = three_points(200)
-    columns = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
-    rows = np.unique(columns.row[columns.sampled])
-    visits, count = np.unique(campaign.measured_at_once[rows], return_counts=True)
-    assert 480 < len(rows) <= 500
-    assert (count == 3).all()
-    assert len(visits) == len(rows) / 3
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_length_is_found_beside_noise_in_common(columns, seed):
@@ -160,7 +149,7 @@ def diagnosed(robot, wanted, seed, folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path):
-    robot = arm() if seed % 2 else without_clearance(three_rrr())
+    robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
     assert diagnosis.claimed == ()
@@ -178,7 +167,9 @@ def test_intervals_cover_beside_noise_in_common(tmp_path):
     """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
-        made, diagnosis = diagnosed(arm(), hidden, 50 + seed, tmp_path / str(seed))
+        made, diagnosis = diagnosed(
+            with_errors(arm()), hidden, 50 + seed, tmp_path / str(seed)
+        )
         (true,) = made.effects
         assert diagnosis.claimed == ("encoder_offset",)
         assert not diagnosis.fit.unknowns.functions

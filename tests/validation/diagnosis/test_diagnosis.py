@@ -17,10 +17,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from assembly.effects import apply_effects
-from assembly.kinematics.posture import place_robot
-from assembly.measurement.conditions import as_declared
-from assembly.measurement.predict import predict, with_finite_motions
 from examples.campaign_folder import data_folder
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
@@ -28,10 +24,8 @@ from tests.planar_arm_for_tests import SIGMA, measured
 from validation.campaign.campaign_file import read_campaign
 from validation.diagnosis import trace
 from validation.diagnosis.diagnose import diagnose
-from validation.diagnosis.holdout import HeldOut
 from validation.diagnosis.report import report_page
 from validation.diagnosis.results import effects, table
-from validation.diagnosis.saving import corrected
 from validation.diagnosis.sentence import sentence
 from validation.diagnosis.text import text
 
@@ -140,6 +134,9 @@ def test_the_sequence_leads_from_the_declared_model_to_the_machine(name, diagnos
     assert first.error == found.before
     assert first.unknowns == 0
     assert last.error == found.after
+    written = table(found)["ladder"][-1]
+    assert written["kept_aside_sigma"] == found.after.normalised
+    assert written["kept_aside_rms"] == found.after.position
     if terms:
         assert last.unknowns == pytest.approx(len(found.fit.x), abs=0.01)
 
@@ -258,31 +255,6 @@ def test_a_diagnosis_shows_its_verdict_on_a_few_lines(diagnosed):
     for said in (found.verdict, *found.claimed, f"{found.after.normalised:.3g} after"):
         assert said in repr(found)
     assert found.summary() == text(found)
-
-
-def test_a_corrected_robot_predicts_what_the_fit_predicts(diagnosed):
-    found = diagnosed("pair")
-    robot, campaign = corrected(found), found.campaign
-    assert robot.effects.keys() == {"encoder_offset", "thermal_expansion"}
-    for row in (0, 21):
-        commanded = dict(zip(("one", "two"), campaign.coordinates[row], strict=False))
-        here = as_declared(
-            place_robot(robot, joints=commanded), campaign.loads[row],
-            covariates={"temperature": campaign.covariates["temperature"][row]},
-        )  # fmt: skip
-        there = with_finite_motions(apply_effects(here, robot.effects))
-        told = predict(there).deviation[0]
-        expected = campaign.measured[row] - found.residual_after[row]
-        assert told == pytest.approx(expected, abs=1e-12)
-
-
-def test_without_rows_to_spare_nothing_is_said_of_rows_held_out(diagnosed):
-    """A campaign of one block: what is judged is what was fitted."""
-    found = diagnosed("none")
-    every = np.ones(len(found.campaign), dtype=bool)
-    alone = replace(found, held=HeldOut("none", (every,), "no rows held out"))
-    assert "on the rows fitted, too few to hold any out" in sentence(alone)
-    assert "rows held out in 5 folds" in sentence(found)
 
 
 ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs

@@ -70,18 +70,6 @@ def test_large_errors_of_frames_are_explained_as_finite_motions(found):
     assert part.name == "geometry"
 
 
-def test_each_step_to_what_is_found_is_judged_on_the_same_rows(found):
-    """Declared and geometry; steps that are not there are left out."""
-    declared, geometry = found.sequence
-    assert (declared.term, geometry.term) == ("declared", "geometry")
-    rows = found.held.rows & ~found.outliers
-    before = errors_of(found.campaign, found.campaign.measured, rows)
-    assert declared.error.position == pytest.approx(before.position)
-    told = float(found.fit.determined.sum())
-    assert geometry.unknowns == pytest.approx(told, rel=0.2)  # of folds, smaller
-    assert geometry.error == found.after
-
-
 def test_errors_are_root_mean_squares_over_measured_cells(found):
     """By hand: a row of 3, 4 and nothing, another that does not count."""
     campaign = found.campaign

@@ -79,17 +79,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert 1e-3 < binom.cdf(inside, 60, 0.6827) < 1 - 1e-3
 
 
-def test_a_drive_that_turns_against_its_load_is_rigid():
-    """The compliance stays at its bound."""
-    M = 30.0
-    seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
-    campaign = bar([0, 0, M, 0, 0, 0], seen)
-    fit = machine(campaign, SOFTER, start=1e-6)
-    assert fit.x == pytest.approx([0.0], abs=1e-9)
-    assert fit.robot.effects == {}
-    assert numbers(fit) == []
-
-
 def test_an_offset_is_exact_far_from_straight():
     """The drive turns by a where K (a - e) = F L cos(q + a), far from straight."""
     K, F, e = 2e3, 150.0, 4e-3

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.bar_for_tests import (
     BEAM,
@@ -19,7 +20,6 @@ from tests.bar_for_tests import (
     machine,
 )
 from tests.planar_arm_for_tests import SIGMA
-from validation.diagnosis import next_measurement as module
 from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.signatures import conditions_of
 
@@ -59,17 +59,6 @@ def test_a_measurement_is_worth_a_standard_deviation(power, worth):
     assert (found is not None) == worth
 
 
-def test_the_pose_is_said_where_poses_were_commanded():
-    """A bar of 0.8 m at a quarter turn; x, y, z and the rotation vector."""
-    campaign = replace(bar(rows=3, spread=np.pi), commanded="pose")
-    found = module._configuration(campaign, conditions_of(campaign), 1)
-    assert list(found) == [f"pose.{name}" for name in module.POSE]
-    shift = [found[f"pose.{k}"] for k in ("tx", "ty", "tz")]
-    turn = [found[f"pose.{k}"] for k in ("rx", "ry", "rz")]
-    assert shift == pytest.approx([0, LENGTH, 0], abs=1e-12)
-    assert turn == pytest.approx([0, 0, np.pi / 2], abs=1e-12)
-
-
 def test_nothing_decides_between_one_explanation_and_itself():
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
@@ -95,6 +84,16 @@ def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
     information = 1 / SIGMA[2] ** 2 + LENGTH**2 / SIGMA[4] ** 2
     power = (e * (1 - np.cos(q))) ** 2 * information / 1.5
     assert found.power == pytest.approx(power, rel=1e-3)
+    by_pose = next_measurement(
+        replace(campaign, commanded="pose"), here, turned, [eccentric]
+    )
+    pose = [by_pose.configuration[f"pose.{k}"] for k in ("tx", "ty", "tz")]
+    expected = [LENGTH * np.cos(q), LENGTH * np.sin(q), 0]
+    assert pose == pytest.approx(expected, abs=1e-9)
+    turn = [by_pose.configuration[f"pose.{k}"] for k in ("rx", "ry", "rz")]
+    assert Rotation.from_rotvec(turn).as_matrix() == pytest.approx(
+        Rotation.from_rotvec([0, 0, q]).as_matrix(), abs=1e-9
+    )
 
 
 def test_a_range_of_temperatures_is_left_by_half_of_it():

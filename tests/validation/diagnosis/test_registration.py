@@ -7,6 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from assembly.effects.registration import BASE
+from assembly.kinematics.posture import place_robot
+from assembly.measurement.predict import predict
+from assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import LENGTH, along, bar
 from validation.diagnosis.registration import (
@@ -91,3 +94,78 @@ def test_without_sessions_of_both_one_device_is_that_of_all_rows(known):
         conditions = replace(conditions, session=sessions)
     found = register(campaign, conditions)
     assert found.base == pytest.approx([*TURN, *SHIFT], abs=1e-9)
+
+
+@pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
+@pytest.mark.parametrize("cells", ["all", "points", "one rotation"])
+def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
+    """p' = R p + t and R' = R, noise-free: 1 rad and 3 m, by points or by rotations."""
+    campaign = bar()
+    R, t = Rotation.from_rotvec(turn), np.array([2.0, -2.0, 1.0])
+    p = LENGTH * along(campaign)
+    seen = np.hstack([np.tile(turn, (8, 1)), R.apply(p) + t - p])
+    if cells == "points":
+        seen[:, :3] = np.nan
+    if cells == "one rotation":
+        seen[1:, :3] = np.nan
+    campaign = bar(measured=seen)
+    # without errors of the model a first guess is right already
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+    found = register(campaign, conditions_of(campaign))
+    assert found.base[:3] == pytest.approx(turn, abs=1e-9)
+    assert found.base[3:] == pytest.approx(t, abs=1e-9)
+
+
+def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
+    """Five places of a slide half a metre beside the base, no rotation read."""
+    robot = Robot("slide", "tip", (
+        Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
+        Frame("slide", "rail", joint="prismatic", actuated=True),
+        Frame("tip", "slide", [0.1, 0, 0]),
+    ))  # fmt: skip
+    placed = [place_robot(robot, joints={"slide": 0.1 * k}) for k in range(5)]
+    seen = np.zeros((5, 6))
+    seen[:, :3] = np.nan
+    campaign = replace(
+        bar(rows=5, measured=seen), robot=robot,
+        coordinates=np.stack([p.coordinates for p in placed]),
+        transforms=np.stack([p.transforms for p in placed]),
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="measured points off one line"):
+        register(campaign, conditions_of(campaign))
+
+
+def test_a_device_is_found_beside_errors_that_the_model_knows():
+    """The declared tip is 4 mm off: that is the machine's, and not the device's."""
+    plain = bar()
+    errors = np.zeros((2, 6))
+    errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
+    robot = plain.robot.with_errors(errors)
+    turn, t = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.5, -2.0])
+    R = Rotation.from_rotvec(turn)
+    q = plain.coordinates[:, 0]
+    off = Rotation.from_rotvec(np.outer(q, [0, 0, 1])).apply(errors[1, 3:])
+    p = LENGTH * along(plain)
+    seen = np.hstack([np.full((8, 3), np.nan), R.apply(p + off) + t - p])
+    campaign = replace(bar(measured=seen), robot=robot)
+    guess = coarse_frame(campaign, conditions_of(campaign))
+    assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
+
+
+def test_each_session_has_a_device_of_its_own():
+    """Two places in the room, two sessions; rows without any are all of one."""
+    plain, sessions = bar(), np.array(["a", "b"] * 4)
+    p, seen = LENGTH * along(plain), np.zeros((8, 6))
+    seen[:, :3] = np.nan
+    where = {"a": ([0.1, 0.2, -0.3], [1.0, 2.0, 0.5]), "b": ([0, 0, 1.0], [-1.0, 0, 0])}
+    for k, name in enumerate(sessions):
+        turn, t = where[name]
+        seen[k, 3:] = Rotation.from_rotvec(turn).apply(p[k]) + t - p[k]
+    campaign = replace(bar(measured=seen), session=sessions)
+    found = register(campaign, conditions_of(campaign))
+    left = campaign.measured - predict(found).deviation
+    assert np.abs(left[:, 3:]).max() < 1e-9
+    unknown = replace(campaign, session=np.array(["a"] * 8))
+    with pytest.raises(BadInput, match='session "b" has no row'):
+        register(unknown, conditions_of(campaign))

@@ -136,3 +136,13 @@ def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
     ), (("end_a", "end_b"),))  # fmt: skip
     found = responses(as_declared(home_posture(robot), [0, 0, 0, 30.0, 0, 0]))
     assert found.wrenches[0, [0, 2], 3] == pytest.approx([15.0, 15.0], rel=1e-9)
+
+
+def test_wrenches_are_as_small_as_their_loads():
+    """Zero is what is rounding beside the largest, and not beside 1 N."""
+    load = np.array([0, 0, 3.0, 0, 5.0, 0])
+    one = responses(conditions_of(bar(load, link=BEAM)))
+    tiny = responses(conditions_of(bar(1e-12 * load, link=BEAM)))
+    assert np.abs(one.wrenches).max() > 1.0
+    assert 1e12 * tiny.wrenches == pytest.approx(one.wrenches, rel=1e-9, abs=1e-9)
+    assert tiny.screws == pytest.approx(one.screws)

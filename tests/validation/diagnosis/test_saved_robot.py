@@ -134,15 +134,6 @@ def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
         assert np.array_equal(seen, fitted)
 
 
-def test_the_last_row_of_the_sequence_is_the_error_after(found):
-    assert found.sequence[0].error == found.before
-    assert found.sequence[-1].error == found.after
-    written = table(found)
-    last, after = written["ladder"][-1], written["error"]["after"]
-    assert last["kept_aside_sigma"] == after["normalised"]
-    assert last["kept_aside_rms"] == after["position"]
-
-
 def test_the_file_knows_the_point_that_was_measured(found, saved):
     """Readings of a table are of it; those of another point say so."""
     point = tuple(found.campaign.reference_point.tolist())

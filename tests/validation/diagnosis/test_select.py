@@ -87,15 +87,6 @@ def test_blunders_are_left_out(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_no_reading_is_looked_at_but_those_given(columns):
-    other = replace(CAMPAIGN, measured=np.full((ROWS, 6), 1.0))
-    same = Columns(other, Derivatives(with_second_order(conditions_of(other))))
-    readings = turned(np.full(ROWS, 3e-4))
-    one, two = found(columns, readings), found(same, readings)
-    assert one.models == two.models
-    assert np.array_equal(one.values, two.values)
-
-
 def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     rng = np.random.default_rng(4)
     z = 5 * rng.normal(size=6 * ROWS)

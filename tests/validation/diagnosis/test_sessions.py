@@ -8,7 +8,7 @@ import pytest
 from assembly.files.robot_file import read_robot, write_robot
 from forcefit.inputs.errors import BadInput
 from tests.campaigns_for_tests import write_campaign
-from tests.validation.diagnosis.test_simulated import arm
+from tests.elastic_arm_for_tests import arm, with_errors
 from validation.campaign.campaign_file import read_campaign, read_commands
 from validation.correction.prediction import predict
 from validation.diagnosis.diagnose import diagnose
@@ -38,7 +38,7 @@ def registration(session, *, placed):
 def measured(folder, hidden, common=(), known=True):
     """A campaign of the arm, each session with what is hidden in it and in all."""
     folder.mkdir(exist_ok=True)
-    robot, body, head = arm(), [], None
+    robot, body, head = with_errors(arm()), [], None
     for number, (session, own) in enumerate(hidden.items()):
         rng = np.random.default_rng(70 + number)
         plan = plan_campaign(robot, DESIGN, rng)

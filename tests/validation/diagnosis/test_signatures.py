@@ -8,7 +8,7 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.function import Function
 from forcefit.inputs.table import BadInput
-from tests.bar_for_tests import bar, fit_of
+from tests.bar_for_tests import BEAM, LONGER, bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.hypotheses import Hypothesis
@@ -80,3 +80,19 @@ def test_a_visible_effect_without_unknowns_is_an_offset():
     exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
     assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
     assert found.columns.shape == (48, 0)
+
+
+@pytest.mark.parametrize("x", [0.0, 3e-4, -2e-3])
+def test_a_length_has_the_same_tangent_about_any_value(x):
+    """1 / sigma along the bar, and nothing at zero; another length beside it too."""
+    campaign = bar(link=BEAM)
+    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
+    expected = whiten(campaign, fit_of(campaign, 1.0))
+    beside = {"encoder_offset": {"drive": 1e-9}}
+    for found in (
+        tangents.at_start(LONGER),
+        tangents.about(LONGER, np.array([x]), {}),
+        tangents.about(LONGER, np.array([x]), beside),
+    ):
+        assert found.columns[:, 0] == pytest.approx(expected, abs=1e-6 * expected.max())
+        assert found.offset == pytest.approx(np.zeros(len(expected)), abs=1e-6)

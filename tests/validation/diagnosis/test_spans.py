@@ -100,4 +100,6 @@ def test_many_blunders_do_not_keep_from_learning(tmp_path):
     assert set(where.tolist()) <= set(np.flatnonzero(diagnosis.outliers).tolist())
     (learned,) = table(diagnosis)["learned"]
     assert learned["variables"] == ["cov.bed"]
+    # what the readings do not show, all but z, stays as declared
+    assert learned["components"] == ["tz"]
     assert diagnosis.after.normalised < 1 + 4 / np.sqrt(2 * 309)
