@@ -127,9 +127,7 @@ def test_turning_the_curve_turns_its_compliance(rng):
             lambda: curve_compliance(
                 [
                     straight_piece(
-                        [0, 0, 0],
-                        [1, 0, 0],
-                        lambda t: BAR if t < 1 / 3 else CROOKED,
+                        [0, 0, 0], [1, 0, 0], lambda t: BAR if t < 1 / 3 else CROOKED
                     )
                 ],
                 E,

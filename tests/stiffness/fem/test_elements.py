@@ -325,8 +325,7 @@ def harmonic_slope(x):
 
 
 @pytest.mark.parametrize(
-    ("order", "counts"),
-    [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)],
+    ("order", "counts"), [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)]
 )
 def test_strains_converge_with_the_power_of_the_mesh(order, counts):
     """The gradient of a harmonic function is in equilibrium without body force.

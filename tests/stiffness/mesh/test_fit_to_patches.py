@@ -8,10 +8,7 @@ import pytest
 
 from forcefit.inputs.table import BadInput
 from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from stiffness.mesh.solid import (
-    boundary_faces,
-    on_shapes,
-)
+from stiffness.mesh.solid import boundary_faces, on_shapes
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import Patches, find_patches
 from stiffness.surface.primitives import Plane

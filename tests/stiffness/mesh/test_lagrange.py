@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from stiffness.fem.elements import isoparametric
-from stiffness.mesh.lagrange import (
-    lattice,
-    numbered,
-    shape_functions,
-)
+from stiffness.mesh.lagrange import lattice, numbered, shape_functions
 from stiffness.mesh.solid import Solid
 from tests.solids_for_tests import bar_solid, box_solid
 

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.mesh.refine import (
-    edges_of,
-    refine,
-    split_edges,
-)
+from stiffness.mesh.refine import edges_of, refine, split_edges
 from stiffness.mesh.solid import Solid, boundary_faces
 from tests.solids_for_tests import bar_solid, box_solid
 

@@ -49,8 +49,7 @@ def test_no_element_of_a_round_bar_is_inverted(section):
 
 
 @pytest.mark.parametrize(
-    "section",
-    [ROUND, {"radius": 0.3}, pytest.param(THIN, marks=pytest.mark.slow)],
+    "section", [ROUND, {"radius": 0.3}, pytest.param(THIN, marks=pytest.mark.slow)]
 )
 def test_torsion_of_round_bars_and_tubes_is_that_of_the_textbook(section):
     """G J / L: round sections do not warp, so that held ends change nothing."""

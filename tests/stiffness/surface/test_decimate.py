@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from stiffness.surface.decimate import (
-    _closed,
-    coarser_surface,
-    euler_characteristic,
-)
+from stiffness.surface.decimate import _closed, coarser_surface, euler_characteristic
 from stiffness.surface.surface import check_surface, signed_volume
 from tests.solids_for_tests import CUBE_TRIANGLES, box_solid
 

@@ -25,7 +25,6 @@ from validation.assumptions.bushes import bush_joints, solve_bushes
 from validation.assumptions.solid_links import solid_link
 from validation.assumptions.validity import (
     Cost,
-    bush_cost,
     closure_cost,
     link_cost,
     pieces_cost,
@@ -203,12 +202,6 @@ def test_a_cost_matters_beyond_a_per_cent_or_twenty_micrometres():
     assert not Cost(1.0, 19e-6, 0.009).matters
     assert Cost(0.0, 21e-6, 0.0).matters
     assert Cost(0.0, 0.0, 0.011).matters
-
-
-def test_disc_and_cone_cost_what_bushes_need_more(posture):
-    cost = bush_cost(posture)
-    ratio = solve_bushes(posture).energy / solve_assembly(posture).energy
-    assert cost.energy == pytest.approx(1 - 1 / ratio)
 
 
 @pytest.mark.usefixtures("coarse_solids")

@@ -237,10 +237,7 @@ def test_a_study_file_of_garbled_bytes_is_read_or_one_line_says_why(content, tmp
 
 
 @QUICK
-@given(
-    key=st.sampled_from(STUDY_KEYS),
-    value=st.sampled_from(ODD_VALUES),
-)
+@given(key=st.sampled_from(STUDY_KEYS), value=st.sampled_from(ODD_VALUES))
 def test_a_study_file_with_an_odd_value_is_read_or_one_line_says_why(
     key, value, tmp_path
 ):

@@ -110,7 +110,6 @@ def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
 
 def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
     """Forty rows within a milliradian tell a place, and no turn of the device."""
-    folder = measured(machine, 40, 1e-3)
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
     folder = measured(machine, 40, 1e-3)
@@ -123,17 +122,6 @@ def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
     assert not day["suffices"]
     assert "do not suffice" in said
     assert day["uncertainty"] > 10 * day["left_in_setup"]
-
-
-@pytest.mark.slow
-def test_zeros_set_anew_are_found_when_asked_for(machine, run):
-    folder = measured(machine, 80, 0.8, zero=5e-4)
-    _, _, (without,), _ = carried(run, machine, folder, "--setup", "30")
-    _, _, (day,), _ = carried(run, machine, folder, "--setup", "30", "--fit",
-                              "registration,zeros")  # fmt: skip
-    assert day["error"]["normalised"] < 1.4
-    # the first joint's zero is a turn of the base: the registration's, too
-    assert without["error"]["normalised"] < 1.4
 
 
 def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):

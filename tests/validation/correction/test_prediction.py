@@ -101,10 +101,6 @@ def test_sessions_are_registered_one_by_one(tmp_path):
     names = [f.name for f in robot.frames if f.actuated]
     head = ",".join(["id", *(f"q.{n}" for n in names)])
     lines = [",".join([f"m{i}", *map(repr, row.tolist())]) for i, row in enumerate(q)]
-    plain = tmp_path / "plain.csv"
-    plain.write_text("\n".join([head, *lines]) + "\n")
-    commands = read_commands(plain, robot)
-    nominal = commands.transforms[:, robot.index(robot.platform), :3, 3]
     shift = np.array([[0.3, -0.2, 0.1], [-1.0, 0.5, 0.0]])[np.arange(16) % 2]
     measured = [
         ",".join([line, "ab"[i % 2], *map(repr, row.tolist())])
@@ -116,5 +112,4 @@ def test_sessions_are_registered_one_by_one(tmp_path):
         toml={"registration": '"unknown"'},
     )  # fmt: skip
     found = predict(read_commands(folder, robot))
-    assert len(nominal) == 16
     assert found.error.position < 1e-9

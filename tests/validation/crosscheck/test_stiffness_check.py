@@ -18,8 +18,7 @@ SLOW = ("hexapod", "orthoglide", "arm6")
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)],
+    "name", ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
 def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):

@@ -10,11 +10,7 @@ from assembly.files.robot_file import read_robot
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.campaigns_for_tests import ARM
 from validation.campaign.campaign_file import read_commands
-from validation.diagnosis.candidates import (
-    Candidate,
-    CandidatePart,
-    variables_of,
-)
+from validation.diagnosis.candidates import Candidate, CandidatePart, variables_of
 from validation.diagnosis.function_forms import CandidateShape
 from validation.diagnosis.responses import responses
 from validation.diagnosis.sensitivities import Sensitivities

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from validation.diagnosis.gaussian import scale
-from validation.diagnosis.noise import (
-    findings,
-    probability_good,
-    repeat_scatter,
-)
+from validation.diagnosis.noise import findings, probability_good, repeat_scatter
 
 
 def test_blunders_are_told_from_noise():

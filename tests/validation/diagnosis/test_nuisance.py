@@ -8,11 +8,7 @@ import pytest
 from assembly.measurement.predict import predict
 from assembly.model.robot import Frame, Robot
 from tests.bar_for_tests import LENGTH, bar
-from validation.diagnosis.nuisance import (
-    nuisance,
-    with_compliance,
-    with_error,
-)
+from validation.diagnosis.nuisance import nuisance, with_compliance, with_error
 from validation.diagnosis.responses import responses
 from validation.diagnosis.signatures import conditions_of, whiten
 

@@ -12,10 +12,7 @@ from assembly.measurement.predict import predict
 from assembly.model.robot import Frame, Robot
 from forcefit.inputs.table import BadInput
 from tests.bar_for_tests import LENGTH, along, bar
-from validation.diagnosis.registration import (
-    coarse_frame,
-    register,
-)
+from validation.diagnosis.registration import coarse_frame, register
 from validation.diagnosis.signatures import conditions_of
 
 TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]

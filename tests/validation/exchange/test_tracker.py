@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.campaigns_for_tests import ARM
-from validation.campaign.campaign import Campaign
 from validation.campaign.campaign_file import read_campaign
 from validation.exchange.device_table import Writing, parse_time
 
@@ -128,15 +127,6 @@ def test_one_command_from_a_device_s_file_to_the_verdict(lab, run):
     assert status == 0, err
     assert json.loads(out)["verdict"] == "none_needed"
     assert report.stat().st_size < 5e6
-
-
-@pytest.mark.skipif(
-    "points" not in Campaign.__dataclass_fields__, reason="campaigns have no points yet"
-)
-def test_several_targets_are_points_of_the_campaign(lab, run):
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
-    assert run(*lab.words())[0] == 0
-    assert len(read_campaign(lab.folder / "campaign")) == 39
 
 
 def test_a_german_table_with_times_and_uncertainty(lab, run):

@@ -308,7 +308,6 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
     results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
     assert results.solution["status"] == "cannot assemble"
     assert not results.passed
-    results.study.folder.joinpath("x")
     assert verdict(results).startswith(
         "No answer at this pose: cannot assemble, a rigid"
     )
@@ -340,14 +339,10 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
         ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
         ("title", "scales = [[1]]\ntitle", "scales: found [1] as number 1, expected"),
         ("title", "title = 1 #", "title: found 1, expected a string"),
-        ("title", "title", None),
     ],
 )  # fmt: skip
 def test_every_mistake_in_a_study_file_is_one_message(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
-    if message is None:
-        assert read_study(path).robot.name == "irsbot2"
-        return
     with pytest.raises(BadInput) as error:
         read_study(path)
     text = str(error.value)
