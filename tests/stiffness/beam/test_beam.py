@@ -130,17 +130,6 @@ def test_thin_tube_reaches_cowpers_limit():
 
 
 @pytest.mark.parametrize(
-    ("ratio", "factor"), [(1, 0.1406), (1.5, 0.1958), (2, 0.2287), (10, 0.3123)]
-)
-def test_rectangle_torsion_is_timoshenkos_table(ratio, factor):
-    """Timoshenko & Goodier, section 109, k1; printed to three or four digits."""
-    section = rectangular_section(ratio * 0.1, 0.1, NU)
-    expected = factor * ratio * 0.1**4
-    assert section.J == pytest.approx(expected, rel=6e-4)
-    assert rectangular_section(0.1, ratio * 0.1, NU).J == section.J
-
-
-@pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: round_section(-1, NU), "radius = -1 must be finite and > 0"),

@@ -89,9 +89,9 @@ def calculix_element(K):
 def five_columns(K):
     """Node, direction, node, direction, value: the upper half."""
     return "".join(
-        f"{i // 6 + 1},{i % 6 + 1}, {j // 6 + 1},{j % 6 + 1}, {K[i, j]!r}\n"
+        f"{i // 6 + 1},{i % 6 + 1}, {j // 6 + 1},{j % 6 + 1}, {K[i, j].item()!r}\n"
         for i in range(12) for j in range(i, 12) if K[i, j]
-    ).replace("np.float64(", "").replace(")", "")  # fmt: skip
+    )  # fmt: skip
 
 
 def three_columns(K):

@@ -162,14 +162,6 @@ def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
 
 
 @both_orders
-def test_stiffness_is_symmetric_definite_and_reciprocal(order):
-    _, solution = solved(bar_solid(2, 4, 0.04, 0.2), order)
-    K = solution.stiffness
-    np.testing.assert_allclose(K, K.T, atol=0)
-    assert np.linalg.eigvalsh(scaled(K, K))[0] > 0.01
-
-
-@both_orders
 def test_a_mirrored_link_has_the_mirrored_stiffness(order):
     """x to -x: RX, TY, TZ keep their sign, RY, RZ, TX change it."""
     solid = box_solid((2, 3, 3), (0.05, 0.08, 0.2))
@@ -225,19 +217,6 @@ def test_reading_at_another_tip_is_a_screw_map(order):
     A = screw_map(there - near)
     expected = A.T @ one.stiffness @ A
     assert np.abs(scaled(other.stiffness - expected, expected)).max() < 1e-11
-
-
-@both_orders
-def test_superlu_and_pardiso_agree(order):
-    mesh = curved_mesh(order, layers=True)
-    upper = assemble(mesh, *constants(mesh))
-    free = np.ones(upper.shape[0], dtype=bool)
-    free[np.unique(mesh.faces[mesh.patch == 0])[:, None] * 3 + np.arange(3)] = False
-    part = upper[free][:, free]
-    loads = np.random.default_rng(0).normal(size=(part.shape[0], 2))
-    slow = solve(part, loads, "SuperLU")
-    fast = solve(part, loads, solver_name())
-    np.testing.assert_allclose(fast, slow, rtol=0, atol=1e-9 * np.abs(slow).max())
 
 
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))

@@ -11,7 +11,6 @@ from stiffness.fem.adaptive_step import (
     DEFAULT_EFFECTIVITY,
     SAFETY_FACTOR,
     estimated_error,
-    refine_level,
     solve_level,
 )
 from stiffness.fem.condensation import condense, rigid_motions
@@ -157,17 +156,6 @@ def test_a_bar_thinner_than_its_shape_is_as_much_softer_as_the_books_say(excess)
     np.testing.assert_allclose(-estimate, exact, rtol=0.02)
 
 
-def test_only_round_faces_of_bent_elements_can_leave_their_shapes():
-    """Interfaces are planes; a face's share is that of its own piece of the side."""
-    level = bar(1, 6)
-    each = geometry_errors(
-        level.mesh, level.solid.shapes, level.solution.fields, *constants(level.mesh)
-    )
-    side = level.mesh.patch == 2
-    assert np.abs(each[~side]).max() == 0
-    assert np.abs(each[side]).max() > 0
-
-
 @pytest.mark.parametrize(
     "mesh", [(1, 12), (2, 12), pytest.param((3, 18), marks=pytest.mark.slow)]
 )
@@ -268,12 +256,3 @@ def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
     whole = condense(mesh, *constants(mesh), centers).stiffness
     cut = bar(2, 12).solution.stiffness
     assert whole[0, 0] / BENDING - 1 > 2 * (cut[0, 0] / BENDING - 1) > 0
-
-
-def test_refining_grows_by_what_was_asked_and_what_its_neighbours_need():
-    level = bar(1, 6)
-    count = len(level.solid.cells)
-    sizes = [len(refine_level(level, growth).cells) for growth in (1.0, 1.5, 3.0)]
-    assert sizes[0] == count
-    assert 1.5 * count <= sizes[1] < sizes[2]
-    assert 3.0 * count <= sizes[2] <= 20 * count

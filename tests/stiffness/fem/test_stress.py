@@ -104,7 +104,8 @@ def test_the_region_is_stated_and_the_edge_kept_out(solved):
     assert stress.places[:, 2].min() >= R * (1 - 1e-9)
     assert stress.places[:, 2].max() <= (L - R) * (1 + 1e-9)
     assert "at least 0.04 m away" in stress.region
-    with pytest.raises(BadInput, match="nothing of the link is 1 m away"):
+    words = "stress: nothing of the link is 1 m away from its interfaces; the furthest"
+    with pytest.raises(BadInput, match=f"^{words} node is 0.2 m$"):
         stress_influence(solved, away=1.0)
 
 

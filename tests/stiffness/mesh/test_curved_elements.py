@@ -7,14 +7,13 @@ from stiffness.fem.elements import integration, isoparametric, lame, triangle_ar
 from stiffness.fem.error_indicator import geometry_errors
 from stiffness.mesh.curved_elements import (
     curved_elements,
-    patches_of_cells,
     refine_inverted,
 )
 from stiffness.mesh.edge_grading import layered, split_joining_edges
 from stiffness.mesh.lagrange import lattice, shape_functions
 from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Plane, Sphere
-from tests.solids_for_tests import bar_solid, box_cells, box_solid, outward
+from tests.solids_for_tests import bar_solid, box_cells, outward
 
 HALF = 0.5  # tangent of half the angle that the shell's piece is seen under
 SOLID_ANGLE = 4 * np.arcsin(HALF**2 / (1 + HALF**2))
@@ -179,22 +178,3 @@ def test_what_does_not_fold_is_left_as_it_is():
     for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
         assert not curved_elements(solid, 3).inverted.any()
         assert refine_inverted(solid, 3) is solid
-
-
-def test_a_cells_faces_are_of_the_boundarys_patches_or_inside():
-    """The k-th face lacks corner 3 - k; looked up one by one, however corners are
-    numbered."""
-    solid = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
-    name = np.random.default_rng(8).permutation(len(solid.points))
-    points = np.empty_like(solid.points)
-    points[name] = solid.points
-    numbers = np.arange(len(solid.faces)) % 7
-    cells, faces = name[solid.cells], name[solid.faces]
-    solid = Solid(points, cells, faces, numbers, (None,) * 7)
-    corners = np.sort(cells, axis=1)
-    known = {frozenset(f): n for f, n in zip(solid.faces, numbers, strict=True)}
-    expected = [
-        [known.get(frozenset(np.delete(cell, 3 - k)), -1) for k in range(4)]
-        for cell in corners
-    ]
-    assert patches_of_cells(solid.faces, solid.patch, corners).tolist() == expected

@@ -11,7 +11,6 @@ from stiffness.fem.condensation import KINDS, condense
 from stiffness.fem.elements import integration, isoparametric, triangle_areas
 from stiffness.link import scaled
 from stiffness.mesh.edge_grading import (
-    LAYER_SHARE,
     layered,
     singular_edges,
     split_joining_edges,
@@ -22,7 +21,6 @@ from stiffness.mesh.solid import Solid, boundary_faces
 from stiffness.surface.primitives import Plane
 from tests.solids_for_tests import (
     Z,
-    bar_solid,
     box_solid,
     constants,
     masked_solid,
@@ -61,16 +59,6 @@ def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(
     inner = (np.abs(middle[:, :2] - 0.1) < 1e-9).all(axis=1)
     assert (clamped.sum(), inner.sum()) == (8 * len(heights), 3)
     assert edges == {tuple(edge) for edge in ends[clamped | inner]}
-
-
-def test_fewer_clamped_patches_have_fewer_singular_edges():
-    for solid, least in ((corner_post(), 3), (bar_solid(2, 3, 0.02, 0.1), 0)):
-        none, one, two = (
-            {tuple(e) for e in singular_edges(solid, held)}
-            for held in reversed(CLAMPED)
-        )
-        assert none < one < two
-        assert len(none) == least
 
 
 def touched(solid, held):
@@ -116,15 +104,6 @@ def check_layers(solid, held):
     return mesh, parts
 
 
-@pytest.mark.parametrize("held", CLAMPED)
-def test_layers_of_an_l_conform_and_lose_nothing(held):
-    solid = split_joining_edges(corner_post(), held)
-    check_chordless(solid, held)
-    assert solid.volumes().sum() == pytest.approx(0.75 * SIZE.prod(), rel=1e-12)
-    mesh, _ = check_layers(solid, held)
-    assert len(mesh.cells) > 1.5 * len(solid.cells)
-
-
 @settings(max_examples=25, deadline=None)
 @given(
     kept=st.lists(st.booleans(), min_size=12, max_size=12).filter(any),
@@ -145,26 +124,6 @@ def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
     share = sum(kept) / len(kept)
     assert solid.volumes().sum() == pytest.approx(share * SIZE.prod(), rel=1e-12)
     check_layers(solid, held)
-
-
-def test_the_layer_takes_its_share_of_each_edge():
-    """New corners lie at LAYER_SHARE of the way from a singular corner to another one;
-    old corners stay, and tetrahedra away from singular edges stay whole."""
-    held = (0, 1)
-    solid = split_joining_edges(corner_post(), held)
-    parts = layered(solid, held)
-    new = parts.corners >= len(solid.points)
-    corners = np.sort(solid.cells, axis=1)[parts.parent]
-    on = touched(solid, held)[corners]
-    places = parts.places[new]
-    of = np.broadcast_to(on[:, None, :], parts.places.shape)[new]
-    shares = np.tile([0, 0, LAYER_SHARE, 1 - LAYER_SHARE], (len(places), 1))
-    np.testing.assert_allclose(np.sort(places, axis=1), shares, rtol=1e-12)
-    assert of[places > 0.5].all()
-    assert not of[(places > 0) & (places < 0.5)].any()
-    assert (parts.places[~new].max(axis=1) == 1).all()
-    far = np.flatnonzero(~touched(solid, held)[solid.cells].any(axis=1))
-    assert (np.bincount(parts.parent)[far] == 1).all()
 
 
 # --- nested spaces -------------------------------------------------------------------

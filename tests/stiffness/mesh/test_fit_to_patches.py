@@ -8,33 +8,14 @@ import pytest
 
 from forcefit.inputs.table import BadInput
 from stiffness.mesh.fit_to_patches import MeshFailed, fit_to_patches
-from stiffness.mesh.solid import boundary_faces, on_shapes
+from stiffness.mesh.solid import boundary_faces
 from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import Patches, find_patches
 from stiffness.surface.primitives import Plane
 from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, box_solid
 
-X, Z = np.array([1.0, 0, 0]), np.array([0.0, 0, 1])
-
-
-def test_points_within_reach_go_to_all_their_shapes_and_others_stay():
-    """A point at a corner of two planes goes to their common line, of a patch without a
-    shape nowhere."""
-    points = np.array([
-        [0.1, 0.2, 0.3],
-        [0.1, 5.0, 3.0],
-        [0.1, 0.2, 0.3],
-        [0.3, 0, 0.4],
-    ])
-    shapes = (Plane(0 * X, X), Plane(0 * Z, Z), None)
-    groups = [((0,), np.array([0, 1])), ((2,), np.array([2])), ((0, 1), np.array([3]))]
-    moved = on_shapes(points, groups, shapes, 0.5 * (1 + 1e-9))
-    expected = [[0.0, 0.2, 0.3], [0.0, 5.0, 3.0], points[2], [0.0, 0.0, 0.0]]
-    np.testing.assert_allclose(moved, expected, atol=1e-14)
-    moved = on_shapes(points, groups, shapes, 0.5 * (1 - 1e-9))
-    np.testing.assert_allclose(moved[3], points[3])
-    np.testing.assert_allclose(points[0], [0.1, 0.2, 0.3])
+Z = np.array([0.0, 0, 1])
 
 
 def test_a_face_of_one_tetrahedron_alone_is_on_the_boundary():

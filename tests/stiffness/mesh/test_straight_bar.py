@@ -78,24 +78,3 @@ def test_a_square_bar_bends_alike_about_both_axes_and_its_estimate_covers_its_er
     size = np.sqrt(np.outer(np.diag(K), np.diag(K)))
     off = np.abs((coarse.stiffness - K) / size).max()
     assert off < coarse.relative_error_estimate
-
-
-@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
-def test_each_side_of_a_bar_is_a_patch(section):
-    """Round ones by radius, the outer first; flat ones across x, then across y."""
-    solid = straight_bar(section)
-    corners = solid.points[solid.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    ends = np.abs(normals[:, 2]) > 1e-9 * np.linalg.norm(normals, axis=1)
-    np.testing.assert_array_equal(solid.patch < 2, ends)
-    np.testing.assert_allclose(corners[ends][..., 2].T, [solid.patch[ends]] * 3)
-    if "radius" in section:
-        radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
-        assert [shape.radius for shape in solid.shapes[2:]] == radii
-        expected = np.array(radii)[solid.patch[~ends] - 2]
-        away = np.linalg.norm(corners[~ends][..., :2], axis=2)
-        np.testing.assert_allclose(away.T, [expected] * 3, rtol=1e-12)
-    else:
-        assert solid.shapes[2:] == (None, None)
-        across = np.abs(normals[~ends]).argmax(axis=1)
-        np.testing.assert_array_equal(solid.patch[~ends], 2 + across)

@@ -10,7 +10,6 @@ from stiffness.surface.interface import parse_interface
 from stiffness.surface.patches import find_patches, interface_shape, triangles_on
 from stiffness.surface.primitives import Cone, Plane
 from stiffness.surface.surface import Surface, check_surface
-from stiffness.surface.triangle_graph import TriangleGraph
 from tests.solids_for_tests import bar, cylinder
 
 FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface
@@ -142,21 +141,3 @@ def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
         members = np.bincount(patches.patch)
         assert members.tolist() == [sides, sides, *([2 * sides // count] * count)]
         assert (patches.patch >= 0).all()
-
-
-def test_a_cap_with_its_corners_on_a_cylinder_is_not_of_it():
-    """A fan from a corner of the rim: all its corners are on the cylinder."""
-    points, triangles = cylinder(0.02, 0.1, 24)
-    i = np.arange(1, 23)
-    caps = [np.column_stack([0 * i, i + 1, i]), np.column_stack([0 * i, i, i + 1]) + 24]
-    surface = check_surface(
-        points[:48], np.concatenate([triangles[:48], *caps]), "prism"
-    )
-    along = np.abs(surface.normals()[:, 2]) > 0
-    graph = TriangleGraph(surface)
-    cone = Cone(np.zeros(3), np.array([0.0, 0, 1]), 0.02)
-    every = np.arange(len(surface.triangles))
-    np.testing.assert_array_equal(graph.fits(cone, every), ~along)
-    inside_out = Cone(np.zeros(3), np.array([0.0, 0, -1]), 0.02)
-    np.testing.assert_array_equal(graph.fits(inside_out, every), ~along)
-    assert not graph.fits(Cone(np.zeros(3), cone.axis, 0.0201), every).any()
