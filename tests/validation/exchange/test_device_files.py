@@ -91,29 +91,85 @@ def test_leica_export_with_a_zero_uncertainty_is_read(lab, run, encoding):
     assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
 
 
-WIDE_HEADS = {
-    "prefix": ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
-    "dots": ",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"),
-    "suffix": ",".join(f"{a}_{n}" for n in "ABC" for a in "xyz"),
-    "joined": ",".join(f"{n}{a}" for n in "ABC" for a in "xyz"),
-    "numbered": ",".join(f"{a}{k}" for k in (1, 2, 3) for a in "xyz"),
-    "twice": ",".join("XYZ" * 3),
+def with_commas(lines):
+    """Decimal commas, as in German exports; dates keep their points."""
+    return [line.replace(".", ",").replace("02,03,", "02.03.") for line in lines]
+
+
+def hidden(lines):
+    """A target that was hidden in the fifth line."""
+    cells = lines[4].split(",")
+    cells[2:5] = "", "", ""
+    return [*lines[:4], ",".join(cells), *lines[5:]]
+
+
+AXES = ",".join("XYZ" * 3)
+MOTIVE = [
+    "Format Version,1.23,Capture Frame Rate,120.0,Length Units,Millimeters", "",
+    ",Type," + ",".join(["Marker"] * 9),
+    ",Name," + ",".join(f"arm:{n}" for n in "ABC" for _ in "xyz"),
+    ",ID," + ",".join(["7"] * 9), ",," + ",".join(["Position"] * 9),
+    "Frame,Time (Seconds)," + AXES,
+]  # fmt: skip
+VICON = ["Trajectories", "100", ",,arm:A,,,arm:B,,,arm:C,,", "Frame,Sub Frame," + AXES,
+         ",,mm" + 8 * ",mm"]  # fmt: skip
+GERMAN = with_commas(
+    points(line="p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00")
+)
+FARO = "FARO CAM2 2023\nReport: robot 7\n{}\nCoordinate System: World\n\n"
+FARO += "Name\tX\tY\tZ\tDeviation"
+FARO_ROWS = list(points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021"))
+BLANKS = list(points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}"))
+STATED, COMMA = {"unit": None}, {"unit": None, "decimal": '","'}
+# head, body, keys of the targets file
+EXPORTS = {
+    "prefix": (",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"), rows(), {}),
+    "dots": (",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "suffix": (",".join(f"{a}_{n}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "joined": (",".join(f"{n}{a}" for n in "ABC" for a in "xyz"), rows(), {}),
+    "numbered": (",".join(f"{a}{k}" for k in (1, 2, 3) for a in "xyz"), rows(), {}),
+    "axes alone": (AXES, rows(), {}),
+    "commands in rows": (
+        "Point," + ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
+        reversed(list(rows(line="p{k}"))), {},
+    ),
+    # a target that was hidden is missing
+    "Vicon": ("\r\n".join(VICON), hidden(list(rows(line="{k}00,0"))), STATED),
+    "Motive": ("\n".join(MOTIVE), rows(line="{k},0.{k}"), STATED),
+    "German": ("Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit", GERMAN, COMMA),
+    "slash": ("Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit", GERMAN, COMMA),
+    "underline": ("Point Name;X_mm;Y_mm;Z_mm;Date;Time", GERMAN, COMMA),
+    "FARO": (FARO.format("Units: Millimeters"), FARO_ROWS, STATED),
+    "FARO in": (FARO.format("Units in mm"), FARO_ROWS, STATED),
+    "FARO unit": (FARO.format("unit\tmm"), FARO_ROWS, STATED),
+    "blanks": ("Point Name    X          Y          Z", BLANKS, {}),
+    "blanks, units": ("Point  X [mm]  Y [mm]  Z [mm]", BLANKS, {}),
+    "blank, units": ("Point X [mm] Y [mm] Z [mm]", BLANKS, {}),
+    # the commands are separated by commas and have points
+    "commas": ("Point;X [mm];Y [mm];Z [mm]",
+               with_commas(points(line="p{k}::{name};{x!r};{y!r};{z!r}")), COMMA),
+}  # fmt: skip
+EXPORTS = {
+    name: (head, list(body), keys) for name, (head, body, keys) in EXPORTS.items()
 }
 
 
-@pytest.mark.parametrize("head", WIDE_HEADS)
-def test_table_with_all_targets_in_a_row_is_read(lab, run, head):
-    table = imported(lab, run, "\n".join([WIDE_HEADS[head], *rows()]))
-    assert (table["readings"], table["rows"]) == (39, 13)
-    assert_exact(lab, 39)
-
-
-def test_wide_table_is_joined_by_the_commands_in_its_rows(lab, run):
-    head = "Point," + WIDE_HEADS["prefix"]
-    body = list(rows(line="p{k}"))
-    table = imported(lab, run, "\n".join([head, *reversed(body)]))
-    assert (table["joined_by"], table["readings"]) == ("name", 39)
-    assert_exact(lab, 39)
+@pytest.mark.parametrize("name", EXPORTS)
+def test_export_of_a_device_program_is_read_exactly(lab, run, name):
+    head, body, keys = EXPORTS[name]
+    lab.targets(**keys)
+    encoding = "utf-8-sig" if name == "commas" else "utf-8"
+    table = imported(lab, run, "\n".join([head, *body]), encoding)
+    readings = 38 if name == "Vicon" else 39
+    assert (table["readings"], table["rows"]) == (readings, 13)
+    assert_exact(lab, readings)
+    if "p3" in "".join(body):
+        assert table["joined_by"] == "name"
+    if name == "Vicon":
+        assert "1 readings without coordinates" in table["left_out"][0]
+    if body is EXPORTS["German"][1]:
+        times = read_campaign(lab.folder / "campaign").covariates["time"]
+        assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
 
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
@@ -127,38 +183,6 @@ def test_rows_of_numbers_alone_are_all_targets_in_their_order(lab, run, before):
 def test_rows_without_any_reading_are_one_line(lab, run):
     line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
     assert "found no" in line
-
-
-def test_vicon_trajectories_are_read(lab, run):
-    """Names above merged cells, units below; a target that was hidden is missing."""
-    body = list(rows(line="{k}00,0"))
-    cells = body[4].split(",")
-    cells[2:5] = "", "", ""
-    body[4] = ",".join(cells)
-    head = ["Trajectories", "100", ",,arm:A,,,arm:B,,,arm:C,,",
-            "Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z", ",,mm" + 8 * ",mm"]  # fmt: skip
-    lab.targets(unit=None)
-    table = imported(lab, run, "\r\n".join([*head, *body]))
-    assert table["readings"] == 38
-    assert "1 readings without coordinates" in table["left_out"][0]
-    assert_exact(lab, 38)
-
-
-def test_motive_csv_is_read(lab, run):
-    """OptiTrack's: properties, then name, ID and kind of each column above the axes."""
-    head = [
-        "Format Version,1.23,Capture Frame Rate,120.0,Length Units,Millimeters",
-        "",
-        ",Type," + ",".join(["Marker"] * 9),
-        ",Name," + ",".join(f"arm:{n}" for n in "ABC" for _ in "xyz"),
-        ",ID," + ",".join(["7"] * 9),
-        ",," + ",".join(["Position"] * 9),
-        "Frame,Time (Seconds)," + ",".join("XYZ" * 3),
-    ]
-    lab.targets(unit=None)
-    table = imported(lab, run, "\n".join([*head, *rows(line="{k},0.{k}")]))
-    assert table["readings"] == 39
-    assert_exact(lab, 39)
 
 
 def test_motive_rigid_body_is_read_without_its_markers(lab, run):
@@ -182,57 +206,9 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     assert_exact(lab, 13)
 
 
-@pytest.mark.parametrize(
-    "head",
-    ["Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit",
-     "Punktname;X / mm;Y / mm;Z / mm;Datum;Zeit",
-     "Point Name;X_mm;Y_mm;Z_mm;Date;Time"],
-)  # fmt: skip
-def test_german_headers_and_units_after_a_slash_are_read(lab, run, head):
-    lab.targets(unit=None, decimal='","')
-    line = "p{k}::{name};{x!r};{y!r};{z!r};02.03.2026;10:{k:02d}:00"
-    body = [line.replace(".", ",").replace("02,03,", "02.03.")
-            for line in points(line=line)]  # fmt: skip
-    imported(lab, run, "\n".join([head, *body]))
-    assert_exact(lab, 39)
-    times = read_campaign(lab.folder / "campaign").covariates["time"]
-    assert times == pytest.approx(60.0 * np.repeat(np.arange(13), 3))
-
-
-@pytest.mark.parametrize("stated", ["Units: Millimeters", "Units in mm", "unit\tmm"])
-def test_lines_before_the_header_are_passed_over_and_say_the_unit(lab, run, stated):
-    head = ["FARO CAM2 2023", "Report: robot 7", stated, "Coordinate System: World", ""]
-    lab.targets(unit=None)
-    body = points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021")
-    text = "\n".join([*head, "Name\tX\tY\tZ\tDeviation", *body])
-    assert imported(lab, run, text)["joined_by"] == "name"
-    assert_exact(lab, 39)
-
-
-@pytest.mark.parametrize(
-    "head",
-    ["Point Name    X          Y          Z", "Point  X [mm]  Y [mm]  Z [mm]",
-     "Point X [mm] Y [mm] Z [mm]"],
-)  # fmt: skip
-def test_header_of_words_in_a_table_of_blanks_is_read(lab, run, head):
-    body = points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}")
-    assert imported(lab, run, "\n".join([head, *body]))["joined_by"] == "name"
-    assert_exact(lab, 39)
-
-
 def test_unit_stated_in_the_file_and_another_declared_are_refused(lab, run):
     line = refused(lab, run, "Units: Inches\nname;x;y;z\nA;1;2;3")
     assert 'line 1: found the unit "in", the targets file says "mm"' in line
-
-
-def test_decimal_comma_of_an_export_does_not_touch_a_table_of_commas(lab, run):
-    """The commands are parted by commas and have points."""
-    lab.targets(unit=None, decimal='","')
-    body = [
-        line.replace(".", ",") for line in points(line="p{k}::{name};{x!r};{y!r};{z!r}")
-    ]
-    imported(lab, run, "\n".join(["Point;X [mm];Y [mm];Z [mm]", *body]), "utf-8-sig")
-    assert_exact(lab, 39)
 
 
 def test_decimal_is_declared_for_each_table(lab, run):
@@ -381,39 +357,35 @@ def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
     assert "0.001 times as far, all alike, as mm taken for m" in line
 
 
-def test_targets_that_are_elsewhere_are_remarked(lab, run):
-    """B was mounted 60 mm from its place: its distances are not those declared."""
+def moved_mount(k, name, p):
+    """B was mounted 60 mm from its place."""
+    turn = Rotation.from_euler("z", sum(ANGLES[k]))
+    return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
-    def change(k, name, p):
-        turn = Rotation.from_euler("z", sum(ANGLES[k]))
-        return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
+def no_target(k, name, p):
+    return np.random.default_rng([k, ord(name)]).normal(0, 0.8, 3)
+
+
+SHUFFLED = list(points("A", "{x!r} {y!r} {z!r}"))
+REMARKS = {
+    "other distances": ("ABC", points(line=SPATIAL_ANALYZER, change=moved_mount),
+        "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143"),
+    "other order": ("A", SHUFFLED[::2] + SHUFFLED[1::2],
+        "are they joined to the right ones?"),
+    "no targets": ("ABC", points(line=SPATIAL_ANALYZER, change=no_target),
+        "distances differ from row to row, whatever was commanded"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REMARKS)
+def test_readings_that_do_not_fit_targets_or_commands_are_remarked(lab, run, case):
+    names, lines, remark = REMARKS[case]
+    lab.targets(names)
+    lab.export("\n".join(lines))
     status, out, _ = run(*lab.words())
     assert status == 0
-    assert "remark: A and B are read 0.162 .. 0.162 m apart, declared 0.143" in out
-
-
-def test_readings_that_do_not_follow_the_commands_are_remarked(lab, run):
-    """Joined by order, and the commands were written down in another."""
-    lab.targets("A")
-    body = list(points("A", "{x!r} {y!r} {z!r}"))
-    lab.export("\n".join(body[::2] + body[1::2]))
-    status, out, _ = run(*lab.words())
-    assert status == 0
-    assert "are they joined to the right ones?" in out
-
-
-def test_columns_that_are_no_places_of_targets_are_remarked_as_such(lab, run):
-    """No command can be to blame where the targets' own distances come and go."""
-
-    def change(k, name, p):
-        return np.random.default_rng([k, ord(name)]).normal(0, 0.8, 3)
-
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
-    status, out, _ = run(*lab.words())
-    assert status == 0
-    assert "distances differ from row to row, whatever was commanded" in out
+    assert remark in out
 
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
