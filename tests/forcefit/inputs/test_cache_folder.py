@@ -77,7 +77,7 @@ def test_a_temporary_folder_that_others_may_write_is_not_taken(nothing):
     assert cache_folder() is None
 
 
-def test_nothing_is_kept_where_no_folder_can_be_written(nothing):
+def test_no_cache_without_a_writable_folder(nothing):
     shutil.rmtree(nothing / "tmp")
     assert cache_folder() is None
 

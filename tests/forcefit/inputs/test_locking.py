@@ -12,7 +12,7 @@ from forcefit.inputs.locking import locked_file
 ROOT = Path(__file__).parents[3]
 
 
-def test_a_locked_file_is_refused_until_it_is_let_go(tmp_path):
+def test_locked_file_is_refused_until_released(tmp_path):
     """In the same process too: a run that begins another of the same file."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):
@@ -24,7 +24,7 @@ def test_a_locked_file_is_refused_until_it_is_let_go(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_lock_that_a_killed_program_left_stops_nobody(tmp_path):
+def test_lock_of_a_killed_program_is_taken(tmp_path):
     path = tmp_path / "map.nc.journal"
     held = f"""
 import os
@@ -69,7 +69,7 @@ main()
         "assembly solve irsbot2 --pose tx=0.1,tz=-0.5 --json {}.json",
     ],
 )
-def test_a_command_needs_nothing_that_only_posix_has(tmp_path, words):
+def test_commands_run_without_posix_modules(tmp_path, words):
     """Modules and functions that Windows lacks: the same answer without them.
 
     Only what runs in the command's own process is tried.

@@ -117,7 +117,7 @@ def test_lists_of_numbers_become_arrays(value, expected):
     [1.0, "12", None, {"a": 1}, [True], ["1"], [[1], [1, 2]], [[1], 2], [1, [2]],
      [[1], ["a"]], [2**1024], [-(10**400)]],
 )  # fmt: skip
-def test_what_is_not_numbers_of_one_shape_becomes_none(value):
+def test_ragged_or_non_numeric_lists_give_none(value):
     assert number_array(value) is None
 
 
@@ -141,7 +141,7 @@ def test_the_fault_in_an_array_is_pointed_at(value, shape, text):
     assert find_fault(value, shape) == text
 
 
-def test_inf_is_no_fault_where_it_is_a_number():
+def test_infinity_is_accepted_on_request():
     assert find_fault([1, math.inf, "a"], (3,), infinite=True) == "'a' as number 3"
 
 
@@ -254,7 +254,7 @@ def test_a_file_too_large_is_not_read(tmp_path):
         ("a = 1\na = 2", "Cannot overwrite a value"),
     ],
 )
-def test_what_is_not_toml_is_refused_with_its_reason(text, reason, tmp_path):
+def test_wrong_toml_is_refused_with_its_reason(text, reason, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(text)
     found = message(read_toml, path)

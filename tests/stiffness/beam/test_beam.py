@@ -65,7 +65,7 @@ def test_two_beams_end_to_end_are_one_beam(cut, rng):
     assert_same(A @ beam(cut * 0.7) @ A.T + beam((1 - cut) * 0.7), beam(0.7), 1e-13)
 
 
-def test_rows_of_the_textbook():
+def test_compliance_has_the_entries_of_the_textbook():
     """Gere: F L^3/3EI + F L/GA', F L^2/2EI, M L/EI, T L/GJ, F L/EA."""
     L, G = 0.5, E / (2 * (1 + NU))
     C = beam_compliance(L, SECTION, E, NU)
@@ -146,7 +146,7 @@ def test_thin_tube_reaches_cowpers_limit():
         (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
     ],
 )
-def test_what_is_no_beam_is_refused(call, message):
+def test_wrong_beam_is_refused(call, message):
     with pytest.raises(BadInput) as caught:
         call()
     assert message in str(caught.value)
@@ -196,7 +196,7 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
         (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
     ],
 )
-def test_what_is_no_compliance_is_refused(C, message):
+def test_wrong_compliance_is_refused(C, message):
     with pytest.raises(BadInput) as caught:
         LinkStiffness("test", C, tip=[0, 0, 0], base=[0, 0, 0])
     assert message in str(caught.value)

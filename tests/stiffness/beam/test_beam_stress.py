@@ -221,7 +221,7 @@ def test_a_mirrored_wrench_gives_the_same_peak(section, rng):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_many_wrenches_at_once_are_one_after_the_other(section, rng):
+def test_many_wrenches_give_the_peaks_of_each(section, rng):
     wrench = rng.normal(size=(3, 1000, 6))
     stress, where = peak_beam_stress(section, 0.2, wrench)
     assert stress.shape == (3, 1000)
@@ -258,7 +258,7 @@ def test_many_wrenches_at_once_are_one_after_the_other(section, rng):
         (BAR, 0.1, np.full(6, np.nan), "finite numbers"),
     ],
 )
-def test_what_cannot_be_answered_is_refused(section, length, wrench, message):
+def test_wrong_stress_input_is_refused(section, length, wrench, message):
     with pytest.raises(BadInput, match=message):
         peak_beam_stress(section, length, wrench)
 

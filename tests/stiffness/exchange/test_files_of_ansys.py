@@ -113,7 +113,7 @@ def test_nodes_of_a_named_selection_with_decimal_commas(solid):
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
-def test_six_freedoms_a_node(tmp_path):
+def test_mapping_of_six_freedoms_a_node_is_read(tmp_path):
     """A superelement of two nodes, the second one first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
@@ -138,7 +138,7 @@ def test_six_freedoms_a_node(tmp_path):
         ("Matrix Eqn\n", "rows that do not run from 1"),
     ],
 )
-def test_a_mapping_that_is_none(text, message, tmp_path):
+def test_wrong_mapping_is_refused_in_one_line(text, message, tmp_path):
     (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
     (tmp_path / "k.mapping").write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -157,7 +157,7 @@ def test_a_mapping_that_is_none(text, message, tmp_path):
          "expected a number"),
     ],
 )  # fmt: skip
-def test_a_harwell_boeing_file_that_is_none(change, message, tmp_path):
+def test_wrong_harwell_boeing_file_is_refused(change, message, tmp_path):
     text = harwell_boeing(csc_array(np.eye(12)), right_side=False)
     (tmp_path / "k.matrix").write_text(change(text))
     with pytest.raises(BadInput, match=message):
@@ -196,7 +196,7 @@ def test_every_kind_of_matrix_market(head, numbers, tmp_path):
         ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
     ],
 )
-def test_a_damaged_matrix_market_file_is_one_line(text, message, tmp_path):
+def test_damaged_matrix_market_file_is_refused(text, message, tmp_path):
     """SciPy's reader takes some of these for a matrix, or allocates what they claim."""
     (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
     with pytest.raises(BadInput, match=message):

@@ -143,7 +143,7 @@ def test_a_textbook_beam_from_every_program(name, write, tolerance, tmp_path):
     assert link.base - link.tip == pytest.approx([-0.5, 0, 0], abs=1e-9)
 
 
-def test_dmig_of_four_digits(tmp_path):
+def test_dmig_of_four_digits_is_refused_as_unbalanced(tmp_path):
     """Eight characters hold four digits, so the ends balance to a stiff beam's 1e-4."""
     path = tmp_path / "k.pch"
     K = textbook_beam()
@@ -157,7 +157,7 @@ def test_dmig_of_four_digits(tmp_path):
     "to", ["matrix-market", "abaqus", "calculix", "nastran", "numpy"]
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
-def test_what_is_written_is_read_back(to, unit, tmp_path, rng):
+def test_exported_link_is_imported_again(to, unit, tmp_path, rng):
     """Any stiffness, any offset; ten digits of Nastran's fields, else rounding."""
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
@@ -239,7 +239,9 @@ def test_a_chain_of_beams_is_condensed_to_its_ends(tmp_path):
         (lambda K: np.array(["a"]), [], "expected a square of numbers"),
     ],
 )
-def test_what_is_no_link_is_one_line(run, matrix, options, message, tmp_path):
+def test_matrix_that_is_no_link_is_refused_in_one_line(
+    run, matrix, options, message, tmp_path
+):
     path = tmp_path / "k.npy"
     np.save(path, matrix(textbook_beam()))
     status, out, err = run("stiffness", "import", path, *options)
@@ -268,7 +270,7 @@ def test_what_is_no_link_is_one_line(run, matrix, options, message, tmp_path):
         ("k.odb", "", "found the ending .odb, expected one of"),
     ],
 )
-def test_a_wrong_file_is_one_line(run, name, text, message, tmp_path):
+def test_wrong_matrix_file_is_refused_in_one_line(run, name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
     status, out, err = run("stiffness", "import", tmp_path / name)
     assert (status, out) == (2, "")
@@ -310,7 +312,7 @@ def test_only_a_matrix_of_the_same_format_is_replaced(run, tmp_path):
     assert "found a file that is not a matrix for nastran" in err
 
 
-def test_numbers_whose_products_are_none_are_refused(run, tmp_path):
+def test_stiffness_above_1e100_is_not_exported(run, tmp_path):
     link = tmp_path / "rod.json"
     K = np.diag([1e300, 1, 1, 1, 1, 1]).tolist()
     link.write_text(json.dumps({"stiffness": K, "base": [0] * 3, "tip": [0, 0, 1]}))

@@ -87,7 +87,7 @@ def test_a_stiffness_is_twice_the_energy_of_its_fields(kind):
     np.testing.assert_allclose(means[1], np.eye(6), atol=1e-8)
 
 
-def test_what_is_solved_for_is_what_no_interface_holds():
+def test_unknowns_exclude_the_held_interfaces():
     """All nodes of a quadratic 2 by 4 by 4 grid; less base and tip; less the base;
     less six supports."""
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)

@@ -108,7 +108,7 @@ def test_a_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 
 @pytest.mark.parametrize("curved", [False, True])
-def test_the_matrix_is_scikit_fems(curved):
+def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
     """A second code, whose weak form shares nothing with ours but the rule."""
     import skfem
     from scipy.spatial import cKDTree

@@ -100,7 +100,7 @@ def test_linear_strains_leave_no_error_and_quadratic_ones_do(rng, singular):
     assert np.diag(estimate[1]).min() > 1e-5 * E
 
 
-def test_at_a_singular_edge_it_is_the_energy_of_what_is_not_linear():
+def test_indicator_at_a_singular_edge_is_the_nonlinear_energy():
     """u = (0, 0, z^3 / 3): of the stress of z^2 an element's best linear part is taken
     off, here by least squares; the share is the same for all, near one."""
     mesh = isoparametric(box_solid((2, 1, 3), (0.5, 0.6, 0.8)))
@@ -186,7 +186,7 @@ def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
     assert abs(K[2, 2] / TORSION - 1) < told[2]
 
 
-def test_what_the_elements_indicate_is_what_they_miss():
+def test_indicated_error_is_near_the_true_error():
     """Before any safety: bending's indicated error, within 1.5 of the true one."""
     for mesh in ((1, 6), (1, 12), (2, 12), (2, 24)):
         K, indicated, shape = bar(*mesh).totals()
@@ -194,7 +194,7 @@ def test_what_the_elements_indicate_is_what_they_miss():
         assert 1 / 1.5 < indicated[0, 0] / BENDING / true < 1.5
 
 
-def test_stiffness_falls_and_two_meshes_tell_the_fall():
+def test_two_meshes_bound_the_error_of_the_finer():
     """The index is between the safety factor and that times twice the default."""
     history = [bar(*mesh).totals() for mesh in ((1, 6), (2, 12))]
     error, factor = estimated_error(history)
@@ -223,7 +223,7 @@ def plate(*counts):
     return solve_level(solid, [Material(E, NU)], centers, "rigid").totals()
 
 
-def test_tractions_left_on_a_free_face_store_what_undoes_them():
+def test_residual_tractions_of_a_unit_cube_have_the_energy_by_hand():
     """A shear s over a unit cube leaves s on four faces, whose triangles are 1 by 1:
     2 s^2 / mu / pi times their height 1 / sqrt 2, by hand; a pull across nothing."""
     mesh = isoparametric(box_solid((1, 1, 1), np.ones(3)))
@@ -236,7 +236,7 @@ def test_tractions_left_on_a_free_face_store_what_undoes_them():
     assert np.abs(estimate - np.diag([estimate[0, 0], 0])).max() == 0
 
 
-def test_a_twisted_thin_plates_error_is_seen_on_one_mesh_and_on_two():
+def test_error_of_a_twisted_thin_plate_is_covered():
     """Elements 7 to 15 mm wide on a 2 mm plate, whose layer is 0.6 mm deep at its free
     edges: the true error of twisting is 1.4 and 0.7 %."""
     history = [plate(4, 1, 8), plate(8, 1, 16)]

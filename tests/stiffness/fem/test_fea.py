@@ -85,7 +85,7 @@ def test_a_bar_of_two_materials_end_to_end(cache):
 
 
 @pytest.mark.slow
-def test_a_budget_that_is_used_up_says_so(cache):
+def test_exhausted_budget_is_reported(cache):
     solution = solve_link(
         bar_surface(), *PLANES, [Material(E, NU)],
         options=FemOptions(accuracy=1e-5, budget=Budget(levels=2), cache=cache),
@@ -103,7 +103,7 @@ def test_a_budget_that_is_used_up_says_so(cache):
         ({"materials": []}, "at least one"),
     ],
 )
-def test_options_that_are_none_are_refused(change, message, cache):
+def test_wrong_options_are_refused(change, message, cache):
     given = {"materials": [Material(E, NU)], "cache": cache} | change
     materials = given.pop("materials")
     with pytest.raises(BadInput) as caught:

@@ -40,7 +40,7 @@ def test_a_box_with_two_points_follows_steiners_rule():
     np.testing.assert_allclose(inertia, about + own, rtol=1e-10, atol=1e-12)
 
 
-def test_without_a_density_there_are_the_points_alone_or_nothing():
+def test_mass_without_density_is_that_of_the_points():
     mesh = box()
     nothing = np.zeros(len(mesh.cells))
     mass, centre, inertia = mass_properties(mesh, nothing)

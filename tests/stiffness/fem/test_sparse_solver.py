@@ -30,12 +30,12 @@ def test_the_whole_matrix_is_solved_from_its_upper_triangle(rng, name, columns):
     np.testing.assert_allclose(solve(csr_array(np.triu(A)), loads), x, atol=1e-10)
 
 
-def test_without_its_package_there_is_superlu(monkeypatch, chosen):
+def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: None)
     assert chosen() == "SuperLU"
 
 
-def test_a_package_that_does_not_load_is_as_none(monkeypatch, chosen):
+def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
     """As where MKL's library is of another machine."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
@@ -43,7 +43,7 @@ def test_a_package_that_does_not_load_is_as_none(monkeypatch, chosen):
     assert chosen() == "SuperLU"
 
 
-def test_where_mkl_is_not_installed_there_is_no_library(monkeypatch):
+def test_missing_mkl_gives_no_library(monkeypatch):
     def absent(name):
         raise sparse_solver.PackageNotFoundError(name)
 

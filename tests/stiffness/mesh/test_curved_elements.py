@@ -148,7 +148,7 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
-def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
+def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
     """A face that bulges by a quarter of the wall would fold its tetrahedron: these
     are straightened; each has the hand of its straight corners everywhere."""
     solid = shell(counts, inner, 1.0)
@@ -164,7 +164,7 @@ def test_no_element_is_turned_over_however_thin_the_wall(counts, inner, order):
 
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
-def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
+def test_refining_inverted_elements_brings_the_volume_nearer(counts, inner):
     """Straightened elements leave the shape; smaller ones by less than half of it."""
     solid = shell(counts, inner, 1.0)
     error = [
@@ -174,7 +174,7 @@ def test_halving_what_would_fold_brings_the_shape_nearer(counts, inner):
     assert error[1] < error[0] / 2
 
 
-def test_what_does_not_fold_is_left_as_it_is():
+def test_elements_that_are_not_inverted_are_kept():
     for solid in (shell((2, 2, 2), 0.6, 1.0), bar_solid(2, 4, 0.04, 0.2)):
         assert not curved_elements(solid, 3).inverted.any()
         assert refine_inverted(solid, 3) is solid

@@ -34,7 +34,7 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
-def test_a_mesh_of_another_volume_is_not_the_part(stretch):
+def test_mesh_of_another_volume_is_refused(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
     with pytest.raises(MeshFailed, match="the mesh has 0.00.* the surface encloses"):
         fit_to_patches(made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS))

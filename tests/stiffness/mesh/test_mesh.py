@@ -80,7 +80,7 @@ def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage
     [(0, "first\nno inside", "no inside"), (0, "no inside\n", "no inside"),
      (1, "first\nout of memory", "out of memory")],
 )  # fmt: skip
-def test_a_mesher_without_an_answer_is_reported_with_its_last_words(
+def test_failed_mesher_is_reported_with_its_last_words(
     tmp_path, monkeypatch, status, words, told
 ):
     """A surface that it takes for no solid has no tetrahedra; or it dies."""
@@ -95,7 +95,7 @@ def test_a_mesher_without_an_answer_is_reported_with_its_last_words(
         mesh_solid(bar(), *FACES, cache=tmp_path)
 
 
-def test_the_mesher_is_ended_when_its_time_is_up(tmp_path):
+def test_mesher_is_stopped_at_its_time_limit(tmp_path):
     """0.05 s is less than a Python process needs to start."""
     with pytest.raises(MeshFailed, match=r"no mesh after 0.05 s"):
         mesh_solid(bar(), *FACES, time_limit=0.05, cache=tmp_path)
@@ -145,7 +145,7 @@ def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shell
 
 
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
-def test_the_mesher_gets_fewer_triangles_of_the_same_part(name):
+def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     """Corners of the coarse surface near the part, as many holes, its volume to 1 %.
 
     The bracket has no triangle to spare and stays as it is."""

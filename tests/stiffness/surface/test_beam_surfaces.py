@@ -87,7 +87,7 @@ def test_a_tube_or_a_box_needs_a_hole():
         ),
     ],
 )
-def test_what_is_no_shape_is_refused(shape, lengths, words):
+def test_wrong_shape_is_refused(shape, lengths, words):
     for call in (check_shape, shape_surface, lambda s, v: shape_beam(s, v, NU)):
         with pytest.raises(BadInput) as caught:
             call(shape, lengths)

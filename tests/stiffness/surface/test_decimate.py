@@ -18,7 +18,7 @@ def fine_cube(unit, bump=0.0):
 
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
-def test_a_fine_cube_is_as_well_a_coarse_one(unit):
+def test_fine_cube_becomes_coarse(unit):
     """Flat sides need no triangles within: a tenth and fewer, in any unit."""
     surface = fine_cube(unit)
     points, triangles = coarser_surface(surface, 1e-4 * unit)
@@ -30,7 +30,7 @@ def test_a_fine_cube_is_as_well_a_coarse_one(unit):
 
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
-def test_what_sticks_out_further_than_is_allowed_stays(unit):
+def test_bump_above_the_tolerance_is_kept(unit):
     """A bump of 0.8 mm: its tip is there to 0.1 mm."""
     surface = fine_cube(unit, 8e-4)
     points, triangles = coarser_surface(surface, 1e-4 * unit)

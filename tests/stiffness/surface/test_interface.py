@@ -27,7 +27,9 @@ FLAT = {"point": POINT, "normal": [0, 3, 4]}
          "bore", POINT, UNIT, 1e-9),
     ],
 )  # fmt: skip
-def test_an_interface_is_where_it_is_said_to_be(text, kind, point, direction, radius):
+def test_interface_has_the_place_and_direction_of_its_text(
+    text, kind, point, direction, radius
+):
     interface = parse_interface(text)
     assert (interface.kind, interface.radius) == (kind, radius)
     np.testing.assert_allclose(interface.point, point)
@@ -62,7 +64,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "message"), REFUSED)
-def test_what_is_no_interface_is_refused(text, message):
+def test_wrong_interface_is_refused(text, message):
     with pytest.raises(BadInput) as caught:
         parse_interface(text, "--base")
     assert str(caught.value).startswith("--base: ")
@@ -107,7 +109,7 @@ def test_a_point_is_three_finite_numbers(point):
 
 
 @pytest.mark.parametrize("radius", [0, -1.0, np.inf, np.nan, "wide", None])
-def test_a_radius_of_a_table_is_a_finite_number_above_nothing(radius):
+def test_radius_of_a_table_must_be_finite_and_positive(radius):
     bore = {"point": [0, 0, 0], "axis": [0, 1, 0], "radius": radius}
     plane = {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}, "radius": radius}
     for name, table in (("bore.radius", {"bore": bore}), ("radius", plane)):

@@ -44,7 +44,7 @@ def test_any_order_unit_and_longest_side_give_the_same_pairs(along):
         assert {tuple(sorted(pair)) for pair in pairs.tolist()} == expected
 
 
-def test_of_many_apart_only_those_that_meet_cross():
+def test_crossing_pairs_are_found_among_many_triangles():
     """More than are looked at together; the last two cross."""
     rng = np.random.default_rng(1)
     corners = 1e-3 * rng.normal(size=(1100, 3, 3))
@@ -60,7 +60,7 @@ def test_of_many_apart_only_those_that_meet_cross():
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
-def test_what_only_touches_does_not_cross(unit, way):
+def test_touching_triangles_do_not_cross(unit, way):
     """A needle's edge of length 2 ends in a triangle's plane, or passes its side; a
     billionth of a length further it crosses."""
     base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])[::way]

@@ -75,7 +75,7 @@ def spoke(low, high):
 
 
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
-def test_a_disc_has_what_lies_within_its_radius(unit):
+def test_disc_has_the_triangles_within_its_radius(unit):
     """To 0.2 %; what goes from 1 % inside to 1 % outside is cut, and refused."""
     radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
     center = ",".join(map(str, unit * shift))
@@ -97,7 +97,7 @@ def test_a_disc_has_what_lies_within_its_radius(unit):
             assert triangles_on(surface, disc, "tip").tolist() == [0, 1]
 
 
-def test_an_interface_off_the_part_is_told_where_the_part_is():
+def test_interface_off_the_part_is_refused_with_the_extent_of_the_part():
     words = (
         "bar: no face of the surface lies on the tip interface {} [m]; the part spans "
     )

@@ -113,7 +113,7 @@ def test_a_damaged_file_is_refused_with_its_facet(tmp_path, content, message):
     assert "cube.stl" in str(no.value)
 
 
-def test_no_bytes_do_more_than_refuse(tmp_path, rng):
+def test_any_damaged_stl_file_is_read_or_refused(tmp_path, rng):
     """500 files with bytes changed, cut out or missing at the end."""
     for number in range(500):
         content = bytearray(TEXT if number % 2 else BINARY)

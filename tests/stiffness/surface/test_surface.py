@@ -71,7 +71,7 @@ def test_a_prism_has_its_own_volume_and_area():
         ("absent/a.stl", None, "cannot be read"),
     ],
 )
-def test_what_is_no_surface_file_is_refused(tmp_path, name, content, message):
+def test_wrong_surface_file_is_refused(tmp_path, name, content, message):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)

@@ -14,7 +14,7 @@ from validation.campaign.campaign import number_rows
 from validation.campaign.campaign_file import read_campaign
 
 
-def test_a_campaign_is_what_its_files_say(tmp_path):
+def test_campaign_has_the_content_of_its_files(tmp_path):
     """Two arms by hand: x = cos q1 + 0.8 cos(q1 + q2), y likewise."""
     campaign = read_campaign(write_campaign(tmp_path / "first"))
     assert campaign.name == "first"
@@ -36,7 +36,7 @@ def test_a_campaign_is_what_its_files_say(tmp_path):
     assert not campaign.measured.flags.writeable
 
 
-def test_taking_rows_keeps_their_order_and_their_numbers(tmp_path):
+def test_take_keeps_the_order_and_numbers_of_rows(tmp_path):
     campaign = read_campaign(write_campaign(tmp_path))
     some = campaign.take([3, 1])
     assert some.ids == ("m4", "m2")
@@ -47,12 +47,12 @@ def test_taking_rows_keeps_their_order_and_their_numbers(tmp_path):
     assert len(campaign.take([])) == 0
 
 
-def test_rows_are_numbered_by_first_use():
+def test_number_rows_counts_by_first_occurrence():
     numbers = number_rows([2.0, 1.0, 2.0 + 1e-12, -0.0, 0.0], [math.nan] * 5)
     np.testing.assert_array_equal(numbers, [0, 1, 0, 2, 2])
 
 
-def test_poses_and_joints_name_the_same_configurations(tmp_path):
+def test_commanded_poses_give_the_commanded_joints(tmp_path):
     """The tool's poses written down as a command give the joints back."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
@@ -67,7 +67,7 @@ def test_poses_and_joints_name_the_same_configurations(tmp_path):
     np.testing.assert_array_equal(poses.configuration, joints.configuration)
 
 
-def test_a_machine_without_drives_is_always_at_home(tmp_path):
+def test_machine_without_drives_has_one_configuration(tmp_path):
     robot = 'name = "post"\nplatform = "top"\n[[frame]]\nname = "top"\n'
     robot += 'parent = "base"\ntranslation = [0, 0, 2]\n'
     folder = write_campaign(tmp_path, robot=robot, head="id,meas.tz,cov.temperature",
@@ -77,7 +77,7 @@ def test_a_machine_without_drives_is_always_at_home(tmp_path):
     np.testing.assert_array_equal(campaign.repeat, [0, 0])
 
 
-def test_a_robot_may_be_built_in(tmp_path):
+def test_campaign_reads_a_built_in_robot(tmp_path):
     folder = write_campaign(tmp_path, head="id,pose.tx,pose.tz,meas.tx",
                             rows=["a,0.05,-0.5,1e-5"],
                             toml={"robot": '"irsbot2"'})  # fmt: skip
@@ -128,7 +128,7 @@ def test_a_measured_motion_is_converted_to_si(tmp_path):
     assert campaign.take([0]).motion_units == campaign.motion_units
 
 
-def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
+def test_byte_order_mark_and_carriage_returns_are_accepted(tmp_path):
     folder = write_campaign(tmp_path)
     table = folder / "measurements.csv"
     text = table.read_text().replace("\n", "\r\n") + "\r\n\r\n"
@@ -137,14 +137,14 @@ def test_a_mark_before_the_text_and_carriage_returns_are_accepted(tmp_path):
     assert len(read_campaign(folder / "campaign.toml")) == 4
 
 
-def test_sigma_of_a_reading_goes_before_that_of_the_device(tmp_path):
+def test_sigma_of_a_row_replaces_that_of_the_device(tmp_path):
     rows = ["a,0,0,1e-5,2e-5,3e-6,", "b,0,0,1e-5,,,"]
     head = "id,q.one,q.two,meas.tx,meas.ty,sigma.tx,sigma.ty"
     sigma = read_campaign(write_campaign(tmp_path, head=head, rows=rows)).sigma
     np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
 
 
-def test_a_device_somewhere_in_the_room_may_read_far(tmp_path):
+def test_unknown_registration_allows_large_positions_not_rotations(tmp_path):
     rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
     head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
     head += "cov.temperature,cov.time,cov.approach"
@@ -236,7 +236,7 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_a_table_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+def test_wrong_table_is_refused_in_one_line(case, tmp_path):
     head, rows, message = BAD_TABLES[case]
     folder = write_campaign(tmp_path, head=head, rows=rows)
     with pytest.raises(BadInput, match=message) as caught:
@@ -272,7 +272,7 @@ BAD_TOML = {
 
 
 @pytest.mark.parametrize("case", BAD_TOML)
-def test_a_campaign_file_that_makes_no_sense_is_refused_in_one_line(case, tmp_path):
+def test_wrong_campaign_file_is_refused_in_one_line(case, tmp_path):
     toml, rest, message = BAD_TOML[case]
     folder = write_campaign(tmp_path, toml=toml, noise=rest)
     with pytest.raises(BadInput, match=message) as caught:
@@ -281,7 +281,7 @@ def test_a_campaign_file_that_makes_no_sense_is_refused_in_one_line(case, tmp_pa
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_no_table_is_not_printed(tmp_path):
+def test_refusal_does_not_print_the_content_of_another_file(tmp_path):
     folder = write_campaign(tmp_path)
     (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
     with pytest.raises(BadInput, match="names no column") as caught:
@@ -289,18 +289,18 @@ def test_a_file_that_is_no_table_is_not_printed(tmp_path):
     assert "secret" not in str(caught.value)
 
 
-def test_a_folder_that_is_not_there_says_so(tmp_path):
+def test_missing_folder_is_refused(tmp_path):
     with pytest.raises(BadInput, match=r"gone/campaign.toml: cannot be read: No such"):
         read_campaign(tmp_path / "gone")
 
 
-def test_a_robot_file_that_is_wrong_is_named_itself(tmp_path):
+def test_wrong_robot_file_of_a_campaign_is_named(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
 
 
-def test_the_files_of_the_docs_are_read(tmp_path):
+def test_campaign_files_of_the_docs_are_read(tmp_path):
     """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
@@ -347,7 +347,7 @@ def test_a_row_is_read_point_by_point(tmp_path):
     assert campaign.take([3]).targets.tolist() == [[0, 0.2, 0]]
 
 
-def test_several_tables_are_sessions(tmp_path):
+def test_each_of_several_tables_is_a_session(tmp_path):
     folder = write_campaign(tmp_path, toml={"measurements": '["a.csv", "b.csv"]'})
     (folder / "a.csv").write_text(f"{HEAD}\n{ROWS[0]}\n")
     (folder / "b.csv").write_text(f"{HEAD}\n{ROWS[1]}\n{ROWS[2]}\n")
@@ -369,7 +369,7 @@ def test_several_tables_are_sessions(tmp_path):
     ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
      'points: found "tx"'),
 ])  # fmt: skip
-def test_sessions_and_points_that_make_no_sense(head, cells, extra, message, tmp_path):
+def test_wrong_sessions_and_points_are_refused(head, cells, extra, message, tmp_path):
     with pytest.raises(BadInput) as error:
         read_campaign(write_campaign(tmp_path, head, [cells], extra=extra))
     assert message in str(error.value)

@@ -95,7 +95,7 @@ def assert_read_or_says_why(folder):
     ),
     registration=st.sampled_from(["known", "unknown"]),
 )
-def test_a_table_with_odd_cells_is_read_or_one_line_says_why(
+def test_table_with_odd_cells_is_read_or_refused_in_one_line(
     changes, registration, tmp_path
 ):
     table = [line.split(",") for line in TEXT.splitlines()]
@@ -254,12 +254,12 @@ def test_garbled_bytes_of_error_sources_are_read_or_refused_in_one_line(
 
 @LIGHT
 @given(rows=st.lists(st.lists(st.floats(-1e3, 1e3), min_size=10, max_size=10)))
-def test_any_numbers_are_read_or_one_line_says_why(rows, tmp_path):
+def test_any_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
     lines = [",".join([f"r{i}", *map(repr, row)]) for i, row in enumerate(rows)]
     assert_read_or_says_why(write_campaign(tmp_path, HEAD, lines))
 
 
-def test_the_campaign_that_is_mangled_is_sound(tmp_path):
+def test_undamaged_campaign_is_read(tmp_path):
     """Otherwise every mutation would stop at the same first mistake."""
     folder = write_campaign(tmp_path)
     (folder / "campaign.toml").write_text(TOML)

@@ -89,7 +89,7 @@ def carried(run, machine, folder, *words):
     return code, text, json.loads(file.read_text())["sessions"], out
 
 
-def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
+def test_robot_is_carried_to_a_new_session_by_few_rows(machine, run):
     folder = measured(machine, 60, 0.8)
     code, _, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
@@ -108,7 +108,7 @@ def test_a_robot_is_carried_over_by_a_few_rows(machine, run):
     assert again.error.position < 1.3 * SIGMA
 
 
-def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
+def test_rows_of_one_place_do_not_suffice(machine, run):
     """Forty rows within a milliradian tell a place, and no turn of the device."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
@@ -124,7 +124,7 @@ def test_rows_of_one_place_do_not_suffice_and_say_so(machine, run):
     assert day["uncertainty"] > 10 * day["left_in_setup"]
 
 
-def test_a_robot_diagnosed_and_saved_foretells_its_own_days(machine, run):
+def test_saved_robot_predicts_its_own_sessions(machine, run):
     """The device stood elsewhere each day: the file says where, and noise is left."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
@@ -149,7 +149,7 @@ def test_sessions_are_carried_one_by_one(machine, run):
     assert set(load_robot(out).session_effects) == {"a", "b"}
 
 
-def test_a_drift_stays_behind_where_there_is_no_clock(machine, run):
+def test_drift_is_not_carried_over_without_a_clock(machine, run):
     """The other day's wave of 15 sigma is not this day's, and is not written."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
@@ -161,7 +161,7 @@ def test_a_drift_stays_behind_where_there_is_no_clock(machine, run):
     assert load_robot(out).functions == ()
 
 
-def test_a_drift_is_fitted_anew_to_set_up_rows_over_the_day(machine, run):
+def test_drift_is_fitted_again_to_set_up_rows(machine, run):
     """Today's wave is another one; every fourth row tells it to a third of sigma."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
@@ -196,7 +196,7 @@ def test_set_up_rows_of_the_first_minutes_leave_a_drift_open(machine, run):
     (["--setup", "6"], "nothing but set-up"),
     (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
 ])  # fmt: skip
-def test_set_up_rows_that_are_none_are_refused(words, message, machine, run):
+def test_wrong_set_up_rows_are_refused(words, message, machine, run):
     folder = measured(machine, 6, 0.8)
     code, _, error = run("validation", "carry", str(machine / "saved.toml"),
                          str(folder), *words)  # fmt: skip

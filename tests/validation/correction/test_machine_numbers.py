@@ -65,7 +65,7 @@ def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
     assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
 
 
-def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
+def test_known_sums_of_parameters_stay_known(tmp_path):
     """Only a + b was known; dry rows tell a again, and b makes up for it where wet."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
@@ -80,7 +80,7 @@ def test_what_the_fit_knew_of_sums_stays_known(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
+def test_change_beyond_the_saved_deviation_is_followed(
     tmp_path,
 ):
     """Twenty standard deviations: what is known is widened, and so is its spread."""
@@ -94,7 +94,7 @@ def test_a_machine_that_changed_by_more_than_the_fit_was_uncertain_is_followed(
     assert day.suffices
 
 
-def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
+def test_carried_file_predicts_the_judged_rows(tmp_path):
     s, y = 3e-5, 4e-5
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < 8, ())
@@ -107,7 +107,7 @@ def test_the_file_that_is_written_foretells_what_was_judged(tmp_path):
     assert again.spread[:, 3] == pytest.approx(carried.sessions[0].uncertainty)
 
 
-def test_numbers_of_one_session_are_not_the_machines(tmp_path):
+def test_machine_numbers_exclude_those_of_a_session(tmp_path):
     saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
     clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
     robot = replace(
@@ -129,7 +129,7 @@ def test_numbers_of_one_session_are_not_the_machines(tmp_path):
     assert len(own) == 2
 
 
-def test_a_compliance_stays_above_nothing():
+def test_compliance_stays_positive():
     """Taken from by more than there is, a thousandth stays; a rigid joint is rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
@@ -146,9 +146,7 @@ def test_a_compliance_stays_above_nothing():
     ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
-def test_slopes_of_functions_are_what_a_small_change_does(
-    where, component, kind, tmp_path
-):
+def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_path):
     """By differences of the predicting function, under load, a device anywhere."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
@@ -178,7 +176,7 @@ def test_slopes_of_functions_are_what_a_small_change_does(
 
 
 @pytest.mark.slow
-def test_a_spring_that_became_softer_is_found_by_twenty_rows(tmp_path):
+def test_softer_spring_is_found_by_twenty_rows(tmp_path):
     """Monday's machine is diagnosed; on Tuesday its drive gives a quarter more."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}

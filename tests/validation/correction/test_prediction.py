@@ -34,7 +34,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
-def test_a_table_of_commands_is_foretold(tmp_path, run):
+def test_predict_reads_a_table_of_commands(tmp_path, run):
     """A turn of the first joint by a sin q swings the tool about the base."""
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two\na,0.3,0.0\nb,-0.4,0.5\n")
@@ -56,7 +56,7 @@ def test_a_table_of_commands_is_foretold(tmp_path, run):
         assert found == pytest.approx([turn, -turn * y, turn * x], abs=2e-7)
 
 
-def test_a_campaign_is_foretold_under_its_names(tmp_path, run):
+def test_predict_keeps_the_names_of_a_campaign(tmp_path, run):
     head = "id,q.one,q.two,meas.A.tx,meas.B.ty"
     folder = write_campaign(
         tmp_path / "c", head, ["m1,0.1,0.2,1e-4,2e-4", "m2,0.4,0.2,0,"],
@@ -78,7 +78,7 @@ def test_a_campaign_is_foretold_under_its_names(tmp_path, run):
     assert rows[1]["meas.B.ty"] == ""
 
 
-def test_what_a_function_needs_must_be_a_column(tmp_path, run):
+def test_predict_refuses_a_missing_covariate(tmp_path, run):
     humid = ARM + WAVE.replace('"q.one"', '"cov.humidity"').replace(
         "1.sine", "1"
     ).replace("waves", "powers")

@@ -52,7 +52,7 @@ def push(cone, screw, width):
 
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
-def test_the_push_is_the_gradient_of_the_energy(arm):
+def test_contact_force_is_the_gradient_of_its_energy(arm):
     """Central differences of half a nanometre; inside, at the bound, outside.
 
     With an arm of 40 mm a pin tilted by r / arm touches as one shifted by r does.
@@ -100,7 +100,7 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
     assert both[1] == pytest.approx(0.04 * both[3])
 
 
-def test_a_joints_play_follows_the_format():
+def test_clearance_of_a_joint_follows_the_format():
     """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
     clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
     fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
@@ -117,7 +117,7 @@ def test_a_joints_play_follows_the_format():
 
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
-def test_axial_play_is_taken_off_the_misfit(misfit):
+def test_axial_clearance_reduces_the_misfit(misfit):
     """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z.
 
     A contact of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the
@@ -152,7 +152,7 @@ def test_a_time_limit_ends_its_simulation_and_no_other(pause, monkeypatch):
     assert simulate_assembly(posture, model=contacts).rigid_energy > 0
 
 
-def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
+def test_interruption_inside_the_solver_is_raised(monkeypatch):
     """Exudyn makes an error of its own of Ctrl-C; it must not be tried again."""
     import validation.multibody.exudyn_model
 
@@ -165,7 +165,7 @@ def test_an_interruption_inside_the_solver_comes_out(monkeypatch):
         simulate_assembly(posture, model=SimulationModel(clearances=True))
 
 
-def test_play_swallows_a_smaller_misfit():
+def test_misfit_within_the_clearance_stores_no_energy():
     """A lateral misfit of 20 um inside a disc of 30 um: nothing presses."""
     tight = coaxial([0, 0, 0, 2e-5, 0, 0], None)
     loose = coaxial([0, 0, 0, 2e-5, 0, 0], Clearance(radial=3e-5))
@@ -228,7 +228,7 @@ def heavy(length=0.4):
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
-def test_weight_acts_beside_play(links):
+def test_weight_acts_together_with_clearance(links):
     """A hundredfold weight exceeds the clearance: energy, springs, gap hold.
 
     With beams the simulation also stores q^2 L^5 / 1440 EI each between their ends.
@@ -244,7 +244,7 @@ def test_weight_acts_beside_play(links):
     assert abs(ratio - 1) > 0.1
 
 
-def test_a_wrong_weight_beside_play_is_found_out(monkeypatch):
+def test_wrong_weight_together_with_clearance_fails(monkeypatch):
     """Five per cent too heavy in the linear model."""
     import assembly.linear.assembled
 
@@ -276,7 +276,7 @@ def drawn(name, size, pose=None):
      pytest.param("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed",
                   marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
+def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
     """No load, and errors within the clearance: any place in the valley, and no energy.
 
     That says something of the overconstrained robots only, which pass: the others close
@@ -294,7 +294,7 @@ def test_play_that_takes_up_everything_costs_nothing(name, size, pose, said):
      pytest.param("delta", [0, 0, 0, 0, 0, -50], marks=pytest.mark.slow),
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
-def test_under_a_load_the_gap_is_measured_by_what_is_stored(name, load):
+def test_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
     """Without errors, closing costs nothing: the reference is the load's energy.
 
     Parts of the five-bar stay loose under its load.

@@ -70,7 +70,7 @@ def test_finite_rotations_explain_the_whole_difference(posture):
     assert max(beams.metric.unexplained.values()) < 0.1
 
 
-def test_a_difference_that_finite_rotations_leave_fails(posture, monkeypatch):
+def test_difference_not_due_to_finite_rotations_fails(posture, monkeypatch):
     """The exact model given errors one per cent too large; the others' agree."""
     import validation.crosscheck.pair
 
@@ -147,7 +147,7 @@ def test_weight_and_moment_act_alike_in_both_finite_models(name):
     assert max(check.metric.unexplained.values()) < 1e-4
 
 
-def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
+def test_wrong_weight_in_the_exact_model_fails(monkeypatch):
     """Five per cent too heavy, in the model with finite motions alone."""
     import assembly.exact.exact
 
@@ -164,7 +164,7 @@ def test_a_wrong_weight_in_the_exact_model_is_found_out(monkeypatch):
 
 
 @pytest.mark.slow
-def test_rods_that_roll_are_held_and_said_to_be():
+def test_rolling_rods_are_held_and_reported():
     """The delta's rods roll by radians under a load; without one they need no holding.
 
     Both virtual-joint models then have the same springs, and all agree.
@@ -202,7 +202,7 @@ def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
     assert check.passed, check.text()
 
 
-def test_two_scales_at_full_errors_are_made_enough(irsbot2):
+def test_scales_are_added_until_limits_are_known(irsbot2):
     """Limits are not known to a thousandth: smaller scales are added, and all holds.
 
     Of 30 draws on two scales alone, slopes were 1.92 to 2.21.
@@ -254,7 +254,7 @@ def test_a_serial_robot_has_no_energy_and_still_a_slope():
     assert check.pairs[0].simulated.energy == 0.0
 
 
-def test_without_errors_and_load_nothing_is_compared_and_nothing_passes():
+def test_crosscheck_without_errors_and_load_has_no_signal():
     result = crosscheck(triangle(np.zeros(6)))
     assert {check.verdict for check in result.checks.values()} == {"no signal"}
     assert not result.passed
@@ -264,7 +264,7 @@ def test_without_errors_and_load_nothing_is_compared_and_nothing_passes():
     assert result.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
 
 
-def test_what_a_serial_robot_cannot_compare_is_counted_beside_what_passed():
+def test_checks_without_signal_are_counted_next_to_passed_ones():
     """No spring carries anything: only the platform's pose says something."""
     error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
     frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
@@ -279,7 +279,7 @@ def test_what_a_serial_robot_cannot_compare_is_counted_beside_what_passed():
     assert outcome[-1] == f"passed; {counted} checks had nothing to compare"
 
 
-def test_a_failed_simulation_says_so_in_a_table():
+def test_failed_simulation_is_a_row_of_the_table():
     frames = (
         Frame("a", translation=[1, 0, 0]),
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
@@ -310,7 +310,7 @@ BY_DEFAULT = (
         for name, mutation in MUTATIONS.items()
     ],
 )
-def test_a_broken_term_is_found_out(irsbot2, mutation, broken):
+def test_broken_term_of_the_linear_model_fails(irsbot2, mutation, broken):
     """The simulation shares none of these terms, so each breaks the agreement."""
     broken(mutation)
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
@@ -327,7 +327,7 @@ def test_two_crossed_bars_pass():
 
 
 @pytest.mark.parametrize("mutation", BEAM_MUTATIONS.values(), ids=BEAM_MUTATIONS.keys())
-def test_a_broken_beam_is_found_out(mutation, broken):
+def test_broken_beam_of_the_linear_model_fails(mutation, broken):
     """By the bars of the test above."""
     broken(mutation)
     assert not crosscheck(triangle(BENT), load=LOAD).passed

@@ -45,7 +45,7 @@ def compared(scales, wrong, second=0.05, third=0.03):
     return compare_scales(scales, solve, Found)
 
 
-def test_two_scales_of_a_right_model_are_not_held_against_it():
+def test_right_model_passes_from_two_scales():
     """Slope 1.76 and limit 0.015 on the two scales alone; two halves more tell."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
@@ -70,13 +70,13 @@ def test_a_wrong_term_does_not_hide_behind_the_second_order():
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
 
-def test_enough_scales_are_left_as_they_are():
+def test_no_scales_are_added_to_enough():
     comparison = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
     assert len(comparison.pairs) == 4
     assert verdict(comparison) == "passed"
 
 
-def test_what_six_scales_do_not_tell_is_said():
+def test_undecided_after_six_scales_is_reported():
     """A check that is never known better than to twice its bound."""
 
     class Vague(Found):
@@ -88,7 +88,7 @@ def test_what_six_scales_do_not_tell_is_said():
     assert verdict(comparison) == "not decided"
 
 
-def test_nothing_but_noise_neither_fails_nor_passes():
+def test_noise_neither_fails_nor_passes():
     """Simulations resolve a hundredth of the floor; the extrapolation makes 15 of 1."""
 
     def solve(s):
@@ -100,7 +100,7 @@ def test_nothing_but_noise_neither_fails_nor_passes():
     assert len(comparison.pairs) == 4
 
 
-def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
+def test_zero_against_a_signal_fails():
     """Ours is zero: a signal in the other is a difference, however small ours is."""
 
     def solve(s):
@@ -111,7 +111,7 @@ def test_a_model_that_gives_nothing_where_the_other_gives_something_fails():
     assert verdict(comparison) == "failed"
 
 
-def test_no_checks_at_all_do_not_pass():
+def test_comparison_without_checks_does_not_pass():
     class Empty(Found):
         def __post_init__(self):
             self.checks = {}
@@ -135,5 +135,5 @@ def test_no_checks_at_all_do_not_pass():
         (Check(0.5, 1.0, 2.0, signal=False), "undecided"),
     ],
 )
-def test_a_check_knows_what_it_does_not_know(check, expected):
+def test_verdict_of_a_check_includes_its_uncertainty(check, expected):
     assert check.verdict == expected

@@ -60,7 +60,7 @@ def test_saved_robot_predicts_the_printed_error_and_a_smaller_one_than_declared(
 
 
 @pytest.mark.slow
-def test_the_expansion_of_a_printer_is_what_it_is(diagnosed, tmp_path):
+def test_expansion_of_a_printer_is_recovered(diagnosed, tmp_path):
     """23.4e-6 per kelvin declared, 12e-6 true."""
     found = diagnosed(CASES / "declared_effect")
     assert (found.verdict, found.claimed) == ("explained", ("thermal_expansion",))
@@ -73,7 +73,7 @@ def test_the_expansion_of_a_printer_is_what_it_is(diagnosed, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_clearance_in_a_leg_is_a_clearance(diagnosed):
+def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
     found = diagnosed(CASES / "hx_play")
     assert (found.verdict, found.claimed) == ("explained", ("joint_clearance",))
     springs = table(found)["springs"] or {"parameters": []}
@@ -82,7 +82,7 @@ def test_a_clearance_in_a_leg_is_a_clearance(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
-def test_what_the_library_lacks_is_no_effect_of_it(name, diagnosed):
+def test_effects_outside_the_library_are_learned(name, diagnosed):
     """A rod that grows with time; waves of a gear.  Down to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
@@ -90,7 +90,7 @@ def test_what_the_library_lacks_is_no_effect_of_it(name, diagnosed):
 
 
 @pytest.mark.slow
-def test_scatter_of_repeats_is_no_cause(diagnosed):
+def test_scatter_of_repeats_is_not_claimed(diagnosed):
     """Errors are in the sigma stated; what memory does is no drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

@@ -42,7 +42,7 @@ def one_at(components, shape=LINE):
     return Candidate((part,), "screw", shape)
 
 
-def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities):
+def test_basis_is_orthonormal_and_keeps_zero_columns(sensitivities):
     s, q = sensitivities
     columns, mixed = s.basis(("q.one",), LINE)
     np.testing.assert_allclose(columns.T @ columns / 12, np.eye(2), atol=1e-12)
@@ -53,7 +53,7 @@ def test_two_powers_are_orthonormal_and_a_column_of_nothing_stays(sensitivities)
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-12])
-def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
+def test_parameters_are_named_by_component(sensitivities, units):
     """T x, and their deviations; as small as they may be."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
@@ -70,7 +70,7 @@ def test_numbers_are_those_of_the_form_by_component(sensitivities, units):
     )
 
 
-def test_components_that_are_not_seen_are_left_out(sensitivities):
+def test_components_below_their_deviation_are_omitted(sensitivities):
     """Of one that is left its numbers have no name before theirs; of none, nothing."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
@@ -86,7 +86,7 @@ def test_components_that_are_not_seen_are_left_out(sensitivities):
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_what_a_component_does_by_place(axis):
+def test_sensitivity_of_a_component_depends_on_its_place(axis):
     """A base swings the tip about its origin; a spring gives by its wrench."""
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
@@ -106,7 +106,7 @@ def test_what_a_component_does_by_place(axis):
     np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
 
 
-def test_what_was_varied_and_is_known_in_every_row_may_count():
+def test_variables_are_varied_and_known_in_every_row():
     """A load that stays, a temperature that one row lacks, a time of zero do not."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)

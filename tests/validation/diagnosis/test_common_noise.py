@@ -95,7 +95,7 @@ def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_a_length_is_found_beside_noise_in_common(columns, seed):
+def test_length_is_found_next_to_common_noise(columns, seed):
     """Its uncertainty is that of the mean of 60 measurements, not of 180 points."""
     true = 2e-5
     rng = np.random.default_rng([seed, 2])
@@ -107,7 +107,7 @@ def test_a_length_is_found_beside_noise_in_common(columns, seed):
     assert selected.values[0] == pytest.approx(true, abs=3.5 * std)
 
 
-def test_a_fit_counts_what_points_have_in_common_once():
+def test_fit_counts_common_noise_once_per_measurement():
     """Of a length: (c^2 + sigma^2/3) / measurements, for a shift c of all points."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
@@ -120,7 +120,7 @@ def test_a_fit_counts_what_points_have_in_common_once():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_what_repeats_do_not_show_is_no_noise(repeats):
+def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
     """A motion that is the same whenever a command is repeated has a cause."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
@@ -148,7 +148,7 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path):
+def test_poor_repeatability_alone_claims_nothing(seed, tmp_path):
     robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
@@ -163,7 +163,7 @@ def test_nothing_is_claimed_where_only_the_machine_repeats_badly(seed, tmp_path)
 
 
 @pytest.mark.slow
-def test_intervals_cover_beside_noise_in_common(tmp_path):
+def test_intervals_cover_the_truth_next_to_common_noise(tmp_path):
     """An encoder's offset in twelve campaigns: 90 % intervals, 8 of 12 in 99 %."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):

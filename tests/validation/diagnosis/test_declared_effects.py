@@ -90,7 +90,7 @@ def widest(campaign, name, true):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_fitted_beside_a_declared_effect_is_the_machine(name):
+def test_fit_next_to_a_declared_effect_gives_the_machine(name):
     """Readings of the machine without noise: its numbers, and its readings.
 
     Whether it is softer or stiffer, longer or shorter than declared.
@@ -118,7 +118,7 @@ def test_what_is_fitted_beside_a_declared_effect_is_the_machine(name):
         assert found == pytest.approx(true, rel=2e-2)
 
 
-def test_no_effect_with_numbers_is_left_out():
+def test_every_effect_with_parameters_is_tested():
     assert WRONG.keys() | {"geometric_stiffening"} == LIBRARY.keys()
 
 

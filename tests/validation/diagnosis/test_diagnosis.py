@@ -89,7 +89,7 @@ def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
     assert found.noise.position == pytest.approx(SIGMA[3])
 
 
-def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
+def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
     """Four fifths of the noise last 200 s; the effect is the same, less sure."""
     exact = measured(tmp_path, seed=1, noise=0.0, **CASES["one"])
     time = exact.covariates["time"]
@@ -107,7 +107,7 @@ def test_noise_that_lasts_widens_what_is_known(diagnosed, tmp_path):
     assert abs(value - 3e5) < 3 * std
 
 
-def test_noise_that_repeats_show_to_be_larger_is_told(diagnosed, tmp_path):
+def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
     """Three times what is stated: errors stay in the sigma stated, no cause named."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
@@ -125,7 +125,7 @@ def test_noise_that_repeats_show_to_be_larger_is_told(diagnosed, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
-def test_the_sequence_leads_from_the_declared_model_to_the_machine(name, diagnosed):
+def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
     """Steps that the machine lacks are left out; the last row is the error after."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
@@ -141,7 +141,7 @@ def test_the_sequence_leads_from_the_declared_model_to_the_machine(name, diagnos
         assert last.unknowns == pytest.approx(len(found.fit.x), abs=0.01)
 
 
-def test_a_sound_model_is_left_alone(diagnosed):
+def test_sound_model_is_not_changed(diagnosed):
     found = diagnosed("none")
     assert (found.verdict, found.claimed) == ("none_needed", ())
     assert found.before == found.after
@@ -159,7 +159,7 @@ def test_two_effects_are_named_together(diagnosed, tmp_path):
     assert found.after.normalised <= 1.05 * left_by_the_truth("pair", found, tmp_path)
 
 
-def test_heat_that_never_changes_may_be_a_length(diagnosed):
+def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
     """The class is named, and the temperature that would decide."""
     found = diagnosed("confounded")
     assert (found.verdict, found.claimed) == ("ambiguous", ())
@@ -172,7 +172,7 @@ def test_heat_that_never_changes_may_be_a_length(diagnosed):
 
 
 @pytest.mark.slow
-def test_what_no_effect_explains_is_learned(diagnosed):
+def test_unexplained_deviation_is_learned(diagnosed):
     found = diagnosed("outside")
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < found.before.normalised
@@ -181,7 +181,7 @@ def test_what_no_effect_explains_is_learned(diagnosed):
 
 
 @pytest.mark.slow
-def test_a_device_anywhere_with_blunders_and_gaps(diagnosed):
+def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
     """A turn of the first drive is the device's; the second's offset is seen."""
     found = diagnosed("device")
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
@@ -194,7 +194,7 @@ def test_a_device_anywhere_with_blunders_and_gaps(diagnosed):
 
 
 @pytest.mark.slow
-def test_models_chosen_by_some_rows_are_fitted_to_all(tmp_path, monkeypatch):
+def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
     """The same answer, narrower than by those rows; blunders among the others too."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
@@ -288,7 +288,7 @@ def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_campaigns_of_the_simulation_are_understood(name):
+def test_simulated_campaigns_get_an_accepted_verdict(name):
     """The verdict and the effects as the simulation's side accepts them."""
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
@@ -308,7 +308,7 @@ def test_campaigns_of_the_simulation_are_understood(name):
 
 
 @pytest.mark.slow
-def test_practice_campaigns_of_another_program(tmp_path):
+def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
     """By the score that came with them: nothing wrong, parameters within 3 std.
 
     After / perfect model: 1.15 is 2.6 standard deviations of the rms of 25 rows' noise.

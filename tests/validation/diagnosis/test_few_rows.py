@@ -44,7 +44,7 @@ def test_eight_rows_of_a_target_explain_nothing(seed):
 
 
 @pytest.mark.slow
-def test_as_many_rows_as_were_asked_for_suffice():
+def test_requested_number_of_rows_suffices():
     found = diagnose(seen(8, 1))
     wanted = int(found.needed.split("about ")[1].split()[0])
     again = diagnose(seen(wanted, 1))
@@ -54,7 +54,7 @@ def test_as_many_rows_as_were_asked_for_suffice():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
-def test_readings_like_no_other_are_never_explained(seed):
+def test_random_readings_are_never_explained(seed):
     """A hundred sigma each, at random: there is nothing to be learned in 8 or 16."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))
@@ -63,7 +63,7 @@ def test_readings_like_no_other_are_never_explained(seed):
 
 
 @pytest.mark.parametrize("rows", [2, 3])
-def test_fewer_rows_than_powers_of_a_function_claim_nothing(rows):
+def test_very_few_rows_claim_nothing(rows):
     """Functions of four powers were built of no more columns than there are rows."""
     campaign = seen(rows, 1)
     time = np.linspace(0.0, 600.0, rows)

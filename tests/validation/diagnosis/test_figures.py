@@ -17,7 +17,7 @@ def diagnosed(tmp_path_factory):
     return diagnose(measured(folder, seed=1, stiffness=(np.inf, 7e4)))
 
 
-def test_the_robot_drawn_stands_where_it_was_measured(diagnosed):
+def test_drawn_robot_is_at_its_measured_pose(diagnosed):
     """Within five sigma of the reading, where the declared model errs by far more."""
     row, name = worst_row(diagnosed)
     assert name == "position"

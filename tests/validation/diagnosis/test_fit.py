@@ -67,7 +67,7 @@ def test_a_standard_deviation_is_that_of_the_slopes_where_the_fit_ends():
     assert abs(value - e) < 0.05 * std
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say():
+def test_intervals_cover_the_truth_at_the_stated_rate():
     """One standard deviation in 68 %, of 60 campaigns."""
     rng = np.random.default_rng(8)
     inside = 0
@@ -99,7 +99,7 @@ def test_an_offset_is_exact_far_from_straight():
     assert np.abs(fit.residual).max() < 0.5  # sigma
 
 
-def test_what_finite_motions_explain_needs_no_effect_once_they_are_declared():
+def test_finite_model_needs_no_geometric_stiffening():
     """K a = F L cos(q + a): a quarter turn of the load's arm is no first order."""
     K, F, rows = 2e3, 150.0, 20
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])

@@ -21,7 +21,7 @@ def draw():
     return X, 10 ** rng.uniform(-2, 1, 7), rng.normal(size=40)
 
 
-def test_blocks_left_out_are_foretold_as_by_refits(draw):
+def test_leave_block_out_equals_refits(draw):
     X, std, z = draw
     blocks = np.repeat(np.arange(8), 5)
     marginal = marginalise(X, std, z, np.zeros((40, 0)))

@@ -40,7 +40,7 @@ def inaccurate(tmp_path_factory):
     return diagnose(read_campaign(folder))
 
 
-def test_geometry_alone_is_told_from_every_effect(inaccurate):
+def test_geometric_errors_are_not_claimed_as_effects(inaccurate):
     """Nothing of the library is claimed for frames that are all a little off.
 
     After: 40 rows of 6 readings, each in one of five folds; their noise's rms has a
@@ -89,7 +89,7 @@ def diagnosed(tmp_path_factory):
     return find
 
 
-def test_what_the_library_lacks_is_learned(diagnosed, tmp_path):
+def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path):
     """The stand yields with the square of the load: 6 sigma at 30 N, in every reading.
 
     Bodies of a planar arm that move with the load do as well as the stand.
@@ -120,7 +120,7 @@ def test_what_the_library_lacks_is_learned(diagnosed, tmp_path):
 
 
 @pytest.mark.slow
-def test_places_that_do_the_same_are_listed(diagnosed):
+def test_equivalent_places_are_listed(diagnosed):
     """In a planar arm any body that moves out of the plane reads the same."""
     found = diagnosed("sag")
     assert found.verdict == "learned"
@@ -131,7 +131,7 @@ def test_places_that_do_the_same_are_listed(diagnosed):
 
 
 @pytest.mark.slow
-def test_scatter_teaches_nothing(diagnosed):
+def test_scatter_is_not_learned(diagnosed):
     """Three times the noise stated, and no repeats that would say so."""
     found = diagnosed("scatter")
     assert found.verdict == "outside_library"

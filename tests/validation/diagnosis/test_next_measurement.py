@@ -24,7 +24,7 @@ from validation.diagnosis.next_measurement import next_measurement
 from validation.diagnosis.signatures import conditions_of
 
 
-def test_another_temperature_tells_heat_from_length():
+def test_another_temperature_separates_expansion_from_length():
     """d'(I + J C J')^-1 d with d = alpha L 10 K / sigma along the bar, by hand.
 
     R readings at T leave the length sigma^2 / R and the expansion that much over
@@ -46,7 +46,7 @@ def test_another_temperature_tells_heat_from_length():
 
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
-def test_a_measurement_is_worth_a_standard_deviation(power, worth):
+def test_next_measurement_needs_a_power_of_one(power, worth):
     """Of heat and length as above, by an expansion that differs by so much."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}
@@ -59,14 +59,14 @@ def test_a_measurement_is_worth_a_standard_deviation(power, worth):
     assert (found is not None) == worth
 
 
-def test_nothing_decides_between_one_explanation_and_itself():
+def test_equal_models_have_no_next_measurement():
     campaign = bar(link=BEAM)
     here = conditions_of(campaign)
     fit = machine(campaign, LONGER)
     assert next_measurement(campaign, here, fit, [fit]) is None
 
 
-def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
+def test_next_configuration_lies_between_the_measured_ones():
     """A turned encoder and an eccentric one at 0 and at 2 pi: e = e cos q.
 
     Between, they differ by e (1 - cos q) in the direction of either, of information
@@ -96,7 +96,7 @@ def test_a_configuration_between_decides_where_the_measured_ones_are_alike():
     )
 
 
-def test_a_range_of_temperatures_is_left_by_half_of_it():
+def test_next_temperature_exceeds_the_range_by_half():
     """20 to 60: low, middle, or 20 + 1.5 times 40, which is the farthest."""
     heat = {"temperature": np.linspace(20.0, 60.0, 8)}
     plain = bar(link=BEAM, **heat)
@@ -109,7 +109,7 @@ def test_a_range_of_temperatures_is_left_by_half_of_it():
         assert found.covariates == {"temperature": 80.0}
 
 
-def test_a_load_that_decides_is_half_as_large_again_and_no_more_than_is_needed():
+def test_next_load_is_half_as_large_again():
     """A drive that gives under M against one that is turned: by 1.5 M, or -1.5 M."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)

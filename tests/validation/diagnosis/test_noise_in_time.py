@@ -63,7 +63,7 @@ def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
     assert np.array_equal(white, H)
 
 
-def test_the_mean_of_a_process_has_the_variance_of_the_books():
+def test_mean_of_an_ornstein_uhlenbeck_process_has_the_textbook_variance():
     """(1 + f)/(1 - f) - 2 f (1 - f^n)/(n (1 - f)^2), over n; f = exp(-step/tau)."""
     campaign = session(columns=(3,))
     f, n = np.exp(-STEP / CONSTANT), ROWS
@@ -74,7 +74,7 @@ def test_the_mean_of_a_process_has_the_variance_of_the_books():
 
 
 @pytest.mark.slow
-def test_intervals_hold_nine_campaigns_in_ten(rng):
+def test_intervals_cover_nine_campaigns_in_ten(rng):
     """Estimated share and constant; by white noise hardly more than half hold.
 
     200 campaigns of three unknowns: 0.9 +- 0.012 were they independent; what the fit
@@ -145,7 +145,7 @@ def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
     assert found.probability == pytest.approx(expected[2], rel=1e-9, abs=0)
 
 
-def test_points_of_a_body_have_noise_of_their_own(rng):
+def test_noise_in_time_is_independent_between_points(rng):
     """Two points, read in turns, are two series: covariances of each add up."""
     one, both = session(40), session(80)
     both.point = np.tile(["p", "q"], 40)

@@ -44,7 +44,7 @@ def test_geometry_and_springs_that_readings_show_are_listed_with_their_bounds(lo
     assert set(springs.axis.tolist()) == {0, 1, 2, 5}
 
 
-def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
+def test_tolerances_set_prior_sizes_and_zero_excludes_a_direction(loaded):
     campaign, _, _ = loaded
     tolerance = np.array([1e-3, 0, 1e-3, 2e-4, 0, 1e-4])
     frames = (replace(campaign.robot.frames[0], tolerance=tolerance),
@@ -62,7 +62,7 @@ def test_tolerances_say_sizes_and_zero_says_that_a_direction_is_exact(loaded):
     assert geometry.take(own).columns.shape == (48, 4)
 
 
-def test_what_is_not_loaded_or_not_read_has_no_unknowns():
+def test_unloaded_or_unread_directions_have_no_unknowns():
     """Nothing is loaded: no springs; only x is read: what moves it."""
     seen = np.full((8, 6), np.nan)
     seen[:, 3] = 0.0
@@ -75,7 +75,7 @@ def test_what_is_not_loaded_or_not_read_has_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_columns_add_up_to_what_a_robot_with_them_reads(loaded):
+def test_columns_sum_to_the_readings_of_a_changed_robot(loaded):
     """Errors and springs of a size that is small, built into the robot."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)

@@ -51,7 +51,7 @@ def test_rows_that_lack_a_cell_do_not_take_part(cell):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-9)
 
 
-def test_rotations_of_a_machine_that_turns_are_seen_turned():
+def test_device_rotation_is_found_next_to_a_turned_model():
     """R = D M: the device's rotation is left when the model's is taken off the right;
     of several that differ, the mean."""
     model = np.array([0.02, -0.03, 0.04])
@@ -80,7 +80,7 @@ def test_three_points_off_one_line_are_enough(points):
 
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])
-def test_without_sessions_of_both_one_device_is_that_of_all_rows(known):
+def test_sessions_missing_on_one_side_share_one_device(known):
     """Half the rows are seen from elsewhere: a compromise, the same in all."""
     seen, sessions = seen_by(TURN, SHIFT), np.array(["a", "b"] * 4)
     campaign = bar(measured=seen)
@@ -114,7 +114,7 @@ def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
     assert found.base[3:] == pytest.approx(t, abs=1e-9)
 
 
-def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
+def test_collinear_points_do_not_determine_the_device_rotation():
     """Five places of a slide half a metre beside the base, no rotation read."""
     robot = Robot("slide", "tip", (
         Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
@@ -133,7 +133,7 @@ def test_points_on_a_line_anywhere_do_not_say_how_a_device_is_turned():
         register(campaign, conditions_of(campaign))
 
 
-def test_a_device_is_found_beside_errors_that_the_model_knows():
+def test_device_is_found_next_to_declared_errors():
     """The declared tip is 4 mm off: that is the machine's, and not the device's."""
     plain = bar()
     errors = np.zeros((2, 6))

@@ -67,7 +67,7 @@ def test_linearised_elements_are_exact_at_their_values(columns):
     assert [e.origin for e in again] == elements
 
 
-def test_a_model_finds_values_that_a_linear_one_misses(columns):
+def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
     elements, xs = effects(columns)
     z = moved() + np.random.default_rng(0).normal(size=120)
     again = known(columns, z)
@@ -80,7 +80,7 @@ def test_a_model_finds_values_that_a_linear_one_misses(columns):
         assert abs(e.values(mean) - x) < 4 * spread
 
 
-def test_a_spring_that_is_a_drives_compliance_is_no_nuisance(columns):
+def test_spring_of_a_drive_is_an_effect_and_not_a_nuisance(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
     loose = Columns(loaded, Derivatives(with_second_order(conditions_of(loaded))))
     small, robot = loose.nuisance, CAMPAIGN.robot

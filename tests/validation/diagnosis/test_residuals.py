@@ -45,7 +45,7 @@ def test_scatter_between_repeats_by_hand():
     assert found.rms == pytest.approx(np.sqrt(2510 / 2))
 
 
-def test_repeats_that_are_equal_leave_no_noise_to_blame():
+def test_equal_repeats_make_any_residual_a_lack_of_fit():
     """A device that rounds: what is left at all is a lack of fit."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
@@ -57,7 +57,7 @@ def test_repeats_that_are_equal_leave_no_noise_to_blame():
     assert lack_of_fit(campaign, np.zeros(4), 1).against_repeats == 1.0
 
 
-def test_without_repeats_nothing_is_said_of_them():
+def test_campaign_without_repeats_has_no_repeat_scatter():
     campaign = campaign_of(np.ones((5, 6)), repeat=np.arange(5))
     found = lack_of_fit(campaign, np.ones(30), 3)
     assert np.isnan(found.repeats)
@@ -90,7 +90,7 @@ def test_a_device_worse_than_stated_is_no_lack_of_fit(rng):
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
-def test_what_repeats_share_is_a_lack_of_fit(size, rng):
+def test_deviation_common_to_repeats_is_a_lack_of_fit(size, rng):
     """Whatever the device: 2 sigma common to all visits of a configuration."""
     campaign = noisy(rng, 120, 20, size)
     shared = 2 * size * rng.normal(size=(20, 6))[campaign.repeat] * SIGMA
@@ -98,7 +98,7 @@ def test_what_repeats_share_is_a_lack_of_fit(size, rng):
     assert lack_of_fit(campaign, z, 0).significant
 
 
-def test_a_row_far_off_is_named_and_at_most_one_in_twenty(rng):
+def test_large_residuals_are_outliers(rng):
     z = rng.normal(size=(40, 6))
     z[7, 3] += 40
     campaign = campaign_of(z)

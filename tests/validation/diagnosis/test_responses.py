@@ -30,7 +30,7 @@ def turns_of(campaign):
 
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
-def test_screws_are_carried_along_the_bar_and_loads_back(rows):
+def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
     """However many postures there are, and in whatever order they come again.
 
     A drive's screw turns the whole bar, in the base's axes; the tip's is read as it
@@ -53,7 +53,7 @@ def test_screws_are_carried_along_the_bar_and_loads_back(rows):
     assert not found.wrenches[:, 1].any()
 
 
-def test_a_device_reads_small_screws_where_and_as_it_stands():
+def test_readings_of_small_screws_follow_the_device_frame():
     """R (t + r x arm), arm to the point it sees; its turn after b by Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
@@ -76,7 +76,7 @@ def test_a_device_reads_small_screws_where_and_as_it_stands():
         )
 
 
-def test_a_row_without_a_solution_answers_nothing():
+def test_row_without_a_solution_has_zero_response():
     """A closed chain with an unknown error; other rows are as before."""
     at = home_posture(five_bar())
     three = replace(
@@ -97,7 +97,7 @@ def test_a_row_without_a_solution_answers_nothing():
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
-def test_play_that_rests_changes_no_answer(held, closed):
+def test_resting_clearance_changes_no_response(held, closed):
     """To first order: it stays where the load has taken it, and the same goes through.
 
     Of an open chain, and of one that closes.
@@ -126,7 +126,7 @@ def test_play_that_rests_changes_no_answer(held, closed):
     assert tight.wrenches.any()
 
 
-def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
+def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
     """Each carries half: what closes is looked at as if all play were gone."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (
@@ -138,7 +138,7 @@ def test_play_of_one_of_two_springs_side_by_side_shifts_no_load():
     assert found.wrenches[0, [0, 2], 3] == pytest.approx([15.0, 15.0], rel=1e-9)
 
 
-def test_wrenches_are_as_small_as_their_loads():
+def test_wrenches_are_proportional_to_small_loads():
     """Zero is what is rounding beside the largest, and not beside 1 N."""
     load = np.array([0, 0, 3.0, 0, 5.0, 0])
     one = responses(conditions_of(bar(load, link=BEAM)))

@@ -64,7 +64,7 @@ def with_gain(campaign, gain):
     return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
 
 
-def test_a_known_gain_leaves_noise(rocking):
+def test_known_gain_of_a_measured_motion_leaves_noise(rocking):
     """1 mrad at 0.7 m is some twenty sigma; 0.2 mrad of it too much, some four."""
     assert predict(rocking).error.normalised > 8
     assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15

@@ -24,7 +24,7 @@ def cut_to(share):
      lambda content: content.replace(b"\x08\x00", b"\x63\x00")],
     ids=["empty", "third", "end", "text", "compression"],
 )  # fmt: skip
-def test_damaged_covariance_is_refused_by_its_name(tmp_path, damage):
+def test_damaged_covariance_file_is_refused_by_name(tmp_path, damage):
     """An empty one ended the command as if interrupted."""
     path = tmp_path / "saved.npz"
     write_covariance(SavedCovariance((), np.zeros((0, 0))), path)

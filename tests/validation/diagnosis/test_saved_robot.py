@@ -48,7 +48,7 @@ def saved(found, tmp_path_factory):
     return read_robot(path)
 
 
-def test_the_file_predicts_the_errors_that_are_printed(found, saved):
+def test_saved_robot_predicts_the_printed_errors(found, saved):
     """To the ten digits of the file: all rows without outliers."""
     again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
@@ -57,7 +57,7 @@ def test_the_file_predicts_the_errors_that_are_printed(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
-def test_the_error_after_is_of_a_machine_that_never_saw_its_rows(found):
+def test_error_after_is_of_a_fit_without_the_held_out_rows(found):
     """The same unknowns, fitted to the other rows alone from where a fit begins."""
     assert found.held.how == "split"
     used = ~found.held.rows & ~found.outliers
@@ -72,7 +72,7 @@ def test_the_error_after_is_of_a_machine_that_never_saw_its_rows(found):
     assert 0.75 < found.after.normalised < 1.35
 
 
-def test_what_is_saved_is_fitted_to_all_rows(found, saved):
+def test_saved_robot_is_fitted_to_all_rows(found, saved):
     rows = ~found.outliers
     assert saved.diagnosis["rows_fitted"] == rows.sum() == found.fitted.sum()
     assert len(found.fit.residual) == 6 * rows.sum()
@@ -103,7 +103,7 @@ def test_readings_held_out_change_nothing_but_the_errors(found, change):
         assert not again.claimed
 
 
-def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
+def test_folds_are_fitted_without_their_held_out_readings(monkeypatch):
     """Each is searched and fitted with NaN there; all rows but at the end."""
     given, looked = [], []
 
@@ -134,7 +134,7 @@ def test_no_fold_is_given_the_readings_by_which_it_is_judged(monkeypatch):
         assert np.array_equal(seen, fitted)
 
 
-def test_the_file_knows_the_point_that_was_measured(found, saved):
+def test_saved_robot_keeps_the_measured_point(found, saved):
     """Readings of a table are of it; those of another point say so."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
@@ -146,7 +146,7 @@ def test_the_file_knows_the_point_that_was_measured(found, saved):
     assert told["reference_point"] == [0.0, 0.0, 0.0]
 
 
-def test_a_bare_table_is_read_at_the_point_of_the_file(found, tmp_path, run):
+def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_path, run):
     """Through the command: two rows, as predicted for the campaign's."""
     save(found, tmp_path / "robot.toml")
     campaign = found.campaign.take(np.arange(2))
@@ -175,7 +175,7 @@ def test_a_bare_table_is_read_at_the_point_of_the_file(found, tmp_path, run):
     assert {f"std.{c}" for c in ("rx", "tz")} <= set(head)
 
 
-def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
+def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
     """Of 120 rows that were not measured before: by covariance and noise.
 
     720 readings whose errors of the model are common: five standard errors of 0.011.
@@ -189,7 +189,7 @@ def test_nine_readings_in_ten_lie_in_their_intervals(found, saved):
     assert told.spread.max() > 0.1 * SIGMA.min()
 
 
-def test_the_file_knows_how_sure_its_numbers_are(found, saved):
+def test_saved_robot_has_the_covariance_of_its_parameters(found, saved):
     """Of every number that was fitted; errors within what it says of them."""
     known = read_covariance(saved)
     assert len(known.numbers) == len(found.fit.x)
@@ -198,7 +198,7 @@ def test_the_file_knows_how_sure_its_numbers_are(found, saved):
     assert any(kind == "geometric_error" for kind, _ in names)
 
 
-def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
+def test_unmeasured_components_are_named_and_uncertain(tmp_path):
     """Heights alone: x and y are as open as errors of frames are large."""
     seen = read(commanded(arm(), 24))
     blind = seen.measured.copy()
@@ -221,7 +221,7 @@ def test_components_that_were_not_measured_are_named_and_uncertain(tmp_path):
     assert np.isnan(std["rotation"])
 
 
-def test_a_machine_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
+def test_robot_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
     """Exit 1 and no file, whatever the verdict; better ones are saved."""
     folder = tmp_path / "campaign"
     folder.mkdir()

@@ -42,7 +42,7 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_teaches_nothing_whatever_sigma_was_stated(columns, noise):
+def test_noise_of_any_scale_selects_nothing(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
@@ -69,7 +69,7 @@ def test_waves_of_a_gear_are_found_with_their_number(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_no_drift_of_the_reading(columns):
+def test_growth_with_time_is_not_a_drift_of_the_reading(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
@@ -78,7 +78,7 @@ def test_growth_with_time_is_no_drift_of_the_reading(columns):
     assert selected.functions[0].candidate.parts[0].where != "reading"
 
 
-def test_blunders_are_left_out(columns):
+def test_search_excludes_outliers(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     readings = np.zeros((ROWS, 6))
     readings[[1, 10, 21], [3, 4, 3]] = 40 * sigma
@@ -87,7 +87,7 @@ def test_blunders_are_left_out(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
+def test_joint_scores_of_functions_equal_single_scores(columns):
     rng = np.random.default_rng(4)
     z = 5 * rng.normal(size=6 * ROWS)
     every = np.ones(len(z), dtype=bool)
@@ -103,7 +103,7 @@ def test_functions_scored_together_are_worth_what_each_is_worth_alone(columns):
     assert together == pytest.approx(alone, rel=1e-6)
 
 
-def test_what_readings_see_by_rounding_alone_is_no_place():
+def test_places_seen_by_rounding_alone_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
@@ -116,7 +116,7 @@ def test_what_readings_see_by_rounding_alone_is_no_place():
 
 
 @pytest.mark.parametrize("size", [6.0, 25.0])
-def test_one_row_alone_teaches_no_function(columns, size):
+def test_single_row_selects_no_function(columns, size):
     readings = np.zeros((ROWS, 6))
     readings[17] = size * CAMPAIGN.sigma[17] * [1, -1, 1, 1, -1, 1]
     selected = found(columns, readings)

@@ -74,7 +74,7 @@ def parameters(found, name, session=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
+def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
     """A spring that all share is found beside them; the file says all of it."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
@@ -112,7 +112,7 @@ def test_every_session_has_its_zeros_and_its_tool(known, tmp_path):
 
 
 @pytest.mark.slow
-def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
+def test_common_effects_are_claimed_for_all_sessions(tmp_path):
     """What all share is claimed for all, and saved without a session."""
     zeros = Hidden("encoder_offset", ZEROS["monday"])
     folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
@@ -125,7 +125,7 @@ def test_sessions_of_one_machine_have_nothing_of_their_own(tmp_path):
 
 
 @pytest.mark.slow
-def test_every_session_drifts_in_its_own_way(tmp_path):
+def test_drift_is_found_for_each_session(tmp_path):
     """Other components, and 900 s on one day against 2000 s on the other."""
     drifts = {
         "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},
@@ -150,7 +150,7 @@ def test_every_session_drifts_in_its_own_way(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_campaign_says_what_else_may_differ(tmp_path):
+def test_per_session_effects_are_read_from_the_campaign(tmp_path):
     """A load cell with another gain each day, 10 % and -8 %."""
     gains = {"monday": 1.1, "tuesday": 0.92}
     hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
@@ -171,7 +171,7 @@ def test_a_campaign_says_what_else_may_differ(tmp_path):
     ('"load_gain"', "per_session: found"),
     ("[3]", "found 3, expected effects"),
 ])  # fmt: skip
-def test_what_cannot_differ_by_session_is_refused(given, message, tmp_path):
+def test_wrong_per_session_effect_is_refused(given, message, tmp_path):
     folder = write_campaign(tmp_path / "days", toml={"per_session": given})
     with pytest.raises(BadInput, match=re.escape(message)):
         read_campaign(folder)
@@ -195,7 +195,7 @@ def in_two_tables(folder, shift):
     return folder
 
 
-def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
+def test_function_acts_only_in_sessions_with_its_covariate(tmp_path):
     """20 um for each of ten parts of humidity, which one of two tables records."""
     folder = in_two_tables(tmp_path / "days", 2e-5)
     diagnosis = diagnose(read_campaign(folder))
@@ -210,7 +210,7 @@ def test_a_function_acts_in_the_sessions_that_have_its_covariate(tmp_path):
     assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
-def test_a_covariate_of_one_table_alone_is_no_matter_where_nothing_depends_on_it(
+def test_covariate_of_one_table_is_ignored_without_dependence(
     tmp_path,
 ):
     campaign = read_campaign(in_two_tables(tmp_path / "days", 0.0))

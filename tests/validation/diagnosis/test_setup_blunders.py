@@ -137,7 +137,7 @@ def test_exchanged_joints_are_named(rng, pair):
     assert said(machine.campaign()) == {("exchanged", names)}
 
 
-def test_two_blunders_together_are_both_named(rng):
+def test_two_set_up_blunders_are_both_named(rng):
     machine = Machine(rng, unknown=True)
     machine.q[:, 1] *= -1
     machine.q[:, 3] += np.pi / 2
@@ -220,7 +220,7 @@ def test_drives_of_a_closed_chain_are_named(rng):
     assert said(machine.campaign()) == {("sign", (name,))}
 
 
-def test_readings_of_single_blunders_do_not_hide_it(rng):
+def test_outliers_do_not_hide_a_reversed_joint(rng):
     machine = Machine(rng)
     machine.q[:, 2] *= -1
     machine.points[[3, 17]] += 5.0

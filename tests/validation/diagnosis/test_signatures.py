@@ -21,7 +21,7 @@ from validation.diagnosis.signatures import (
 from validation.diagnosis.trace import FINITE
 
 
-def test_the_weight_has_the_direction_that_covariates_say():
+def test_weight_has_the_direction_of_the_gravity_covariates():
     """Zero where they do not."""
     along = {"gravity.x": np.arange(8.0), "gravity.z": np.full(8, -9.81)}
     here = conditions_of(bar(**along))
@@ -55,7 +55,7 @@ def test_components_of_the_load_that_act_anywhere_are_named():
     assert loaded_components(replace(bar(), loads=loads)) == ["mz", "fy"]
 
 
-def test_the_residual_is_the_reading_less_what_is_declared():
+def test_residual_is_reading_minus_declared_prediction():
     """A bar declared 0.1 mm longer, read 0.3 mm longer; some cells not measured."""
     plain = bar()
     errors = np.zeros((2, 6))

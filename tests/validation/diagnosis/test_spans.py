@@ -59,7 +59,7 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_the_causes_are_learned_in_their_simplest_form(heated):
+def test_causes_are_learned_in_their_simplest_form(heated):
     """Noise correlated in time makes splines and functions of time likelier.
 
     The gain of the bed: to five of its standard errors by the noise, 2.5 um, whose
@@ -80,7 +80,7 @@ def test_the_causes_are_learned_in_their_simplest_form(heated):
     assert value == pytest.approx(BED, abs=5 * 2.5e-6 / spread / np.sqrt(40))
 
 
-def test_spans_of_time_held_out_are_foretold_to_the_noise(heated):
+def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
     """Some sixty independent rows: within half of the noise in them."""
     diagnosis, noise = heated
     kept = diagnosis.held.rows
@@ -89,7 +89,7 @@ def test_spans_of_time_held_out_are_foretold_to_the_noise(heated):
     assert diagnosis.after.position < 1.5 * left
 
 
-def test_many_blunders_do_not_keep_from_learning(tmp_path):
+def test_many_outliers_do_not_prevent_learning(tmp_path):
     """Eleven, each two thirds of the one before: left out one after another."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))

@@ -92,7 +92,7 @@ def by_least_squares(X, z):
     return 1 - squares[1] / squares[0], f.sf(ratio, extra, freedom)
 
 
-def test_every_trend_is_an_f_test_of_what_its_name_says(varied, monkeypatch):
+def test_every_trend_is_the_f_test_of_its_name(varied, monkeypatch):
     monkeypatch.setattr(module, "UNLIKELY", 2.0)
     monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
@@ -118,7 +118,7 @@ def test_six_trends_are_named_at_most(varied, rng):
     assert len(trends(many, conditions_of(many), rest)) == 6
 
 
-def test_a_square_is_seen_however_far_from_zero(rng):
+def test_quadratic_trend_is_seen_far_from_zero(rng):
     """A megakelvin and up to one more, or half a second of time."""
     x = rng.uniform(0, 1, 40)
     hot = bar(rows=40, heat=1e6 + x)

@@ -173,14 +173,14 @@ def test_export_of_a_device_program_is_read_exactly(lab, run, name):
 
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
-def test_rows_of_numbers_alone_are_all_targets_in_their_order(lab, run, before):
+def test_rows_of_numbers_are_targets_in_their_order(lab, run, before):
     """A counter or a time before them is told by the targets' distances."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)
 
 
-def test_rows_without_any_reading_are_one_line(lab, run):
+def test_rows_without_readings_are_refused(lab, run):
     line = refused(lab, run, "\n".join(["NaN " * 9] * 13))
     assert "found no" in line
 
@@ -245,7 +245,7 @@ def test_time_of_the_commands_reaches_the_campaign(lab, run):
         ("load.fx [mm]", 'found the unit "mm"'),
     ],
 )
-def test_units_of_commands_are_those_of_their_kind(lab, run, column, message):
+def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
     lab.commands(range(13))
     path = lab.folder / "commands.csv"
     path.write_text(path.read_text().replace("time", column), encoding="utf-8")
@@ -272,7 +272,7 @@ def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, no
     assert "p6" not in lab.table()["id"]
 
 
-def test_reading_that_a_file_has_twice_is_named(lab, run):
+def test_repeated_reading_is_named(lab, run):
     body = list(points(line=SPATIAL_ANALYZER))
     table = imported(lab, run, "\n".join([*body, body[4]]))
     assert table["readings"] == 39
@@ -280,7 +280,7 @@ def test_reading_that_a_file_has_twice_is_named(lab, run):
     assert 'line 40 ("Main::p1::B"): the same reading twice' in line
 
 
-def test_reading_that_is_one_too_many_is_named(lab, run):
+def test_surplus_reading_is_named(lab, run):
     """Joined by order a repeated line moves all that follow."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
@@ -289,7 +289,7 @@ def test_reading_that_is_one_too_many_is_named(lab, run):
     assert line.endswith("; line 7 repeats line 6")
 
 
-def test_what_is_there_twice_in_the_commands_is_named(lab, run):
+def test_duplicates_in_the_commands_are_named(lab, run):
     path = lab.folder / "commands.csv"
     text = path.read_text()
     path.write_text(text.replace("p5", "p3"))
@@ -389,7 +389,7 @@ def test_readings_that_do_not_fit_targets_or_commands_are_remarked(lab, run, cas
 
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
-def test_endless_cell_is_refused_by_its_line(lab, run, piece):
+def test_very_long_cell_is_refused_with_its_line(lab, run, piece):
     """Looking for a unit in 200 000 brackets took minutes."""
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[1] += piece * 200_000 + "x"
@@ -475,22 +475,20 @@ def test_declared_mount_gives_the_rotations_themselves(lab, run, rng):
          "orientation: found"),
     ],
 )  # fmt: skip
-def test_orientations_that_are_not_certain_are_refused(
-    lab, run, head, values, keys, message
-):
+def test_ambiguous_orientations_are_refused(lab, run, head, values, keys, message):
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
     assert message in refused(lab, run, text)
 
 
-def test_orientations_are_passed_over_without_their_noise(lab, run):
+def test_orientations_without_stated_noise_are_ignored(lab, run):
     head, values, _ = ORIENTATIONS["quaternion"]
     lab.targets("A")
     imported(lab, run, "\n".join(["X,Y,Z," + head, *oriented_rows(values)]))
     assert not [name for name in lab.table() if name.startswith("meas.r")]
 
 
-def test_orientation_of_one_of_several_targets_is_the_platforms(lab, run):
+def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
     """Wide: A has a quaternion, B and C are points."""
     head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
     lab.targets(noise_rotation=1e-4)
@@ -509,7 +507,7 @@ def test_orientation_of_one_of_several_targets_is_the_platforms(lab, run):
 # -- cells and clocks ---------------------------------------------------------------
 
 
-def test_cells_are_parted_by_what_most_lines_have(tmp_path):
+def test_delimiter_is_the_mark_of_most_lines(tmp_path):
     """A preamble of other marks does not decide; quoted marks do not part cells."""
     path = tmp_path / "a.txt"
     path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
@@ -520,7 +518,7 @@ def test_cells_are_parted_by_what_most_lines_have(tmp_path):
     assert (sheet.decimal, sheet.rows[0][1]) == (",", ["p1", "1,5", "2,5", "3,5"])
 
 
-def test_file_that_is_no_text_is_refused(tmp_path):
+def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
     with pytest.raises(BadInput, match="holds NUL"):

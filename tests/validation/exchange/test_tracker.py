@@ -109,7 +109,7 @@ def test_spatial_analyzer_text_joined_by_name(lab, run):
     assert 'robot = "../robot.toml"' in declared
 
 
-def test_one_command_from_a_device_s_file_to_the_verdict(lab, run):
+def test_import_diagnoses_a_device_file(lab, run):
     """Readings of the declared arm itself, noise apart: it lacks nothing."""
     noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
     lab.export("\n".join(points(
@@ -233,7 +233,7 @@ def test_readings_joined_by_order_and_read_twice(lab, run):
         ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
     ],
 )
-def test_wrong_files_are_one_line(lab, run, text, targets, message):
+def test_wrong_device_file_is_refused_in_one_line(lab, run, text, targets, message):
     lab.targets(**targets)
     lab.export(text)
     status, out, err = run(*lab.words())
@@ -251,7 +251,7 @@ def test_wrong_files_are_one_line(lab, run, text, targets, message):
         ("ids,q.one,q.two", 'unknown column "ids"'),
     ],
 )
-def test_wrong_commands_are_one_line(lab, run, head, message):
+def test_wrong_table_of_commands_is_refused_in_one_line(lab, run, head, message):
     lab.commands(head=head)
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     status, _, err = run(*lab.words())
@@ -259,7 +259,7 @@ def test_wrong_commands_are_one_line(lab, run, head, message):
     assert message in err.splitlines()[-1]
 
 
-def test_what_is_there_is_not_written_over(lab, run):
+def test_import_does_not_overwrite_a_campaign(lab, run):
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     assert run(*lab.words())[0] == 0
     status, _, err = run(*lab.words())

@@ -20,7 +20,7 @@ def blocks(seed=0):
     return [rng.normal(size=(2 * ROWS, k)) for k in (1, 2, 1)]
 
 
-def test_one_unknown_against_one_by_hand():
+def test_criterion_of_two_unknowns_is_the_schur_complement():
     """a'a - (a'b)^2 / (b'b + 1)."""
     a, _, b = blocks()
     apart = _Criterion(blocks(), ROWS).apart(np.arange(ROWS))
@@ -29,7 +29,7 @@ def test_one_unknown_against_one_by_hand():
     assert np.isnan(np.diag(apart)).all()
 
 
-def test_the_command_writes_a_campaign_to_be_measured(tmp_path, run):
+def test_plan_writes_a_campaign_to_be_measured(tmp_path, run):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     folder, answer = tmp_path / "plan", tmp_path / "plan.json"
@@ -58,7 +58,7 @@ def test_the_command_writes_a_campaign_to_be_measured(tmp_path, run):
         ("--temperature", "hot", 'temperature: found "hot", expected swing'),
     ],
 )
-def test_what_cannot_be_planned_is_said(tmp_path, run, option, value, says):
+def test_plan_refuses_wrong_options(tmp_path, run, option, value, says):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     code, _, error = run("validation", "plan", str(robot), option, value,

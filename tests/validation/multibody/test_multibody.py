@@ -204,7 +204,7 @@ def test_an_infinite_stiffness_locks_its_axis():
 
 
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
-def test_a_bearing_turns_freely_and_yields_otherwise(clearance):
+def test_bearing_turns_freely_and_is_elastic_otherwise(clearance):
     """A bar from a bearing to a wall that is askew by up to 3e-3 rad and 0.2 mm.
 
     Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size.

@@ -36,7 +36,7 @@ def test_a_tripod_with_clearances_of_a_micrometre_is_simulated(scale):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_contacts_are_as_hard_beside_the_energy_at_every_scale():
+def test_contact_energy_is_small_at_every_scale():
     """Self-similar: load, errors and clearances times s, contacts store s^2 as much.
 
     Steps of 1 um were accepted beside clearances of 1 um: contacts then stored twice

@@ -55,7 +55,7 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.exudyn
-def test_a_study_answers_as_the_reference_does(results):
+def test_study_agrees_with_the_reference(results):
     outcome, _, steps = results
     point = NUMBERS["cases"][0]["points"][0]
     assert outcome.solution["energy"] == pytest.approx(point["energy"], rel=1e-10)
@@ -269,7 +269,7 @@ def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
     assert "Not compared: cvxpy: the problem" in report_page(results)
 
 
-def test_the_headline_is_the_worst_play_over_the_map(tmp_path):
+def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
     """A five-bar's play, free: least energy rests it in the middle.
 
     The bound at a pose is that of ``assembly error``, over the map the largest of the
@@ -341,7 +341,7 @@ def test_a_manipulator_that_cannot_be_assembled_is_reported_not_raised(tmp_path)
         ("title", "title = 1 #", "title: found 1, expected a string"),
     ],
 )  # fmt: skip
-def test_every_mistake_in_a_study_file_is_one_message(tmp_path, old, new, message):
+def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
         read_study(path)

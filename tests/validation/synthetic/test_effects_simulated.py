@@ -88,7 +88,7 @@ def machine(robot):
     return as_declared(both, loads, point=POINT, covariates=UNDER), rows
 
 
-def test_no_effect_is_left_out():
+def test_every_effect_of_the_library_is_tested():
     assert EFFECTS.keys() | ELSEWHERE == LIBRARY.keys()
 
 
@@ -99,7 +99,7 @@ def test_no_effect_is_left_out():
     [pytest.param(n, marks=[pytest.mark.slow] * (i % 3 > 0))
      for i, n in enumerate(EFFECTS)],
 )  # fmt: skip
-def test_an_effect_adds_what_the_machine_that_has_it_shows(
+def test_effect_adds_the_deviation_of_a_machine_that_has_it(
     name, program, robot, machine
 ):
     """With finite motions to 30 nm or nrad, of up to 500 um and urad.
