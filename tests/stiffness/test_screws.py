@@ -13,11 +13,6 @@ from stiffness.screws import (
 )
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(1)
-
-
 def test_skew_is_the_cross_product(rng):
     a, b = rng.normal(size=(2, 7, 3))
     np.testing.assert_allclose(

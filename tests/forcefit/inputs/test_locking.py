@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def test_locked_file_is_refused_until_released(tmp_path):
-    """In the same process too: a run that begins another of the same file."""
+    """Also within one process."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):
         with pytest.raises(BlockingIOError), locked_file(path, wait=False):
@@ -70,9 +70,9 @@ main()
     ],
 )
 def test_commands_run_without_posix_modules(tmp_path, words):
-    """Modules and functions that Windows lacks: the same answer without them.
+    """Without modules and functions that Windows lacks the answer is the same.
 
-    Only what runs in the command's own process is tried.
+    Only the command's own process is tested.
     """
     search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     answers = []

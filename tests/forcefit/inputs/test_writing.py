@@ -1,4 +1,4 @@
-"""Every file is written whole or not at all, by one function."""
+"""Files are written whole or not at all."""
 
 import ast
 import multiprocessing
@@ -227,7 +227,7 @@ def write_many(path, mark, count):
 
 
 def test_two_programs_at_once_leave_one_of_their_files(tmp_path):
-    """Each waits for the other: no mixture, and nothing beside it."""
+    """Each waits for the other: no mixture, and no other file."""
     path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
     both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
     for one in both:

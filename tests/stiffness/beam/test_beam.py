@@ -35,11 +35,6 @@ def assert_same(matrix, expected, tol):
     np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(20)
-
-
 @pytest.mark.parametrize("theory", PAPER)
 def test_stiffness_of_the_papers_link_is_its_reference_table(theory):
     diagonal, coupling = PAPER[theory]

@@ -196,7 +196,7 @@ def test_a_round_bars_energy_has_hutchinsons_shear_factor_not_cowpers():
 
 
 def test_a_thin_boxs_constants_are_those_of_finite_elements():
-    """Bredt's wall leaves the corners out: 3.5 % of J at wall / width = 1 / 12."""
+    """Bredt's formula neglects the corners: 3.5 % of J at wall / width = 1 / 12."""
     wall = 0.06 / 12
     measured = measured_section(
         lambda L: masked_solid(
@@ -215,7 +215,7 @@ def test_a_thin_boxs_constants_are_those_of_finite_elements():
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e2])
 def test_a_curve_cut_in_two_is_the_curve_wherever_it_stands(away, size):
-    """An arc in two arcs, a bar in two bars; as long as they are together."""
+    """An arc in two arcs, a bar in two bars; their lengths add up."""
     o, turn = np.array(away) * size, np.array([0.0, 0.6, 0.0])
     centre, corner = o + [0, 0, 0.2 * size], o + [-0.3 * size, 0, 0]
     half = arc_piece(o, centre, turn / 2, CROOKED)

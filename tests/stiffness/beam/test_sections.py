@@ -81,15 +81,12 @@ def test_the_size_of_a_bar_is_its_radius_in_any_unit():
             assert size == pytest.approx(3 * unit / math.sqrt(3), rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    "section",
-    [
-        lambda nu: round_section(1.0, nu),
-        lambda nu: rectangular_section(1.0, 2.0, nu),
-        lambda nu: box_section(1.0, 2.0, 0.1, nu),
-        lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
-    ],
-)
+@pytest.mark.parametrize("section", [
+    lambda nu: round_section(1.0, nu),
+    lambda nu: rectangular_section(1.0, 2.0, nu),
+    lambda nu: box_section(1.0, 2.0, 0.1, nu),
+    lambda nu: i_section(1.0, 2.0, 0.1, 0.1, nu),
+])  # fmt: skip
 def test_poissons_ratio_lies_between_minus_one_and_a_half(section):
     for nu in (-0.999, 0.499):
         assert section(nu).area > 0

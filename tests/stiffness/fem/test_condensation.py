@@ -1,4 +1,4 @@
-"""Interfaces' motions and loads: their duality, supports, what is left to solve for."""
+"""Interfaces' motions and loads: rigid motions, energies, unknowns."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_the_mean_motion_of_an_interface_is_the_nearest_rigid_one_over_its_area(
 
 
 def scaled_screw(screw):
-    """A turn moves the rim, 40 mm away."""
+    """Scale rotations by the rim's radius, 40 mm."""
     return screw * [0.04, 0.04, 0.04, 1, 1, 1]
 
 

@@ -136,7 +136,7 @@ def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
 
 @both_orders
 def test_a_polynomial_of_the_elements_degree_has_its_energy(rng, order):
-    """A second road: the strain energy of u = A m, m all monomials of the degree, by
+    """A second method: the strain energy of u = A m, m all monomials of the degree, by
     differentiating monomials and a tensor rule on the whole box."""
     size = np.array([0.5, 0.6, 0.8])
     mesh = isoparametric(box_solid((1, 2, 2), size), order)

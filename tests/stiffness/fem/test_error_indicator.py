@@ -1,4 +1,4 @@
-"""Error estimates: what they are blind to, what they see, and that they cover."""
+"""Error estimates: exact fields, known errors, coverage."""
 
 from functools import cache
 
@@ -126,7 +126,7 @@ def test_indicator_at_a_singular_edge_is_the_nonlinear_energy():
 
 
 def shifted(excess, kind="distributing-both"):
-    """Compliance of a bar, and what a shape of a slightly larger radius changes."""
+    """Compliance of a bar, and geometry errors of a slightly larger radius."""
     solid = bar_solid(2, 5, R, 0.25)
     mesh = isoparametric(solid)
     lam, mu = constants(mesh)
@@ -187,7 +187,7 @@ def test_the_estimate_covers_the_true_error_on_one_mesh(mesh):
 
 
 def test_indicated_error_is_near_the_true_error():
-    """Before any safety: bending's indicated error, within 1.5 of the true one."""
+    """Bending's error without the safety factor is within 1.5 of the true one."""
     for mesh in ((1, 6), (1, 12), (2, 12), (2, 24)):
         K, indicated, shape = bar(*mesh).totals()
         true = K[0, 0] / BENDING - 1 - shape[0, 0] / BENDING
@@ -249,7 +249,7 @@ def test_error_of_a_twisted_thin_plate_is_covered():
 
 
 def test_a_layer_takes_most_of_the_error_at_the_clamped_edges():
-    """The same tetrahedra without parts: more than twice the error in bending."""
+    """The same tetrahedra without layers have more than twice the error in bending."""
     solid = split_joining_edges(bar_solid(2, 12, R, L), (0, 1))
     mesh = isoparametric(solid)
     centers = np.array([[0, 0, 0], [0, 0, L]])

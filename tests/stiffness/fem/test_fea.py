@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
+from stiffness.fem import fea
 from stiffness.fem.fea import (
     Budget,
     FemOptions,
@@ -95,14 +96,11 @@ def test_exhausted_budget_is_reported(cache):
     assert solution.link.relative_error_estimate > 1e-5
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"interface": "rigit"}, '"rigid"?'),
-        ({"accuracy": 0.0}, "accuracy = 0 must lie between"),
-        ({"materials": []}, "at least one"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"interface": "rigit"}, '"rigid"?'),
+    ({"accuracy": 0.0}, "accuracy = 0 must lie between"),
+    ({"materials": []}, "at least one"),
+])  # fmt: skip
 def test_wrong_options_are_refused(change, message, cache):
     given = {"materials": [Material(E, NU)], "cache": cache} | change
     materials = given.pop("materials")
@@ -140,3 +138,20 @@ def test_a_first_mesh_that_costs_more_than_the_budget_is_refused(budget):
     words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
     with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
+
+
+def test_first_mesh_is_tried_with_smaller_edges_while_there_is_time(monkeypatch):
+    """A tenth of the diagonal, a half and a fifth of that; once without time."""
+    surface, edges = bar_surface(), []
+
+    def fail(*_, edge, **__):
+        edges.append(edge / surface.diagonal)
+        raise MeshFailed("no mesh")
+
+    monkeypatch.setattr(fea, "mesh_solid", fail)
+    out_of_time = Budget(seconds=1e-12)
+    for budget, expected in ((Budget(), [0.1, 0.05, 0.02]), (out_of_time, [0.1])):
+        edges.clear()
+        with pytest.raises(MeshFailed):
+            fea.first_mesh(surface, *PLANES, budget)
+        assert edges == pytest.approx(expected)

@@ -1,4 +1,4 @@
-"""Masses, centres and inertias of solids with points of mass, by the books."""
+"""Masses, centres and inertias of solids with point masses, by Steiner's rule."""
 
 import numpy as np
 import pytest

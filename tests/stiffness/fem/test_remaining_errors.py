@@ -1,4 +1,4 @@
-"""Indicated errors against the formulas of their rates, tractions by hand."""
+"""Indicated errors against the formula of their decay, tractions by hand."""
 
 import numpy as np
 import pytest

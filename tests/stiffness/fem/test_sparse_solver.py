@@ -1,4 +1,4 @@
-"""Sparse systems solved, the solver chosen, the cost predicted."""
+"""Sparse systems and the choice of the solver."""
 
 import sys
 
@@ -12,7 +12,7 @@ from stiffness.fem.sparse_solver import _mkl, solve, solver_name
 
 @pytest.fixture
 def chosen():
-    """The solver's name, looked for again in the test and after it."""
+    """Return ``solver_name`` with an empty cache, cleared again after the test."""
     solver_name.cache_clear()
     yield solver_name
     solver_name.cache_clear()
@@ -36,7 +36,7 @@ def test_superlu_is_used_without_pypardiso(monkeypatch, chosen):
 
 
 def test_superlu_is_used_if_pypardiso_does_not_load(monkeypatch, chosen):
-    """As where MKL's library is of another machine."""
+    """For example with MKL's library of another architecture."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: object())
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)

@@ -1,4 +1,4 @@
-"""Bent elements: on their shapes, of their shapes' volume, none folded."""
+"""Curved elements: on their shapes, of their shapes' volume, none inverted."""
 
 import numpy as np
 import pytest
@@ -53,13 +53,13 @@ def layers_of_bar(rings, layers, order):
 
 
 def side_errors(mesh):
-    """[1] by which the side's nodes leave the cylinder, of its radius."""
+    """[-] distance of the side's nodes from the cylinder over its radius."""
     nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
     return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
 
 
 def test_nodes_and_layers_follow_the_cylinder():
-    """Cubic elements leave it by the fourth power of their size, cut or not."""
+    """Cubic elements have an error of the fourth power of their size, cut or not."""
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -76,7 +76,7 @@ def volume(mesh):
 
 
 def test_the_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """What is left of an arc lies to both sides of it, for edges and faces alike; the
+    """Edges and faces deviate to both sides of an arc, so that errors cancel; the
     quadratic elements' error falls with the fourth."""
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
@@ -103,7 +103,7 @@ def shell_volume(inner, outer):
 
 
 def test_a_spheres_volume_converges_with_the_sixth_power():
-    """Faces bent both ways, hollow and round; nodes at the outline on both shapes."""
+    """Concave and convex faces, with nodes of the outline on both shapes."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -149,8 +149,8 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
 def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
-    """A face that bulges by a quarter of the wall would fold its tetrahedron: these
-    are straightened; each has the hand of its straight corners everywhere."""
+    """A face that bulges by a quarter of the wall would invert its tetrahedron: such
+    elements are straightened, and all have the orientation of their corners."""
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)
     assert bent.inverted.any()
@@ -165,7 +165,7 @@ def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
 def test_refining_inverted_elements_brings_the_volume_nearer(counts, inner):
-    """Straightened elements leave the shape; smaller ones by less than half of it."""
+    """Straightened elements deviate from the shape, smaller ones by less than half."""
     solid = shell(counts, inner, 1.0)
     error = [
         abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)

@@ -1,4 +1,4 @@
-"""Layers along singular edges: found, cut alike on both sides, nothing lost, nested."""
+"""Layers along singular edges: found, conforming, of the same volume, nested."""
 
 from math import prod
 
@@ -78,7 +78,7 @@ def check_chordless(solid, held):
 
 
 def check_layers(solid, held):
-    """Every inner face has two parts, every outer one its patch; nothing is lost."""
+    """Check that parts conform, keep their patches, and fill their tetrahedra."""
     parts = layered(solid, held)
     mesh = isoparametric(solid, 2, parts)
     faces, count = np.unique(
@@ -110,7 +110,7 @@ def check_layers(solid, held):
     held=st.sampled_from(CLAMPED),
 )
 def test_layers_of_any_pile_of_boxes_conform_and_lose_nothing(kept, held):
-    """Bodies that touch in an edge or a corner, holes and steps among them."""
+    """Also bodies that touch in an edge or a corner, holes and steps."""
     counts = np.array([3, 2, 2])
 
     def keep(centers):
@@ -146,8 +146,8 @@ def test_a_richer_space_gives_a_softer_link(kind):
         (p, cut): stiffness(p, parts if cut else None) for p in (2, 3) for cut in (0, 1)
     }
     order = [(2, 0), (3, 0), (3, 1)], [(2, 0), (2, 1), (3, 1)]
-    for road in order:
-        for poor, rich in zip(road, road[1:], strict=False):
+    for sequence in order:
+        for poor, rich in zip(sequence, sequence[1:], strict=False):
             values = np.linalg.eigvalsh(scaled(K[poor] - K[rich], K[poor]))
             assert values[0] > -1e-9
             assert values[5] > 1e-5 or kind != "rigid"

@@ -1,4 +1,4 @@
-"""A mesh fitted to a surface's patches: which face is whose, moved how far, refused."""
+"""A mesh fitted to a surface's patches, and refusals."""
 
 from collections import Counter
 from itertools import combinations
@@ -19,7 +19,7 @@ Z = np.array([0.0, 0, 1])
 
 
 def test_a_face_of_one_tetrahedron_alone_is_on_the_boundary():
-    """Counted one by one, in a box with some of its tetrahedra missing."""
+    """Counted directly, in a box without some of its tetrahedra."""
     rng = np.random.default_rng(6)
     cells = box_solid((3, 3, 2), (1.0, 1.0, 1.0)).cells
     cells = cells[rng.random(len(cells)) < 0.7]
@@ -50,7 +50,7 @@ def test_a_mesh_without_a_face_on_an_interface_is_refused(other, missing):
 
 
 def test_cells_of_either_orientation_and_points_of_no_cell_are_put_in_order():
-    """The same solid as of cells that are all right, without the points; far from the
+    """The same solid as from well-ordered cells, without unused points; far from the
     origin."""
     far = np.array([3.0, -2.0, 1.0])
     rng = np.random.default_rng(7)

@@ -28,7 +28,7 @@ def test_shape_functions_are_one_at_their_point_and_zero_at_the_others(degree, c
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
 def test_shape_functions_hold_every_polynomial_of_their_degree(rng, degree, corners):
-    """1 included, so they sum to one and their derivatives to nothing."""
+    """They sum to one, and their derivatives to zero."""
     L = inside(rng, corners)
     N, dN = shape_functions(degree, L)
     np.testing.assert_allclose(N.sum(axis=1), 1, rtol=1e-13)
@@ -70,7 +70,7 @@ def test_elements_share_the_nodes_of_what_they_share_and_no_others(order):
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_a_shared_node_has_one_place(order):
-    """Each element would put it there itself, wherever it stands in its row; and the
+    """Every element computes the same place for it, in any order; and the
     grid of a box has as many nodes as its finer grid."""
     solid = box_solid((2, 3, 2), (0.1, 0.2, 0.3))
     mesh = isoparametric(solid, order)
@@ -81,7 +81,7 @@ def test_a_shared_node_has_one_place(order):
 
 
 def test_the_numbers_of_the_corners_do_not_matter(rng):
-    """Corners named otherwise: the same places, in other orders, left-handed or not."""
+    """Renumbered corners give the same places, in other orders."""
     solid = bar_solid(1, 2, 0.02, 0.06)
     name = rng.permutation(len(solid.points))
     points = np.empty_like(solid.points)

@@ -1,4 +1,4 @@
-"""Tetrahedra: refined, fitted to shapes, cached, refused when they are not the part."""
+"""Meshes of tetrahedra: fitted to shapes, cached, refused."""
 
 import io
 import subprocess
@@ -83,7 +83,7 @@ def test_a_damaged_mesh_of_the_cache_is_made_again(tmp_path, monkeypatch, damage
 def test_failed_mesher_is_reported_with_its_last_words(
     tmp_path, monkeypatch, status, words, told
 ):
-    """A surface that it takes for no solid has no tetrahedra; or it dies."""
+    """The mesher finds no solid, or it crashes."""
 
     def mesher(command, **_):
         if status == 0:
@@ -107,7 +107,7 @@ def test_mesher_is_stopped_at_its_time_limit(tmp_path):
     not mesh_module._SAME_NUMBERS.exists(), reason="the C++ library is not GNU's"
 )
 def test_the_same_surface_gives_the_same_mesh(tmp_path):
-    """Made twice, with caches of their own; and another where the edge is another."""
+    """Made twice in different caches; another edge gives another mesh."""
     one, again, other = (
         mesh_solid(bar(), *FACES, edge=edge, cache=tmp_path / str(number))
         for number, edge in enumerate((0.03, 0.03, 0.029))
@@ -118,10 +118,7 @@ def test_the_same_surface_gives_the_same_mesh(tmp_path):
 
 
 def test_a_mesh_with_a_breach_is_refused(tmp_path, monkeypatch):
-    """One of 64 columns of the cube is missing: 1.6 % of the volume, and a way through.
-
-    pytetwild left a breach like that in the wall of a 14 x 2 mm tube, 0.6 % of volume
-    and 1 % of stiffness."""
+    """One of 64 columns of the cube is missing: 1.6 % of the volume, a hole."""
     cube = kuhn_cube(8)
     place = np.floor(cube.points[cube.cells].mean(axis=1) / 0.0125)
     whole = ~((place[:, 0] == 3) & (place[:, 1] == 4))
@@ -138,7 +135,7 @@ def test_a_mesh_with_a_breach_is_refused(tmp_path, monkeypatch):
     [("distal_plain", 0, 1), ("tube", 1, 1), ("delta_forearm", 0, 2)],
 )
 def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shells):
-    """Two a shell, the forearm's cavity has one of its own, less two a hole."""
+    """Two for each shell, also the forearm's cavity, less two for each hole."""
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
     characteristic = euler_characteristic(surface.triangles)
     assert characteristic == 2 * shells - 2 * ways_through
@@ -148,7 +145,7 @@ def test_eulers_characteristic_counts_shells_and_holes(name, ways_through, shell
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     """Corners of the coarse surface near the part, as many holes, its volume to 1 %.
 
-    The bracket has no triangle to spare and stays as it is."""
+    The bracket's triangles are all needed."""
     import pyvista as pv
 
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
@@ -162,7 +159,7 @@ def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     assert coarse.volume == pytest.approx(surface.volume, rel=0.01)
     ways = euler_characteristic(surface.triangles)
     assert euler_characteristic(coarse.triangles) == ways
-    # no corner is farther from the part than asked, by another road than the code's
+    # no corner is farther from the part than the tolerance, by another method
     mesh = pv.PolyData.from_regular_faces(surface.points, surface.triangles)
     apart = pv.PolyData(points).compute_implicit_distance(mesh)["implicit_distance"]
     assert np.abs(apart).max() < 4e-4

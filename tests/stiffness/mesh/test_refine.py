@@ -1,4 +1,4 @@
-"""Bisection: edges counted and ranked one by one, halves, who follows whom."""
+"""Refinement by bisection: boundary, patches, number of halvings."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_faces_stay_the_boundary_outward_and_of_their_patch(solid):
 
 @pytest.mark.parametrize("halvings", [0, 1, 2, 4])
 def test_every_part_of_a_cell_is_halved_as_often_as_asked(rng, halvings):
-    """At least; and what is not asked for only where a neighbour must follow."""
+    """At least as often; other cells only where they must conform."""
     solid = crooked(rng)
     asked = np.zeros(len(solid.cells), dtype=int)
     asked[7] = halvings

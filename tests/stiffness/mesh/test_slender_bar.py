@@ -1,4 +1,4 @@
-"""Slender and thin-walled bars, which a mesher of equal edges never finishes."""
+"""Slender and thin-walled bars, meshed without the mesher."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bars meshed without a mesher: closed, filled, and as stiff as they must be."""
+"""Bars meshed without the mesher: closed, filled, of the textbook's stiffness."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SECTIONS = [
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
 def test_a_bar_is_closed_and_has_its_volume_and_ends(section):
-    """On its circles to what chords of so many corners leave; else exactly."""
+    """Exactly, except that chords replace circles."""
     solid = straight_bar(section)
     area = declared_section(section, 0.3).area
     assert (solid.volumes() > 0.0).all()

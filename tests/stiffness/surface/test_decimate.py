@@ -1,4 +1,4 @@
-"""Coarser surfaces for the mesher: closed, of the same holes, as near as asked."""
+"""Coarser surfaces for the mesher: closed, within the tolerance."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_fine_cube_becomes_coarse(unit):
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
 def test_bump_above_the_tolerance_is_kept(unit):
-    """A bump of 0.8 mm: its tip is there to 0.1 mm."""
+    """A bump of 0.8 mm keeps its tip to 0.1 mm."""
     surface = fine_cube(unit, 8e-4)
     points, triangles = coarser_surface(surface, 1e-4 * unit)
     assert len(triangles) < len(surface.triangles)

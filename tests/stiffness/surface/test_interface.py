@@ -71,14 +71,11 @@ def test_wrong_interface_is_refused(text, message):
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "written"),
-    [
-        ("z=0.452", "plane=0,0,0.452/0,0,1"),
-        ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
-        ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
-    ],
-)
+@pytest.mark.parametrize(("text", "written"), [
+    ("z=0.452", "plane=0,0,0.452/0,0,1"),
+    ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
+    ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
+])  # fmt: skip
 def test_an_interface_is_written_as_it_is_read(text, written):
     assert str(parse_interface(text)) == written
     assert str(parse_interface(written)) == written

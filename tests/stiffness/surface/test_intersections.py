@@ -1,4 +1,4 @@
-"""Triangles that cut each other, against edge and triangle as a linear system."""
+"""Triangles that cross, against edge and triangle as a linear system."""
 
 import numpy as np
 import pytest

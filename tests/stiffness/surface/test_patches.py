@@ -25,11 +25,6 @@ from stiffness.surface.surface import check_surface
 from tests.solids_for_tests import bar
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(3)
-
-
 def samples(shape, rng):
     """Points on a quarter of each shape, in general position."""
     a, b = rng.uniform(0, 1.5, (2, 40))
@@ -79,7 +74,7 @@ def test_gradients_are_those_of_the_distance(fit, shape, rng):
 
 
 def test_a_slot_is_two_planes_and_two_half_cylinders():
-    """Tangent faces: no sharp edge tells them apart."""
+    """Tangent faces, without a sharp edge between them."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 17)
     half = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     outline = np.concatenate([half + [0.03, 0], -half - [0.03, 0]])

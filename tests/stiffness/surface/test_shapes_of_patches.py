@@ -1,4 +1,4 @@
-"""Which triangles lie on an interface, and which shapes a part's patches are."""
+"""Triangles on an interface, and shapes of patches."""
 
 import re
 

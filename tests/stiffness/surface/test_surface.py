@@ -1,4 +1,4 @@
-"""Surfaces read and checked: repairs named, what bounds no solid refused."""
+"""Surfaces read, checked and repaired."""
 
 import struct
 
@@ -14,11 +14,6 @@ from stiffness.surface.surface import (
     signed_volume,
 )
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, cylinder
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(3)
 
 
 def write_stl(path, points, triangles):
@@ -59,18 +54,15 @@ def test_a_prism_has_its_own_volume_and_area():
     assert surface.area == pytest.approx(6e-2, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("a.stl", b"", "the file is empty"),
-        ("a.stl", b"no stl at all", "STL"),
-        ("a.obj", b"no obj at all", "OBJ"),
-        ("a.ply", b"ply\nrubbish", "PLY"),
-        ("a.vtk", b"rubbish", "VTK"),
-        ("a.xyz", b"1 2 3", "unknown kind of surface file"),
-        ("absent/a.stl", None, "cannot be read"),
-    ],
-)
+@pytest.mark.parametrize(("name", "content", "message"), [
+    ("a.stl", b"", "the file is empty"),
+    ("a.stl", b"no stl at all", "STL"),
+    ("a.obj", b"no obj at all", "OBJ"),
+    ("a.ply", b"ply\nrubbish", "PLY"),
+    ("a.vtk", b"rubbish", "VTK"),
+    ("a.xyz", b"1 2 3", "unknown kind of surface file"),
+    ("absent/a.stl", None, "cannot be read"),
+])  # fmt: skip
 def test_wrong_surface_file_is_refused(tmp_path, name, content, message):
     path = tmp_path / name
     if content is not None:

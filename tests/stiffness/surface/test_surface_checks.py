@@ -1,4 +1,4 @@
-"""What a surface is refused for, to the last triangle, and what is mended in it."""
+"""Refusals and repairs of surfaces."""
 
 import re
 
@@ -32,7 +32,7 @@ def test_a_triangles_vector_is_its_area_along_its_normal_wherever_it_lies():
 
 
 def test_a_digest_is_of_the_geometry_alone():
-    """To the last bit of a coordinate and the last corner; of no name, no layout."""
+    """It depends on every bit of coordinates and corners, not on name or layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
     same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
     assert one.digest() == same.digest()
@@ -63,7 +63,7 @@ def test_part_of_implausible_size_is_refused_with_a_unit(size, unit, hint):
 
 
 def test_a_step_file_states_its_own_unit(tmp_path, monkeypatch):
-    """What is said beside it does not count; for other files it does."""
+    """The given unit counts for other files only."""
     points, triangles = cylinder()
     monkeypatch.setattr(
         surface_module, "_read_triangles", lambda *_: (points, triangles, None)
@@ -89,7 +89,7 @@ def test_a_step_file_of_the_wrong_unit_is_told_the_likely_one(size, unit, monkey
 
 
 def test_points_of_no_triangle_are_ignored():
-    """Neither one that is no number nor one far away."""
+    """Neither NaN nor a distant point."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
     assert surface.volume == pytest.approx(1e-3)
@@ -108,7 +108,7 @@ def test_a_triangle_of_two_corners_is_dropped_and_named(pair):
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
 def test_turned_triangles_are_repaired_and_named(rng, turned, hollow):
-    """The smaller number of a shell's is turned; then a shell that is inside out."""
+    """The smaller number of triangles is turned, then a shell that is inside out."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
     mixed[some] = mixed[some][:, ::-1]

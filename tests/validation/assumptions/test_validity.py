@@ -34,7 +34,7 @@ from validation.crosscheck.spread_weight import energy_between_ends
 
 E, NU, RHO = 60e9, 0.3, 2700.0
 FLAT = BeamLink({"width": 0.02, "height": 0.05}, E, NU, density=RHO)
-PLAY = Clearance(radial=3e-5, tilt=7.5e-4)  # bushes at +-40 mm
+LOOSE = Clearance(radial=3e-5, tilt=7.5e-4)  # bushes at +-40 mm
 
 
 def cantilever(link=FLAT, length=0.5):
@@ -45,7 +45,7 @@ def cantilever(link=FLAT, length=0.5):
 def pin(error):
     """A pin with clearance between two rigid parts that miss each other by an error."""
     frames = (
-        Frame("pin", clearance=PLAY, geometric_error=error),
+        Frame("pin", clearance=LOOSE, geometric_error=error),
         Frame("end", "pin"),
         Frame("wall"),
     )
@@ -80,7 +80,7 @@ def test_a_shift_across_the_tilts_plane_costs_bushes_less():
 
 
 def test_bushes_lie_between_disc_and_cone_and_half_of_these(posture):
-    """So do energies and margins; the reference saw +5 to +18 per cent elsewhere."""
+    """Both in energy and in margin."""
     frames = tuple(
         replace(f, clearance=replace(
             f.clearance, radial=f.clearance.radial / 2, tilt=f.clearance.tilt / 2
@@ -253,7 +253,7 @@ def test_pose_has_a_cost_without_stored_energy():
 
 
 def test_validity_command_reports_which_assumptions_matter(tmp_path):
-    """Disc and cone do on the paper's robot; what was not asked for says why."""
+    """Disc and cone matter on the paper's robot; other costs state a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", str(file), "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]

@@ -1,4 +1,4 @@
-"""Campaign folders: what must load does, what must not says why in one line."""
+"""Campaign folders: sound ones are read, wrong ones are refused in one line."""
 
 import math
 import re
@@ -53,7 +53,7 @@ def test_number_rows_counts_by_first_occurrence():
 
 
 def test_commanded_poses_give_the_commanded_joints(tmp_path):
-    """The tool's poses written down as a command give the joints back."""
+    """The tool's poses of commanded joints, given as commands."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
     rows = [
@@ -85,7 +85,7 @@ def test_campaign_reads_a_built_in_robot(tmp_path):
 
 
 def test_labels_in_any_script_and_spaces_are_read(tmp_path):
-    """Only control characters are refused, not what a spreadsheet may write."""
+    """Only control characters are refused."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
@@ -301,7 +301,7 @@ def test_wrong_robot_file_of_a_campaign_is_named(tmp_path):
 
 
 def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """Both blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
+    """All blocks together: irsbot2 at 100 mm, 10 N written as 0,01 kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3

@@ -1,4 +1,4 @@
-"""Whatever is done to a campaign's files: it is read, or one line says why not.
+"""Damaged campaign files are read, or refused in one line.
 
 The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.py``.
 """
@@ -66,7 +66,7 @@ TOML = (
 
 
 def assert_one_line(error, folder):
-    """The only way out: one line that names a file of the folder."""
+    """Check that the message is one line and names a file of the folder."""
     text = str(error)
     assert text.startswith(str(folder))
     assert all(c >= " " for c in text)
@@ -74,7 +74,7 @@ def assert_one_line(error, folder):
 
 
 def assert_read_or_says_why(folder):
-    """A campaign is read whole and sound, or not at all."""
+    """Read a campaign and check its arrays, or check the message."""
     try:
         campaign = read_campaign(folder)
     except BadInput as error:
@@ -260,7 +260,7 @@ def test_any_numbers_are_read_or_refused_in_one_line(rows, tmp_path):
 
 
 def test_undamaged_campaign_is_read(tmp_path):
-    """Otherwise every mutation would stop at the same first mistake."""
+    """So that the damaged files have no other fault."""
     folder = write_campaign(tmp_path)
     (folder / "campaign.toml").write_text(TOML)
     assert len(read_campaign(folder)) == 4

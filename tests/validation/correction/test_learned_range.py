@@ -1,4 +1,4 @@
-"""A robot is known where it was measured: rows beyond that are named."""
+"""The learned range of a robot, and rows beyond it."""
 
 import json
 from dataclasses import replace
@@ -53,7 +53,7 @@ def test_learned_range_has_a_margin_of_a_twentieth(tmp_path):
 def test_full_turn_of_a_joint_stays_in_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
-    """Unless a function of its angle does not repeat after a turn."""
+    """Except for functions of its angle that are not periodic."""
     robot = read_robot(robot_file(tmp_path))
     if variables:
         one = Function("base", ("tx",), variables, form, {name: 1e-6})

@@ -1,4 +1,4 @@
-"""A robot's own numbers in a new session: prior and readings, weighed by hand."""
+"""A robot's parameters in a new session: prior and readings, weighted by hand."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ SIGMA = 1e-5
 
 
 def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
-    """A post that shifts along x with ``wet``, which its file says was nothing."""
+    """A post that shifts along x with ``wet``; its file declares no shift."""
     measured = np.full((len(readings), 6), np.nan)
     measured[:, 3] = readings
     campaign = campaign_of(measured, SIGMA, wet=np.array(wet, dtype=float))
@@ -66,7 +66,7 @@ def test_a_number_is_the_weighted_mean_of_prior_and_readings(tmp_path):
 
 
 def test_known_sums_of_parameters_stay_known(tmp_path):
-    """Only a + b was known; dry rows tell a again, and b makes up for it where wet."""
+    """Only a + b was known; dry rows determine a, and b follows."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8
@@ -83,7 +83,7 @@ def test_known_sums_of_parameters_stay_known(tmp_path):
 def test_change_beyond_the_saved_deviation_is_followed(
     tmp_path,
 ):
-    """Twenty standard deviations: what is known is widened, and so is its spread."""
+    """At twenty standard deviations the prior and its spread are widened."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
@@ -130,7 +130,7 @@ def test_machine_numbers_exclude_those_of_a_session(tmp_path):
 
 
 def test_compliance_stays_positive():
-    """Taken from by more than there is, a thousandth stays; a rigid joint is rigid."""
+    """At least a thousandth of the compliance stays; a rigid joint stays rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -147,7 +147,7 @@ def test_compliance_stays_positive():
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
 def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_path):
-    """By differences of the predicting function, under load, a device anywhere."""
+    """By differences of the prediction, under load, with a registered device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
@@ -177,7 +177,7 @@ def test_slopes_of_functions_are_finite_differences(where, component, kind, tmp_
 
 @pytest.mark.slow
 def test_softer_spring_is_found_by_twenty_rows(tmp_path):
-    """Monday's machine is diagnosed; on Tuesday its drive gives a quarter more."""
+    """On Monday the machine is diagnosed; on Tuesday its drive is a quarter softer."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}
     for day, stiffness in springs.items():

@@ -1,4 +1,4 @@
-"""Readings predicted: those of the model, under the campaign's names."""
+"""Predicted readings and their names."""
 
 import csv
 from math import cos, sin
@@ -93,7 +93,7 @@ def test_predict_refuses_a_missing_covariate(tmp_path, run):
 
 
 def test_sessions_are_registered_one_by_one(tmp_path):
-    """Two days with the tracker elsewhere: each is found, nothing is left."""
+    """The tracker stood in two places; the residual is zero."""
     robot = load_robot("arm6")
     write_robot(robot, tmp_path / "robot.toml")
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""What belongs to a session: which numbers, how large, and what stays the robot's."""
+"""Unknowns of a session, their prior sizes, and the robot without them."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def saved():
 
 
 def test_without_session_drops_registration_and_functions_of_time(saved):
-    """The tool is the robot's; what a session is named for stays in that session."""
+    """The tool stays with the robot, functions of a session stay in that session."""
     alone = without_session(saved)
     assert alone.effects == {"registration": {"tool.tx": 0.02}}
     assert alone.functions == (SPRING, OTHER_DAY)

@@ -44,7 +44,7 @@ def coaxial(error, clearance, length=0.4):
 
 
 def push(cone, screw, width):
-    """(6,) all that a contact pushes with."""
+    """(6,) wrench of a contact."""
     wrench = np.zeros(6)
     for row, value in cone_forces(cone, screw, width):
         wrench[row] += value
@@ -81,7 +81,7 @@ def test_a_narrow_contact_is_nothing_inside_and_a_spring_outside():
 
 
 def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
-    """Tilted by c / h it just touches both, shifted by c too; both at once presses.
+    """A tilt by c / h, or a shift by c, just touches; both together press.
 
     At z = h the axis is at (TX + h RY, TY - h RX).
     """
@@ -101,7 +101,7 @@ def test_a_pin_in_two_bushes_touches_where_its_axis_is_there():
 
 
 def test_clearance_of_a_joint_follows_the_format():
-    """Absent is tight, but a passive joint's own motion is free or bounded by spin."""
+    """An absent bound is zero; a passive joint's motion is free or bounded by spin."""
     clearance = Clearance(radial=1e-5, tilt=2e-4, spin=0.01)
     fixed = joint_clearance(Frame("f", clearance=clearance), scale=0.5)
     assert [(c.rows, c.size) for c in fixed.cones] == [
@@ -153,7 +153,7 @@ def test_a_time_limit_ends_its_simulation_and_no_other(pause, monkeypatch):
 
 
 def test_interruption_inside_the_solver_is_raised(monkeypatch):
-    """Exudyn makes an error of its own of Ctrl-C; it must not be tried again."""
+    """Exudyn turns Ctrl-C into an error of its own."""
     import validation.multibody.exudyn_model
 
     def interrupted(*_):
@@ -166,7 +166,7 @@ def test_interruption_inside_the_solver_is_raised(monkeypatch):
 
 
 def test_misfit_within_the_clearance_stores_no_energy():
-    """A lateral misfit of 20 um inside a disc of 30 um: nothing presses."""
+    """A lateral misfit of 20 um inside a disc of 30 um."""
     tight = coaxial([0, 0, 0, 2e-5, 0, 0], None)
     loose = coaxial([0, 0, 0, 2e-5, 0, 0], Clearance(radial=3e-5))
     free = simulate_assembly(loose, model=SimulationModel(clearances=True))
@@ -277,10 +277,10 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """No load, and errors within the clearance: any place in the valley, and no energy.
+    """Without load, errors within the clearance store no energy.
 
-    That says something of the overconstrained robots only, which pass: the others close
-    without energy whatever their clearance.
+    This is a check of overconstrained robots only: the others close without energy
+    whatever their clearance.
     """
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
@@ -297,7 +297,7 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
 def test_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
     """Without errors, closing costs nothing: the reference is the load's energy.
 
-    Parts of the five-bar stay loose under its load.
+    Parts of the five-bar stay free under its load.
     """
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True

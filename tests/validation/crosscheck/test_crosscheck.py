@@ -1,4 +1,4 @@
-"""The two models agree to first order, and a broken one is found out."""
+"""The two models agree to first order, and a broken model fails."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ STEEL = BeamLink({"radius": 0.01}, 200e9, 0.3)
 
 
 def triangle(error):
-    """Two steel bars from a wall to one tip: three times as stiff as it need be."""
+    """Two steel bars from a wall to one tip, overconstrained three times."""
     pin = Clearance(radial=1e-5, tilt=1e-4)
     K = np.diag([1e4, 1e4, 3e2, 1e8, 1e8, 1e8])
     frames = (
@@ -61,7 +61,7 @@ def test_slopes_hold_over_poses_and_draws(signed):
 def test_finite_rotations_explain_the_whole_difference(posture):
     """With springs as links, two codes with finite rotations: 1e-4 of the difference.
 
-    With beams their own finite bending is left: measured 0.1 to 4 per cent.
+    With beams the residual is their own finite bending.
     """
     springs = crosscheck(posture, links="spring")
     assert springs.passed
@@ -136,9 +136,8 @@ def erring(name, density):
 def test_weight_and_moment_act_alike_in_both_finite_models(name):
     """Weight on erring beams, and a couple of dead forces beside a force.
 
-    Measured 6e-6 of what separates them from the linear model.  A beam's weight that
-    starts where it would without errors leaves 7e-3; a moment whose direction stays,
-    and one with the work m.theta, are 58 per cent of it apart (arm6).
+    Relative to what separates them from the linear model; a weight that starts where
+    it would without errors leaves 7e-3, a moment of constant direction 58 per cent.
     """
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
@@ -188,11 +187,7 @@ def test_rolling_rods_are_held_and_reported():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 0, 0, -100.0]])
 def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
-    """Rods that roll are held alike in all models, and no order hides another.
-
-    The slope through the logarithms was 1.36 for seed 2 under the load, and limits of
-    links failed by what the simulation's weak springs do to them.
-    """
+    """Rods that roll are held alike in all models, and no order hides another."""
     robot = load_robot("delta")
     sources = tolerance_sources(
         robot, [3e-3] * 3 + [0] * 3, [f.name for f in robot.frames]
@@ -203,10 +198,7 @@ def test_a_delta_with_errors_of_3_mrad_passes(seed, load):
 
 
 def test_scales_are_added_until_limits_are_known(irsbot2):
-    """Limits are not known to a thousandth: smaller scales are added, and all holds.
-
-    Of 30 draws on two scales alone, slopes were 1.92 to 2.21.
-    """
+    """Limits are not known to a thousandth: smaller scales are added."""
     at = place_robot(
         with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )
@@ -220,13 +212,10 @@ def test_scales_are_added_until_limits_are_known(irsbot2):
     assert table["verdict"] == "passed"
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "lever arm one per cent short",
-        pytest.param("links half a per cent stiff", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("name", [
+    "lever arm one per cent short",
+    pytest.param("links half a per cent stiff", marks=pytest.mark.slow),
+])  # fmt: skip
 def test_two_scales_find_a_broken_term_too(irsbot2, name, broken):
     broken(MUTATIONS[name])
     at = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
@@ -235,7 +224,7 @@ def test_two_scales_find_a_broken_term_too(irsbot2, name, broken):
 
 
 def test_clearances_are_left_out_on_both_sides():
-    """The clearance of 10 um would swallow the error of 8 um."""
+    """With its clearance of 10 um the error of 8 um would store no energy."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
     assert check.posture.robot.frame("a").clearance is None
     assert check.passed
@@ -265,7 +254,7 @@ def test_crosscheck_without_errors_and_load_has_no_signal():
 
 
 def test_checks_without_signal_are_counted_next_to_passed_ones():
-    """No spring carries anything: only the platform's pose says something."""
+    """No spring is loaded: only the platform's pose is compared."""
     error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
     frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
     result = crosscheck(home_posture(Robot("bar", "b", (frame, Frame("b", "a")))))
@@ -322,13 +311,13 @@ BENT = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
 
 
 def test_two_crossed_bars_pass():
-    """They bend every way; the paper's links carry no shear at all."""
+    """They bend in both planes; the paper's links carry no shear."""
     assert crosscheck(triangle(BENT), load=LOAD).passed
 
 
 @pytest.mark.parametrize("mutation", BEAM_MUTATIONS.values(), ids=BEAM_MUTATIONS.keys())
 def test_broken_beam_of_the_linear_model_fails(mutation, broken):
-    """By the bars of the test above."""
+    """In the model of two crossed bars."""
     broken(mutation)
     assert not crosscheck(triangle(BENT), load=LOAD).passed
 

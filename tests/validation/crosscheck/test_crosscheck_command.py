@@ -28,7 +28,7 @@ def test_crosscheck_does_not_pass_a_robot_without_errors(more):
 
 
 def test_readme_example_compares_a_draw_of_errors(tmp_path):
-    """The errors of the file replace the robot's; the seed says which draw."""
+    """The errors of the file replace the robot's; the seed selects the draw."""
     target, root = tmp_path / "check.json", Path(__file__).parents[3]
     example = root / "examples" / "irsbot2_errors.toml"
     outcome = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
@@ -71,11 +71,11 @@ def test_crosscheck_writes_the_public_keys(tmp_path):
 
 
 def test_crosscheck_keeps_clearances_on_request(tmp_path):
-    """Springs in a row that miss each other by more than the clearance between them."""
+    """Springs in series with a misfit larger than the clearance between them."""
     target, file = tmp_path / "check.json", tmp_path / "robot.toml"
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
-    play = Clearance(radial=2e-5, axial=1e-5)
-    write_robot(coaxial_beams(gap, clearance=play), file)
+    loose = Clearance(radial=2e-5, axial=1e-5)
+    write_robot(coaxial_beams(gap, clearance=loose), file)
     outcome = run(str(file), "--with-clearance", "--scale", "0.5,0.25", "--json",
                   str(target))  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
@@ -95,13 +95,10 @@ def test_failed_crosscheck_has_exit_status_1(monkeypatch):
     assert "FAIL" in outcome.output or "cannot" in outcome.output
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("slope.txt", "expected a picture: .png or .svg or .pdf"),
-        ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), [
+    ("slope.txt", "expected a picture: .png or .svg or .pdf"),
+    ("no/such/folder/slope.png", "no/such/folder; expected one that exists"),
+])  # fmt: skip
 def test_crosscheck_refuses_a_figure_that_cannot_be_written(name, message, tmp_path):
     outcome = run("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100",
                "--scale", "1,0.5", "--figure", str(tmp_path / name))  # fmt: skip

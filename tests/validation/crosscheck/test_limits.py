@@ -40,7 +40,7 @@ def test_higher_orders_do_not_change_the_slope_whatever_they_cancel():
 
 
 def test_a_difference_of_third_order_has_no_first_order_either():
-    """Where symmetry takes the second order away: no fault of the linear model."""
+    """Where symmetry removes the second order."""
     assert slope_check(SCALES, SCALES**3, 0.0, 0.1).verdict == "ok"
 
 

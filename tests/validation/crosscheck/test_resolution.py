@@ -1,4 +1,4 @@
-"""The smallest changes that a cross-check notices: two bars on one line by hand."""
+"""The smallest changes that a cross-check detects, for two bars on one line by hand."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,13 +22,13 @@ ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 
 def bars(clearance=CLEARANCE):
     """Two bars that lack 0.4 mm on the x axis, and a disc of 0.1 mm where they meet."""
-    play = Clearance(radial=clearance) if clearance else None
+    loose = Clearance(radial=clearance) if clearance else None
     gap = [0, 0, 0, ERROR, 0, 0]
-    return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=play))
+    return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=loose))
 
 
 def found(posture, metric):
-    """By name, with the linear model in the simulation's place: it is not asked."""
+    """By name, with the linear model in place of the simulation."""
     simulated = SimpleNamespace(held=False)
     pairs = tuple(
         Pair(s, solve_assembly(scaled(posture, s)), simulated, None) for s in (1.0, 0.5)
@@ -76,7 +76,7 @@ def test_smallest_noticed_stiffness_is_twice_the_bound():
 
 
 def test_unloaded_clearance_is_reported_as_unproved():
-    """The bars are pulled along x: a clearance of 20 um along z changes nothing."""
+    """The bars are loaded along x: a clearance of 20 um along z has no effect."""
     frames = [
         f if f.clearance is None
         else replace(f, clearance=replace(f.clearance, axial=2e-5))
@@ -95,7 +95,7 @@ def test_unloaded_clearance_is_reported_as_unproved():
 @pytest.mark.exudyn
 @pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
 def test_wrong_clearance_beyond_the_resolution_fails(monkeypatch, share, passed):
-    """Half of the smallest change passes, twice of it fails: by Exudyn's contact."""
+    """Half of the smallest change passes, twice as much fails."""
     posture = bars()
     right = crosscheck.crosscheck(posture, clearances=True)
     (clearance,) = (r for r in right.resolutions if r.kind == "clearance")

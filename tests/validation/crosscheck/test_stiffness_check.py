@@ -1,4 +1,4 @@
-"""K_C against Exudyn, also where forced assembly stiffens the robot."""
+"""K_C against Exudyn, also of forced assemblies."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ SLOW = ("hexapod", "orthoglide", "arm6")
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
 def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
-    """Nothing is bent there, so that beams are K_E too."""
+    """Beams are not bent there, so that they equal K_E."""
     answer = check_stiffness(home_posture(load_robot(name)), links=links)
     assert answer.differences["linearised"] < 1e-8
     assert answer.differences["exact"] < 1e-6
@@ -31,9 +31,9 @@ def test_robots_without_errors_are_as_stiff_in_the_simulation(name, links):
 
 @pytest.mark.slow
 def test_forced_assembly_is_as_stiff_in_the_simulation():
-    """At the paper's full errors: the classical matrix is off by 5 %, the tangent not.
+    """At the paper's full errors the nominal matrix is off by 5 %.
 
-    A moment is there too, by dead forces on both sides.
+    The load has a moment, of dead forces in both models.
     """
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
@@ -56,7 +56,7 @@ def test_a_loaded_robot_is_as_stiff_in_the_simulation(force):
 
 
 def test_a_pin_pressed_into_its_hole_is_held_along_the_rim():
-    """By F/c, and by its arm; the simulation finds it by smoothed contacts."""
+    """Its stiffness is F/c and that of its arm."""
     force, bound, k = 300.0, 5e-5, 1e6
     link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
     frames = (

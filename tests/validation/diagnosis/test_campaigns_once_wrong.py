@@ -1,4 +1,4 @@
-"""Campaigns on which a diagnosis once failed, by what is known of their machines."""
+"""Difficult campaigns, by what is known of their machines."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,7 +25,7 @@ FOLDERS = [CASES / name for name in (
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """By folder, each once."""
+    """A function that diagnoses a folder once."""
 
     @cache
     def find(folder):
@@ -37,7 +37,7 @@ def diagnosed():
 
 
 def effect(found, name):
-    """Parameters of an effect: value and standard deviation by name."""
+    """Return an effect's parameters by name."""
     (one,) = [e for e in table(found)["effects"] if e["name"] == name]
     return {p["name"]: p for p in one["parameters"]}
 
@@ -83,7 +83,7 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
 def test_effects_outside_the_library_are_learned(name, diagnosed):
-    """A rod that grows with time; waves of a gear.  Down to the noise."""
+    """A rod that grows with time, and waves of a gear, are learned to the noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < 1.2
@@ -91,6 +91,6 @@ def test_effects_outside_the_library_are_learned(name, diagnosed):
 
 @pytest.mark.slow
 def test_scatter_of_repeats_is_not_claimed(diagnosed):
-    """Errors are in the sigma stated; what memory does is no drift."""
+    """Errors are in units of the stated sigma; hysteresis is not a drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

@@ -1,4 +1,4 @@
-"""Candidates: their columns, their numbers, and where they may act."""
+"""Candidate functions: columns, parameters and variables."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ LINE = CandidateShape("powers", ("0", "1"))
 
 
 def arm_sensitivities(folder, bend):
-    """Of the planar arm at twelve configurations, the second drive at bend q^2; q."""
+    """Sensitivities of the planar arm at twelve angles q of the first drive."""
     table = folder / "commands.csv"
     q = np.linspace(0.2, 1.7, 12).round(6)
     lines = [f"m{i},{a:.6f},{bend * a * a:.6f}" for i, a in enumerate(q)]
@@ -54,7 +54,7 @@ def test_basis_is_orthonormal_and_keeps_zero_columns(sensitivities):
 
 @pytest.mark.parametrize("units", [1.0, 1e-12])
 def test_parameters_are_named_by_component(sensitivities, units):
-    """T x, and their deviations; as small as they may be."""
+    """T x and its standard deviations, at any scale."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
     x, std = units * np.array([1.0, -2.0, 0.5, 3.0]), units * np.full(4, 0.1)
@@ -71,7 +71,7 @@ def test_parameters_are_named_by_component(sensitivities, units):
 
 
 def test_components_below_their_deviation_are_omitted(sensitivities):
-    """Of one that is left its numbers have no name before theirs; of none, nothing."""
+    """Parameters of a single component have no prefix."""
     s, _ = sensitivities
     _, mixed = s.basis(("q.one",), LINE)
     x = np.array([1e-12, 0.0, 1e-3, 2e-3])
@@ -87,7 +87,7 @@ def test_components_below_their_deviation_are_omitted(sensitivities):
 
 @pytest.mark.parametrize("axis", range(6))
 def test_sensitivity_of_a_component_depends_on_its_place(axis):
-    """A base swings the tip about its origin; a spring gives by its wrench."""
+    """A base rotates the tip about its origin; a spring deforms by its wrench."""
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
     response = responses(conditions)
@@ -107,7 +107,7 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
 
 
 def test_variables_are_varied_and_known_in_every_row():
-    """A load that stays, a temperature that one row lacks, a time of zero do not."""
+    """Not a constant load, a temperature missing in a row, or a time of zero."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(
@@ -142,7 +142,7 @@ rotation = [0.0, -1.5707963267948966, 0.0]
 
 
 def test_positions_and_loads_that_vary_by_rounding_are_no_variables(tmp_path):
-    """A slide turned by pi/2 as files write it: cos(pi/2) is 6e-17, not zero."""
+    """A slide rotated by pi/2, whose cosine is 6e-17 in floating point."""
     (tmp_path / "slide.toml").write_text(SLIDE)
     x = np.linspace(0.0, 0.5, 9).round(3)
     lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]

@@ -37,7 +37,7 @@ def first(fit):
 @pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_length_is_claimed_at_one_in_a_thousand(times, claimed, sign):
-    """Its standard deviation is sigma / sqrt(8): of eight readings along the bar."""
+    """Its standard deviation is sigma / sqrt(8), from eight readings along the bar."""
     length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
     plain = bar(link=BEAM)
     fit = machine(bar(link=BEAM, measured=fit_of(plain, length)), LONGER)
@@ -46,7 +46,7 @@ def test_length_is_claimed_at_one_in_a_thousand(times, claimed, sign):
 
 
 def test_drive_that_turns_against_its_load_is_rigid_and_no_effect():
-    """The compliance is at its lower bound, zero: no parameter is reported."""
+    """The compliance is at its lower bound, zero, and no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
     assert fit.x == pytest.approx([0.0], abs=1e-9)
@@ -57,7 +57,7 @@ def test_drive_that_turns_against_its_load_is_rigid_and_no_effect():
 
 
 def test_two_equivalent_effects_are_both_unsupported():
-    """Heat that never changes is a length: either may be anything."""
+    """At a constant temperature expansion and length are equivalent."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     campaign = bar(link=BEAM, measured=fit_of(plain, 1e-3), **heat)
@@ -68,7 +68,7 @@ def test_two_equivalent_effects_are_both_unsupported():
 
 
 def test_effect_at_its_bound_is_not_supported():
-    """An expansion of 5e-4 per kelvin, which no material has, stops there."""
+    """The bound is 5e-4 per kelvin, which no material has."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     most = 5e-4 * LENGTH * 5.0
@@ -81,7 +81,7 @@ def test_effect_at_its_bound_is_not_supported():
 
 @pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
 def test_exponent_at_its_bound_is_not_supported(value, claimed):
-    """Of a contact: what gives it its name must not be where it may go no further."""
+    """The exponent of a contact must not be at its bound."""
     slots = (
         Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
         Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
@@ -104,7 +104,7 @@ def test_effects_without_parameters_and_device_frames_are_supported():
 
 
 def softer(robot, x, variance):
-    """The bar's fit of 1 / factor - 1 of its link's modulus."""
+    """A fit of 1 / factor - 1 of the link's modulus."""
     one = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
     unknowns = Unknowns(robot, (Acting(one, np.zeros(1)),))
     C, nothing = np.array([[variance]]), np.zeros((0, 1))
@@ -117,7 +117,7 @@ def softer(robot, x, variance):
     (None, 0.9, 0.81 * 1e-3),
 ])  # fmt: skip
 def test_parameter_deviation_is_that_of_the_factor(declared, value, std):
-    """1 / factor - 1 is fitted: of factor f its uncertainty is f squared times."""
+    """1 / factor - 1 is fitted: the deviation of factor f is f^2 times its own."""
     robot = bar(link=BEAM).robot
     if declared is not None:
         robot = replace(robot, effects={"modulus_scale": {"tip": declared}})
@@ -128,7 +128,7 @@ def test_parameter_deviation_is_that_of_the_factor(declared, value, std):
 
 
 def test_parameter_without_readings_is_not_reported():
-    """Then it is as uncertain as before anything was read."""
+    """Its deviation is that of the prior."""
     robot = bar(link=BEAM).robot
     prior = softer(robot, 0.0, 1.0).unknowns.std[0] ** 2
     assert numbers(softer(robot, 0.0, prior)) == []
@@ -136,7 +136,7 @@ def test_parameter_without_readings_is_not_reported():
 
 
 def test_negative_compliance_is_bounded_at_zero():
-    """A drive that turns against its moment: compliance 0, and the robot as it was."""
+    """A drive that turns against its moment has zero compliance."""
     M = 30.0
     seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
     campaign = bar(
@@ -152,7 +152,7 @@ def test_negative_compliance_is_bounded_at_zero():
 
 
 def test_nuisance_parameters_follow_ridge_regression():
-    """The mean of eight readings along the bar, drawn towards zero by its prior."""
+    """The mean of eight readings along the bar, shrunk by its prior."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)
     campaign = bar(link=BEAM, measured=fit_of(plain, size))

@@ -1,4 +1,4 @@
-"""The command ``validation diagnose``: what it writes, and how it refuses."""
+"""The command ``validation diagnose``: its files and its refusals."""
 
 import json
 

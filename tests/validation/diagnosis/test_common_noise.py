@@ -30,7 +30,7 @@ DESIGN = CampaignDesign(
 
 
 def three_points(visits=VISITS, **covariates):
-    """The bar, three points of whose tip are measured at once, noise of 5 um each."""
+    """The bar with three points of its tip measured together, noise of 5 um each."""
     rows = 3 * visits
     single = bar(link=BEAM, rows=visits, spread=6.0)
     measured = np.zeros((rows, 6))
@@ -54,7 +54,7 @@ def columns():
 
 
 def moved(campaign, sizes, rng):
-    """(R, 6) [m] what every point reads of a motion drawn once for a measurement."""
+    """(R, 6) [m] readings of a random motion of the platform in each measurement."""
     turn, shift = (
         size * rng.normal(size=(len(campaign), 3))[campaign.measured_at_once]
         for size in sizes
@@ -81,7 +81,7 @@ def found(columns, readings, seed, device=DEVICE):
     pytest.param(0.1 * DEVICE, (0.0, 5e-6), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_noise_in_common_is_found_with_its_sizes(columns, device, sizes):
-    """60 measurements say each size of three components to 5 %; four times that."""
+    """60 measurements of three components: 5 % each, and four times that."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
@@ -121,7 +121,7 @@ def test_fit_counts_common_noise_once_per_measurement():
 
 @pytest.mark.parametrize("repeats", [True, False])
 def test_deviation_equal_in_repeats_is_a_lack_of_fit(repeats):
-    """A motion that is the same whenever a command is repeated has a cause."""
+    """A motion that is equal in all repeats of a command."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
     visit = campaign.measured_at_once

@@ -46,7 +46,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """By name of a case: what is found. Each once."""
+    """A function that diagnoses a case once."""
 
     @cache
     def find(name):
@@ -63,7 +63,7 @@ def numbers(found, effect):
 
 
 def assert_within(found, effect, truth):
-    """Three standard deviations, which are no larger than a fifth of the truth."""
+    """Check values within three standard deviations, at most a fifth of the truth."""
     values = numbers(found, effect)
     assert values.keys() == truth.keys()
     for name, (value, std) in values.items():
@@ -72,7 +72,7 @@ def assert_within(found, effect, truth):
 
 
 def left_by_the_truth(name, found, folder):
-    """[-] rms of what the truth leaves on the rows held out: their noise."""
+    """[-] rms of the noise of the held-out rows."""
     exact = measured(folder, seed=1, noise=0.0, **CASES[name])
     z = (found.campaign.measured - exact.measured) / SIGMA
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
@@ -90,7 +90,7 @@ def test_one_effect_is_named_and_measured(diagnosed, tmp_path):
 
 
 def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
-    """Four fifths of the noise last 200 s; the effect is the same, less sure."""
+    """Four fifths of the noise have a time constant of 200 s."""
     exact = measured(tmp_path, seed=1, noise=0.0, **CASES["one"])
     time = exact.covariates["time"]
     R = 0.8 * np.exp(-np.abs(time[:, None] - time) / 200.0) + 0.2 * np.eye(len(time))
@@ -108,7 +108,7 @@ def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
 
 
 def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
-    """Three times what is stated: errors stay in the sigma stated, no cause named."""
+    """Three times the stated sigma, in which errors are reported."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
@@ -126,7 +126,7 @@ def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
 def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """Steps that the machine lacks are left out; the last row is the error after."""
+    """Only steps that the machine has; the last row is the error after."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -160,7 +160,7 @@ def test_two_effects_are_named_together(diagnosed, tmp_path):
 
 
 def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
-    """The class is named, and the temperature that would decide."""
+    """The equivalent effects and the temperature that separates them are named."""
     found = diagnosed("confounded")
     assert (found.verdict, found.claimed) == ("ambiguous", ())
     best = {names for names, p in found.alternatives if p > 0.3}
@@ -182,7 +182,7 @@ def test_unexplained_deviation_is_learned(diagnosed):
 
 @pytest.mark.slow
 def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
-    """A turn of the first drive is the device's; the second's offset is seen."""
+    """The first drive's offset is part of the device frame; the second's is found."""
     found = diagnosed("device")
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
     value, std = numbers(found, "encoder_offset")["two"]
@@ -195,7 +195,7 @@ def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
 
 @pytest.mark.slow
 def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
-    """The same answer, narrower than by those rows; blunders among the others too."""
+    """Parameters are narrower than from the subset; all outliers are found."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -289,7 +289,7 @@ def test_a_report_shows_odd_names_as_they_are_written(diagnosed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_simulated_campaigns_get_an_accepted_verdict(name):
-    """The verdict and the effects as the simulation's side accepts them."""
+    """The verdict and effects are among those that the truth accepts."""
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
     accepted = set(truth["accept_verdicts"])
@@ -309,7 +309,7 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 @pytest.mark.slow
 def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """By the score that came with them: nothing wrong, parameters within 3 std.
+    """Scored by the program that came with them: parameters within 3 std.
 
     After / perfect model: 1.15 is 2.6 standard deviations of the rms of 25 rows' noise.
     """

@@ -1,4 +1,4 @@
-"""The robot of a diagnosis' page, against what was measured of it."""
+"""The robot drawn on a diagnosis' page, against its readings."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def diagnosed(tmp_path_factory):
 
 
 def test_drawn_robot_is_at_its_measured_pose(diagnosed):
-    """Within five sigma of the reading, where the declared model errs by far more."""
+    """Within five sigma of the reading; the declared model is off by twenty."""
     row, name = worst_row(diagnosed)
     assert name == "position"
     aside = diagnosed.held.rows & ~diagnosed.outliers

@@ -1,4 +1,4 @@
-"""Numbers of a robot fitted together, on a bar whose answers are known."""
+"""Parameters of a robot fitted together, on a bar with closed forms."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ from validation.diagnosis.diagnose import diagnose
 
 @pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
 def test_a_length_is_the_mean_of_the_readings_along_the_bar(start):
-    """And its standard deviation sigma / sqrt(R): rotations have no say."""
+    """Its standard deviation is sigma / sqrt(R): rotations do not depend on it."""
     plain = bar(link=BEAM)
     noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
     seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
@@ -80,7 +80,7 @@ def test_intervals_cover_the_truth_at_the_stated_rate():
 
 
 def test_an_offset_is_exact_far_from_straight():
-    """The drive turns by a where K (a - e) = F L cos(q + a), far from straight."""
+    """The drive turns by a where K (a - e) = F L cos(q + a)."""
     K, F, e = 2e3, 150.0, 4e-3
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     plain = bar([0, 0, 0, 0, F, 0], spring=spring)

@@ -1,4 +1,4 @@
-"""Rows that judge: which they are, and which of two models predicts them better."""
+"""Which rows are held out."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def held_in(campaign):
     (59, "folds", 59), (9, "folds", 9),
 ])  # fmt: skip
 def test_whole_configurations_are_held_out(configurations, how, judge):
-    """A quarter of 60, 60 of some hundreds, a tenth of many; each in a fold of few."""
+    """A quarter, at most 60, or a tenth of many; all of them in folds of few."""
     repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
     campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
     held = hold_out(campaign)
@@ -32,7 +32,7 @@ def test_whole_configurations_are_held_out(configurations, how, judge):
 
 
 def test_few_configurations_are_held_out_by_spans_of_time():
-    """Sixteen spans of three rows, each whole and in one fold; order of time counts."""
+    """Sixteen spans of three rows in the order of time, each in one fold."""
     order = np.random.default_rng(0).permutation(48)
     campaign = campaign_of(
         np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order

@@ -1,4 +1,4 @@
-"""Which hypotheses a campaign can tell anything about, listed by hand."""
+"""Hypotheses that a campaign can test, listed by hand."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def named(conditions, loads=()):
 def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
     covariate, effect, values, told
 ):
-    """One that settles needs time that passes, too."""
+    """An effect that settles needs times that differ."""
     conditions = conditions_of(bar(link=BEAM))
     given = replace(conditions, **{covariate: values})
     assert (effect in named(given)) is told
@@ -42,7 +42,7 @@ def test_an_effect_needs_its_covariate_in_every_row_and_once_not_zero(
 
 
 def test_a_load_is_off_in_directions_in_which_it_was_recorded():
-    """The factor and those offsets; either by itself; none of another direction."""
+    """The factor and the offsets of recorded directions, together or alone."""
     found = named(conditions_of(bar(link=BEAM)), ["fy", "mz"])["load_gain"]
     assert found == [
         [("factor",), ("offset.mz",), ("offset.fy",)], [("factor",)],

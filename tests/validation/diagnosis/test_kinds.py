@@ -1,7 +1,7 @@
-"""What people's machines have, hidden in simulated ones: found, named, and predicted.
+"""Effects of real machines, hidden in simulated ones: found, named and predicted.
 
-The simulation shares nothing with what is found.  Fresh rows are of the same machine at
-other configurations; no part of the diagnosis saw them.
+The simulation shares no code with the effects.  Fresh rows are of the same machine at
+other configurations, unknown to the diagnosis.
 """
 
 from dataclasses import replace
@@ -87,7 +87,7 @@ def hidden(tmp_path):
 
 
 def only(learned, *, where, form, of):
-    """The single function that was learned, or at a place that does as well."""
+    """Return the parameters of the single learned function, at an equivalent place."""
     (one,) = learned["learned"]
     others = [same[0]["where"] for same in one["equivalent_places"]]
     assert where in [one["where"], *others]

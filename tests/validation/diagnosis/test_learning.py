@@ -1,4 +1,4 @@
-"""Geometry and functions that no effect of the library is, found and saved."""
+"""Geometric errors and learned functions, found and saved."""
 
 from dataclasses import replace
 from functools import cache
@@ -41,7 +41,7 @@ def inaccurate(tmp_path_factory):
 
 
 def test_geometric_errors_are_not_claimed_as_effects(inaccurate):
-    """Nothing of the library is claimed for frames that are all a little off.
+    """No effect of the library is claimed for errors of all frames.
 
     After: 40 rows of 6 readings, each in one of five folds; their noise's rms has a
     standard error of 0.046, and what some twenty unknowns leave open adds a little.
@@ -90,9 +90,9 @@ def diagnosed(tmp_path_factory):
 
 
 def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path):
-    """The stand yields with the square of the load: 6 sigma at 30 N, in every reading.
+    """The stand deforms with the square of the load: 6 sigma at 30 N.
 
-    Bodies of a planar arm that move with the load do as well as the stand.
+    Bodies of a planar arm that move with the load are equivalent.
     """
     found = diagnosed("stand")
     assert found.verdict == "learned"
@@ -121,7 +121,7 @@ def test_effect_outside_the_library_is_learned_as_a_function(diagnosed, tmp_path
 
 @pytest.mark.slow
 def test_equivalent_places_are_listed(diagnosed):
-    """In a planar arm any body that moves out of the plane reads the same."""
+    """In a planar arm any body that moves out of the plane is equivalent."""
     found = diagnosed("sag")
     assert found.verdict == "learned"
     (one,) = table(found)["learned"]
@@ -132,7 +132,7 @@ def test_equivalent_places_are_listed(diagnosed):
 
 @pytest.mark.slow
 def test_scatter_is_not_learned(diagnosed):
-    """Three times the noise stated, and no repeats that would say so."""
+    """Three times the stated noise, without repeats."""
     found = diagnosed("scatter")
     assert found.verdict == "outside_library"
     assert table(found)["learned"] == []

@@ -1,4 +1,4 @@
-"""The measurement that would decide, on a bar whose answers are known by hand."""
+"""The next measurement, on a bar with closed forms."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_another_temperature_separates_expansion_from_length():
 
 @pytest.mark.parametrize(("power", "worth"), [(1.5, True), (0.9, False)])
 def test_next_measurement_needs_a_power_of_one(power, worth):
-    """Of heat and length as above, by an expansion that differs by so much."""
+    """Expansion against length, for an expansion of given power."""
     R, T = 8, 5.0
     heat = {"temperature": np.full(R, T)}
     plain = bar(link=BEAM, **heat)

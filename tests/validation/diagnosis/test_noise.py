@@ -1,4 +1,4 @@
-"""Scale of the noise, and blunders."""
+"""Scale of the noise, and outliers."""
 
 import numpy as np
 import pytest

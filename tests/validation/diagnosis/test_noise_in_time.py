@@ -12,7 +12,7 @@ WITHIN_90 = 1.645
 
 
 def session(rows=ROWS, columns=(3, 4), sessions=None):
-    """Rows a step of time apart; what is asked of a campaign here, and no more."""
+    """Rows at equal steps of time, with the attributes of a campaign that are used."""
     cells = np.zeros((rows, 6), dtype=bool)
     cells[:, columns] = True
     time = STEP * np.arange(rows)
@@ -46,9 +46,9 @@ def design(campaign, rng):
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1], ROWS // 2)])
 def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
-    """H G'R G H with R written out; generalised least squares can but be surer.
+    """H G'R G H with the full R; generalised least squares has a smaller covariance.
 
-    By Gauss and Markov; with R = 1 nothing is wider.
+    (Gauss-Markov.)  With R = 1 the covariance is unchanged.
     """
     campaign = session(sessions=sessions)
     campaign.covariates["time"] = np.cumsum(rng.uniform(0, 2 * STEP, ROWS))
@@ -132,7 +132,7 @@ def by_definition(campaign, z):
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1, 1], 12)])
 def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
-    """Rows in any order, at times of any steps, some of them at one time."""
+    """Rows in any order, at unequal steps of time."""
     campaign = session(36, (1, 3), sessions)
     campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
     z = (
@@ -146,7 +146,7 @@ def test_the_likelihood_is_that_of_the_covariance_written_out(sessions, rng):
 
 
 def test_noise_in_time_is_independent_between_points(rng):
-    """Two points, read in turns, are two series: covariances of each add up."""
+    """Two points, read in turns, are two independent series."""
     one, both = session(40), session(80)
     both.point = np.tile(["p", "q"], 40)
     both.covariates["time"] = np.repeat(one.covariates["time"], 2)

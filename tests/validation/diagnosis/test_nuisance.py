@@ -1,4 +1,4 @@
-"""Nuisance parameters of a loaded bar, worked out by hand, and what they add."""
+"""Nuisance parameters of a loaded bar, by hand."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def loaded():
 
 
 def of_both_kinds(campaign, conditions, response):
-    """Geometric errors and springs, none of which is an effect of the library."""
+    """Geometric errors and springs that are no effect of the library."""
     small = nuisance(
         campaign, conditions, response, np.zeros((campaign.cells.sum(), 0))
     )
@@ -63,7 +63,7 @@ def test_tolerances_set_prior_sizes_and_zero_excludes_a_direction(loaded):
 
 
 def test_unloaded_or_unread_directions_have_no_unknowns():
-    """Nothing is loaded: no springs; only x is read: what moves it."""
+    """Without load there are no springs; only directions that move x have unknowns."""
     seen = np.full((8, 6), np.nan)
     seen[:, 3] = 0.0
     campaign = bar(measured=seen)
@@ -76,7 +76,7 @@ def test_unloaded_or_unread_directions_have_no_unknowns():
 
 
 def test_columns_sum_to_the_readings_of_a_changed_robot(loaded):
-    """Errors and springs of a size that is small, built into the robot."""
+    """Small errors and springs, built into the robot."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
@@ -98,7 +98,7 @@ def test_springs_of_no_compliance_stay_as_declared():
 
 
 def test_springs_of_passive_joints_leave_their_own_motion_free():
-    """1e-7 m/N in series with a bearing that is rigid but for its turning."""
+    """1e-7 m/N in series with a rigid bearing that is free to rotate."""
     hinge = Frame("hinge", "base", joint="revolute")
     robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
     first, axes = np.zeros(2, int), np.array([2, 4])

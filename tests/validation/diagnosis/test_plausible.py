@@ -1,4 +1,4 @@
-"""Numbers that no machine has, from a campaign and its known sizes."""
+"""Implausible parameters, from a campaign and its known sizes."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ from validation.diagnosis.unknowns import Acting, Small, Unknowns
 
 
 def found(effects, small=()):
-    """A machine with numbers of effects, by their public names."""
+    """A machine with given parameters of effects, by their public names."""
     parts = [
         SimpleNamespace(
             session=None,
@@ -83,7 +83,7 @@ def test_geometric_errors_of_a_fiftieth_of_the_robot_are_implausible(campaign):
 
 
 def test_temperatures_far_from_the_median_are_flagged(campaign):
-    """In kelvin or in degrees: 150 K from the median, and no less."""
+    """150 K from the median, in kelvin or degrees."""
     for usual in (0.0, 293.0):
         heat = np.full(len(campaign), usual)
         heat[2], heat[4] = usual + 149.0, usual - 151.0

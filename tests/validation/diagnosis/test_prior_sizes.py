@@ -1,4 +1,4 @@
-"""Sizes at which readings are likeliest, against a search over the density."""
+"""Most likely prior sizes, against a search over the density."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where a device stands, from positions or rotations of some rows."""
+"""The device frame, from positions or rotations."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 
 
 def seen_by(turn, shift):
-    """(8, 6) what a device reads of a bar that is as declared."""
+    """(8, 6) readings of a device of a bar without errors."""
     p, R = LENGTH * along(bar()), Rotation.from_rotvec(turn)
     return np.hstack([np.tile(turn, (8, 1)), R.apply(p) + shift - p])
 
@@ -35,7 +35,7 @@ def test_without_a_position_the_shift_is_zero():
 
 @pytest.mark.parametrize("cell", range(6))
 def test_rows_that_lack_a_cell_do_not_take_part(cell):
-    """What they have of that kind is wrong, and so is a row without a model."""
+    """The other cells of such a row are wrong here."""
     seen = seen_by(TURN, SHIFT)
     kind = slice(0, 3) if cell < 3 else slice(3, 6)
     seen[2, kind] += 0.3
@@ -52,7 +52,7 @@ def test_rows_that_lack_a_cell_do_not_take_part(cell):
 
 
 def test_device_rotation_is_found_next_to_a_turned_model():
-    """R = D M: the device's rotation is left when the model's is taken off the right;
+    """R = D M: the device's rotation D follows from R and the model's rotation M;
     of several that differ, the mean."""
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
@@ -81,7 +81,7 @@ def test_three_points_off_one_line_are_enough(points):
 
 @pytest.mark.parametrize("known", ["campaign", "conditions"])
 def test_sessions_missing_on_one_side_share_one_device(known):
-    """Half the rows are seen from elsewhere: a compromise, the same in all."""
+    """All rows share one device frame."""
     seen, sessions = seen_by(TURN, SHIFT), np.array(["a", "b"] * 4)
     campaign = bar(measured=seen)
     conditions = conditions_of(campaign)
@@ -96,7 +96,7 @@ def test_sessions_missing_on_one_side_share_one_device(known):
 @pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
 @pytest.mark.parametrize("cells", ["all", "points", "one rotation"])
 def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
-    """p' = R p + t and R' = R, noise-free: 1 rad and 3 m, by points or by rotations."""
+    """p' = R p + t and R' = R without noise: 1 rad and 3 m."""
     campaign = bar()
     R, t = Rotation.from_rotvec(turn), np.array([2.0, -2.0, 1.0])
     p = LENGTH * along(campaign)
@@ -115,7 +115,7 @@ def test_a_device_anywhere_in_the_room_is_found_exactly(turn, cells):
 
 
 def test_collinear_points_do_not_determine_the_device_rotation():
-    """Five places of a slide half a metre beside the base, no rotation read."""
+    """Five places of a slide half a metre from the base, without rotations."""
     robot = Robot("slide", "tip", (
         Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
         Frame("slide", "rail", joint="prismatic", actuated=True),
@@ -134,7 +134,7 @@ def test_collinear_points_do_not_determine_the_device_rotation():
 
 
 def test_device_is_found_next_to_declared_errors():
-    """The declared tip is 4 mm off: that is the machine's, and not the device's."""
+    """The declared error of the tip, 4 mm, is not part of the device frame."""
     plain = bar()
     errors = np.zeros((2, 6))
     errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
@@ -151,7 +151,7 @@ def test_device_is_found_next_to_declared_errors():
 
 
 def test_each_session_has_a_device_of_its_own():
-    """Two places in the room, two sessions; rows without any are all of one."""
+    """Two device frames in two sessions; a session without rows is refused."""
     plain, sessions = bar(), np.array(["a", "b"] * 4)
     p, seen = LENGTH * along(plain), np.zeros((8, 6))
     seen[:, :3] = np.nan

@@ -1,4 +1,4 @@
-"""Effects linearised together, against the finite motion of a drive and a bar."""
+"""Effects linearised together, against finite motions of a drive and a bar."""
 
 from dataclasses import replace
 

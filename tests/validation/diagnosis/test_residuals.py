@@ -1,4 +1,4 @@
-"""What a diagnosis makes of residuals: noise or not, and what they vary with."""
+"""Residuals of a diagnosis: lack of fit, outliers, trends."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def noisy(rng, rows=40, sets=10, size=1.0):
 
 
 def test_probabilities_of_noise_are_uniform(rng):
-    """So that the stated rate of false alarms is the true one."""
+    """The rate of false alarms is the stated one."""
     found = []
     for _ in range(300):
         campaign = noisy(rng)
@@ -35,7 +35,7 @@ def test_probabilities_of_noise_are_uniform(rng):
 
 
 def test_scatter_between_repeats_by_hand():
-    """1 and 3: 2 about their mean, one degree of freedom; a third stands alone."""
+    """1 and 3: squares of 2 about their mean, one degree of freedom."""
     seen = np.full((3, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1])
@@ -46,7 +46,7 @@ def test_scatter_between_repeats_by_hand():
 
 
 def test_equal_repeats_make_any_residual_a_lack_of_fit():
-    """A device that rounds: what is left at all is a lack of fit."""
+    """Repeats of a device that rounds: any residual is a lack of fit."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1, 1])
@@ -91,7 +91,7 @@ def test_a_device_worse_than_stated_is_no_lack_of_fit(rng):
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
 def test_deviation_common_to_repeats_is_a_lack_of_fit(size, rng):
-    """Whatever the device: 2 sigma common to all visits of a configuration."""
+    """2 sigma common to all visits of a configuration, at any noise."""
     campaign = noisy(rng, 120, 20, size)
     shared = 2 * size * rng.normal(size=(20, 6))[campaign.repeat] * SIGMA
     z = whiten(campaign, campaign.measured + shared)
@@ -131,7 +131,7 @@ def varied(rng, rows=120):
 
 
 def test_noise_shows_a_trend_as_rarely_as_stated(rng, monkeypatch):
-    """Over all trends tried; at 5 % instead of 0.1 %, so that 100 campaigns tell."""
+    """Over all trends; at 5 % instead of 0.1 %, for which 100 campaigns suffice."""
     monkeypatch.setattr(module, "UNLIKELY", 0.05)
     alarms = 0
     for _ in range(100):

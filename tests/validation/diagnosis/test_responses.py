@@ -1,4 +1,4 @@
-"""Answers to small screws, by hand, one posture or many."""
+"""Responses to small screws, by hand, at one posture or many."""
 
 from dataclasses import replace
 
@@ -31,10 +31,10 @@ def turns_of(campaign):
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
 def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
-    """However many postures there are, and in whatever order they come again.
+    """For any number and order of postures.
 
-    A drive's screw turns the whole bar, in the base's axes; the tip's is read as it
-    is, in those of the bar.  At the drive is the moment of the forces at the tip.
+    A drive's screw rotates the whole bar, in base axes; the tip's is read in the
+    axes of the bar.  The wrench at the drive has the moment of the forces at the tip.
     """
     campaign, once = loaded(rows)
     order = np.append(np.arange(rows)[::-1], np.arange(0, rows, 3))
@@ -54,7 +54,7 @@ def test_responses_carry_screws_along_the_bar_and_loads_back(rows):
 
 
 def test_readings_of_small_screws_follow_the_device_frame():
-    """R (t + r x arm), arm to the point it sees; its turn after b by Rodrigues."""
+    """R (t + r x arm), with the arm to the measured point; rotations by Rodrigues."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(
@@ -98,9 +98,9 @@ def test_row_without_a_solution_has_zero_response():
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
 def test_resting_clearance_changes_no_response(held, closed):
-    """To first order: it stays where the load has taken it, and the same goes through.
+    """To first order the joint stays where the load has shifted it.
 
-    Of an open chain, and of one that closes.
+    For an open and a closed chain.
     """
     if closed:
         robot, loose = five_bar(), "right.elbow"
@@ -109,9 +109,9 @@ def test_resting_clearance_changes_no_response(held, closed):
     else:
         campaign, conditions = loaded()
         robot, loose = campaign.robot, "drive"
-    play = Clearance(radial=1e-5, axial=2e-5)
+    clearance = Clearance(radial=1e-5, axial=2e-5)
     frames = tuple(
-        replace(f, clearance=play if f.name == loose else f.clearance)
+        replace(f, clearance=clearance if f.name == loose else f.clearance)
         for f in robot.frames
     )
     there = replace(conditions, robot=replace(robot, frames=frames))
@@ -127,7 +127,7 @@ def test_resting_clearance_changes_no_response(held, closed):
 
 
 def test_clearance_of_one_of_two_parallel_springs_shifts_no_load():
-    """Each carries half: what closes is looked at as if all play were gone."""
+    """Each carries half: responses are those without clearance."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (
         Frame("a", joint_stiffness=spring, clearance=Clearance(radial=1e-5)),

@@ -1,4 +1,4 @@
-"""The search of a diagnosis, on a drive and a bar whose readings are closed forms."""
+"""The search of a diagnosis, on a drive and a bar with closed forms."""
 
 from dataclasses import replace
 
@@ -28,13 +28,13 @@ def columns():
 
 
 def turned(angle):
-    """(R, 6) readings of a bar whose drive stands wrong by angles (R,)."""
+    """(R, 6) readings of a bar whose drive is off by angles (R,)."""
     still = np.zeros((ROWS, 2))
     return np.hstack([still, angle[:, None], LENGTH * angle[:, None] * ACROSS])
 
 
 def found(columns, readings, seed=0, *, noise=1.0):
-    """What is selected of readings (R, 6) and noise in every cell but each fourth."""
+    """Selection from readings (R, 6) with noise, in three of four cells."""
     z = (readings / CAMPAIGN.sigma).ravel()
     z = z + noise * np.random.default_rng(seed).normal(size=len(z))
     cells = columns.row % 4 > 0

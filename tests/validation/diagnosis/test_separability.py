@@ -1,4 +1,4 @@
-"""Angles between signatures, against planes whose angles are known."""
+"""Angles between signatures, against planes of known angles."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_equal_column_spaces_form_a_class(rng):
 
 
 def test_nuisance_columns_are_projected_out(rng):
-    """Without the common column the two are at right angles, and a third is gone."""
+    """Without the common column two are orthogonal, and a third vanishes."""
     out = rng.normal(size=(40, 2))
     Q, _ = np.linalg.qr(np.column_stack([out, rng.normal(size=(40, 2))]))
     found = compare_signatures(
@@ -66,7 +66,7 @@ def test_nuisance_columns_are_projected_out(rng):
 
 @pytest.mark.parametrize("units", [1e-9, 1.0])
 def test_nuisance_columns_are_projected_out_at_any_scale(units, rng):
-    """Two at right angles, one 200 times the other; none at all takes nothing."""
+    """Two orthogonal columns, one 200 times the other; no columns project nothing."""
     Q, _ = np.linalg.qr(rng.normal(size=(40, 3)))
     out = units * Q[:, :2] * [1e4, 50.0]
     found = compare_signatures({"a": Q @ [[3.0], [4.0], [12.0]]}, out)
@@ -75,7 +75,7 @@ def test_nuisance_columns_are_projected_out_at_any_scale(units, rng):
 
 
 def test_invisible_effect_is_compared_at_any_size(rng):
-    """2 sigma in all rows together does not show; a twin it is at any size."""
+    """2 sigma in all rows is invisible; equivalence does not depend on size."""
     line = rng.normal(size=(30, 1))
     line /= np.linalg.norm(line)
     found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
@@ -86,7 +86,7 @@ def test_invisible_effect_is_compared_at_any_size(rng):
 
 
 def test_rank_counts_unknowns_of_unequal_scale(rng):
-    """An angle of 1e4 and a shift of 100 sigma at right angles; and their sum."""
+    """An angle of 1e4 and an orthogonal shift of 100 sigma, and their sum."""
     A = np.eye(3)[:, :2] * [1e4, 100.0]
     found = compare_signatures({"a": np.column_stack([A, A.sum(axis=1)])})
     assert (found.rank[0], found.unknowns[0]) == (2, 3)

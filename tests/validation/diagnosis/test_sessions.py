@@ -1,4 +1,4 @@
-"""Campaigns of several sessions, made by the program of springs."""
+"""Campaigns of several sessions, simulated with springs."""
 
 import re
 
@@ -27,7 +27,7 @@ FRAMES = {"monday": [0.3, -0.2, 0.5, 1.2, -0.4, 0.7], "tuesday": [0, 0, 1, 2, 0,
 
 
 def registration(session, *, placed):
-    """The tool of a session, and where its device stands."""
+    """Registration of a session: its tool and its device frame."""
     numbers = {f"tool.{k}": v for k, v in zip(SCREW[3:], TOOLS[session], strict=True)}
     if placed:
         base = zip(SCREW, FRAMES[session], strict=True)
@@ -36,7 +36,7 @@ def registration(session, *, placed):
 
 
 def measured(folder, hidden, common=(), known=True):
-    """A campaign of the arm, each session with what is hidden in it and in all."""
+    """Write a campaign of the arm with effects of each session and of all."""
     folder.mkdir(exist_ok=True)
     robot, body, head = with_errors(arm()), [], None
     for number, (session, own) in enumerate(hidden.items()):
@@ -75,7 +75,7 @@ def parameters(found, name, session=None):
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
-    """A spring that all share is found beside them; the file says all of it."""
+    """A common spring is found together with them, and saved."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
         s: [Hidden("encoder_offset", ZEROS[s]), registration(s, placed=not known)]
@@ -113,7 +113,7 @@ def test_zeros_and_tool_are_found_for_each_session(known, tmp_path):
 
 @pytest.mark.slow
 def test_common_effects_are_claimed_for_all_sessions(tmp_path):
-    """What all share is claimed for all, and saved without a session."""
+    """Common effects are claimed and saved without a session."""
     zeros = Hidden("encoder_offset", ZEROS["monday"])
     folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
     diagnosis = diagnose(read_campaign(folder))
@@ -126,7 +126,7 @@ def test_common_effects_are_claimed_for_all_sessions(tmp_path):
 
 @pytest.mark.slow
 def test_drift_is_found_for_each_session(tmp_path):
-    """Other components, and 900 s on one day against 2000 s on the other."""
+    """Different components, and time constants of 900 s and 2000 s."""
     drifts = {
         "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},
         "tuesday": {
@@ -178,7 +178,7 @@ def test_wrong_per_session_effect_is_refused(given, message, tmp_path):
 
 
 def in_two_tables(folder, shift):
-    """An arm read on two days; on one humidity shifts it, on the other it is warm."""
+    """An arm on two days: humidity is recorded on one, temperature on the other."""
     rng = np.random.default_rng(3)
     days = {"dry": "temperature", "wet": "humidity"}
     tables = '["dry.csv", "wet.csv"]'
@@ -196,7 +196,7 @@ def in_two_tables(folder, shift):
 
 
 def test_function_acts_only_in_sessions_with_its_covariate(tmp_path):
-    """20 um for each of ten parts of humidity, which one of two tables records."""
+    """20 um for each of ten parts of humidity, recorded in one of two tables."""
     folder = in_two_tables(tmp_path / "days", 2e-5)
     diagnosis = diagnose(read_campaign(folder))
     assert diagnosis.verdict == "learned"

@@ -1,4 +1,4 @@
-"""Conditions of a campaign and tangents of its effects, on a bar known by hand."""
+"""Conditions of a campaign and tangents of its effects, on a bar by hand."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from validation.diagnosis.trace import FINITE
 
 
 def test_weight_has_the_direction_of_the_gravity_covariates():
-    """Zero where they do not."""
+    """Zero where there are none."""
     along = {"gravity.x": np.arange(8.0), "gravity.z": np.full(8, -9.81)}
     here = conditions_of(bar(**along))
     expected = np.column_stack([np.arange(8.0), np.zeros(8), np.full(8, -9.81)])
@@ -33,7 +33,7 @@ def test_weight_has_the_direction_of_the_gravity_covariates():
 @pytest.mark.parametrize("name", ["bed", "approach"])
 @pytest.mark.parametrize("given", [True, False])
 def test_a_function_of_a_covariate_needs_its_column(name, given):
-    """But for the side from which one comes, which rows before may tell."""
+    """Except ``approach``, which follows from the rows before."""
     function = (
         Function("reading", ("tx",), ("q.drive",), "reversal", {"0": 1e-6})
         if name == "approach"
@@ -72,7 +72,7 @@ def test_residual_is_reading_minus_declared_prediction():
 
 
 def test_a_visible_effect_without_unknowns_is_an_offset():
-    """Of a soft drive that turns far, finite motions say much."""
+    """A soft drive with a large rotation."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))

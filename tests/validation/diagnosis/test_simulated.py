@@ -36,7 +36,7 @@ def understood(wanted, seed, tmp_path):
 def assert_true_numbers(found, made):
     """Parameters of the simulated machine, within four standard deviations.
 
-    But for masses: which body of the arm is heavier hardly shows in its readings.
+    Except masses: the readings hardly depend on which body is heavier.
     """
     numbers = {
         (effect["name"], p["name"]): p
@@ -53,7 +53,7 @@ def assert_true_numbers(found, made):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LIBRARY)
 def test_every_effect_is_found_at_five_times_the_noise(name, tmp_path):
-    """Or a set that the simulation's side says is the same within the noise."""
+    """Or a set that is equivalent within the noise, by the simulation's account."""
     found, allowed = understood({name: 5.0}, 4, tmp_path)
     if found.verdict == "ambiguous":
         assert len(allowed) > 1

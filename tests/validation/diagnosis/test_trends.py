@@ -1,4 +1,4 @@
-"""All that a residual may vary with, against F tests by another routine."""
+"""Trends of a residual, against F tests by another routine."""
 
 from dataclasses import replace
 

@@ -21,7 +21,7 @@ START = 1_700_000_000  # [s] of the first command
 
 
 def write_bag(path, plugin, transforms):
-    """A rosbag2 of what the device of the planar arm read, a second after commands."""
+    """Write a rosbag2 of readings of the planar arm, a second after commands."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -62,7 +62,7 @@ def write_bag(path, plugin, transforms):
 @pytest.mark.parametrize("transforms", [False, True])
 @pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
 def test_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
-    """Doubles are kept whole: what is left is rounding, as from a table."""
+    """Double precision is kept: deviations are rounding."""
     pytest.importorskip("rosbags")
     lab = Lab(tmp_path)
     lab.commands([START + 60 * k for k in range(len(ANGLES))])

@@ -1,4 +1,4 @@
-"""Files as devices' programs write them: every one holds the same perfect readings.
+"""Exports of devices' programs, all with the same exact readings.
 
 The readings come from the planar arm's closed form, so a campaign made of any of these
 files has deviations that are rounding.
@@ -33,7 +33,7 @@ def lab(tmp_path):
 
 
 def imported(lab, run, text, encoding="utf-8"):
-    """What the command says of an export, as JSON."""
+    """Import an export and return the command's JSON."""
     lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -41,7 +41,7 @@ def imported(lab, run, text, encoding="utf-8"):
 
 
 def refused(lab, run, text):
-    """The one line that refuses an export; nothing is written."""
+    """Return the line that refuses an export, and check that nothing is written."""
     lab.export(text)
     status, out, err = run(*lab.words())
     assert (status, out) == (2, "")
@@ -50,7 +50,7 @@ def refused(lab, run, text):
 
 
 def assert_exact(lab, readings=None):
-    """Deviations of the campaign are rounding, and as many as given are there."""
+    """Check that deviations are rounding, and the number of readings."""
     campaign = read_campaign(lab.folder / "campaign")
     assert np.nanmax(np.abs(campaign.measured[:, 3:])) < 1e-9
     if readings is not None:
@@ -174,7 +174,7 @@ def test_export_of_a_device_program_is_read_exactly(lab, run, name):
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
 def test_rows_of_numbers_are_targets_in_their_order(lab, run, before):
-    """A counter or a time before them is told by the targets' distances."""
+    """A counter or a time before them is recognised by the targets' distances."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)
@@ -186,7 +186,7 @@ def test_rows_without_readings_are_refused(lab, run):
 
 
 def test_motive_rigid_body_is_read_without_its_markers(lab, run):
-    """Its rotation is a quaternion x, y, z, w; its markers have its name too."""
+    """Its rotation is a quaternion x, y, z, w; its markers also have its name."""
     lab.targets("A", unit=None, noise_rotation=1e-4)
     kinds = ["Rotation"] * 4 + ["Position"] * 6
     head = [
@@ -225,7 +225,7 @@ def test_decimal_is_declared_for_each_table(lab, run):
 
 
 def test_time_of_the_commands_reaches_the_campaign(lab, run):
-    """The export has no clock; the table of commands has one, in minutes."""
+    """The export has no time; the table of commands has one, in minutes."""
     lab.commands([str(0.5 * k) for k in range(13)], head="id,q.one,q.two")
     text = (lab.folder / "commands.csv").read_text().replace("time", "time [min]")
     (lab.folder / "commands.csv").write_text(text)
@@ -235,16 +235,13 @@ def test_time_of_the_commands_reaches_the_campaign(lab, run):
     assert campaign.covariates["time"] == pytest.approx(times)
 
 
-@pytest.mark.parametrize(
-    ("column", "message"),
-    [
-        ("cov.temperature [K]", None),
-        ("cov.temperature [°C]", None),
-        ("cov.humidity [%]", None),
-        ("cov.temperature [kg]", 'found the unit "kg"'),
-        ("load.fx [mm]", 'found the unit "mm"'),
-    ],
-)
+@pytest.mark.parametrize(("column", "message"), [
+    ("cov.temperature [K]", None),
+    ("cov.temperature [°C]", None),
+    ("cov.humidity [%]", None),
+    ("cov.temperature [kg]", 'found the unit "kg"'),
+    ("load.fx [mm]", 'found the unit "mm"'),
+])  # fmt: skip
 def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
     lab.commands(range(13))
     path = lab.folder / "commands.csv"
@@ -261,7 +258,7 @@ def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
 
 @pytest.mark.parametrize("nothing", ["NaN", "", "-", "#N/A"])
 def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, nothing):
-    """Joined by order: the readings after it belong to the commands after it."""
+    """Joined by order, later readings belong to later commands."""
     lab.targets("A")
     body = list(points("A", "A;{x!r};{y!r};{z!r}"))
     body[6] = f"A;{nothing};{nothing};{nothing}"
@@ -281,7 +278,7 @@ def test_repeated_reading_is_named(lab, run):
 
 
 def test_surplus_reading_is_named(lab, run):
-    """Joined by order a repeated line moves all that follow."""
+    """Joined by order, a repeated line shifts all later readings."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
     line = refused(lab, run, "\n".join([*body[:6], body[5], *body[6:]]))
@@ -308,15 +305,12 @@ def changed(change):
     return "\n".join(points(line=SPATIAL_ANALYZER, change=lambda k, n, p: change(p)))
 
 
-@pytest.mark.parametrize(
-    ("factor", "words"),
-    [
-        (1 / 25.4, "times 25.4, as in taken for mm"),
-        (25.4, "times 0.03937, as mm taken for in"),
-        (1e-3, "times 1000, as m taken for mm"),
-        (1 / 304.8, "times 304.8, as ft taken for mm"),
-    ],
-)
+@pytest.mark.parametrize(("factor", "words"), [
+    (1 / 25.4, "times 25.4, as in taken for mm"),
+    (25.4, "times 0.03937, as mm taken for in"),
+    (1e-3, "times 1000, as m taken for mm"),
+    (1 / 304.8, "times 304.8, as ft taken for mm"),
+])  # fmt: skip
 def test_lengths_of_another_unit_are_refused_with_the_factor(lab, run, factor, words):
     line = refused(lab, run, changed(lambda p: factor * p))
     assert f"unit: the readings fit far better {words}" in line
@@ -330,15 +324,12 @@ def test_left_handed_coordinates_are_refused(lab, run, axis):
     assert "left-handed: the readings fit far better with one axis reversed" in line
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda p: p * [1, -1, 1], "where y is the device's -y"),
-        (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda p: p * [1, -1, 1], "where y is the device's -y"),
+    (lambda p: p[[1, 0, 2]], "where x is the device's y, y is the device's x"),
+])  # fmt: skip
 def test_axes_of_a_known_registration_are_named(lab, run, change, words):
-    """The base's axes stand: which one is reversed can be told."""
+    """With known base axes the reversed one is named."""
     lab.targets(registration='"known"')
 
     def base(k, name, p):
@@ -358,7 +349,7 @@ def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
 
 
 def moved_mount(k, name, p):
-    """B was mounted 60 mm from its place."""
+    """B is mounted 60 mm from its declared place."""
     turn = Rotation.from_euler("z", sum(ANGLES[k]))
     return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
@@ -390,7 +381,6 @@ def test_readings_that_do_not_fit_targets_or_commands_are_remarked(lab, run, cas
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
 def test_very_long_cell_is_refused_with_its_line(lab, run, piece):
-    """Looking for a unit in 200 000 brackets took minutes."""
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[1] += piece * 200_000 + "x"
     line = refused(lab, run, "\n".join(lines))
@@ -439,7 +429,7 @@ ORIENTATIONS = {
 @pytest.mark.filterwarnings("ignore:Gimbal")
 @pytest.mark.parametrize("kind", ORIENTATIONS)
 def test_orientations_become_rotations_of_the_platform(lab, run, kind):
-    """The platform stands as commanded; how the target is mounted is found."""
+    """The mount of the target is found from commanded poses."""
     head, values, keys = ORIENTATIONS[kind]
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
@@ -508,7 +498,7 @@ def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
 
 
 def test_delimiter_is_the_mark_of_most_lines(tmp_path):
-    """A preamble of other marks does not decide; quoted marks do not part cells."""
+    """A preamble with other marks and quoted marks do not count."""
     path = tmp_path / "a.txt"
     path.write_text('a title, of a file\n"p, 1";2;3\n"p, 2";4;5\n"p, 3";6;7\n')
     cells = [cells for _, cells in read_sheet(path).rows]

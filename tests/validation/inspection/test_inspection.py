@@ -28,7 +28,7 @@ HEAD = ",".join([
 
 
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
-    """Twelve configurations of an elastic arm under two loads, each twice; noise.
+    """Twelve configurations of an elastic arm under two loads, each twice, with noise.
 
     ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device stands.
     """
@@ -61,7 +61,7 @@ def texts(campaign):
 
 
 def sound(rng, **changes):
-    """A design with nothing to say against it, changed by name."""
+    """A design without weakness, with changes by name."""
     rows = 60
     kinds = np.concatenate([rng.permutation(20) for _ in range(3)])
     loads = np.zeros((rows, 6))
@@ -117,7 +117,7 @@ def test_weakness_of_a_design_is_remarked(case, rng):
 
 
 def test_sound_design_has_one_remark(rng):
-    """The post has no joints and each configuration one load here: said, no more."""
+    """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
         "load careful: No configuration was measured under two loads: what the load "
@@ -175,9 +175,9 @@ def test_correlation_equals_that_of_numpy(rng):
 
 
 def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, rng):
-    """Both lengthen the same beams; while it varies they are told apart.
+    """Both lengthen the same beams; a varying temperature separates them.
 
-    A body that follows one temperature has it.
+    A body with delay has the constant temperature too.
     """
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
     assert (
@@ -208,7 +208,7 @@ def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
 
 
 def test_device_that_cannot_be_located_is_remarked(tmp_path):
-    """One angle in two rows: inspected all the same."""
+    """One angle in two rows."""
     rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
     folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
                             toml={"registration": '"unknown"'})  # fmt: skip
@@ -236,7 +236,7 @@ def test_signature_is_the_derivative_by_hand(tmp_path, rng):
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
 def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng):
-    """12 sigma of expansion, told in the axes of a device turned by 2 rad, 5 m away."""
+    """12 sigma of expansion, in the axes of a device rotated by 2 rad, 5 m away."""
     device = None
     if registration == "unknown":
         device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])

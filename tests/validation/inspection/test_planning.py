@@ -1,4 +1,4 @@
-"""Rows that tell effects apart: the criterion by closed forms, the file it writes."""
+"""Planned campaigns: the criterion in closed form, and the file."""
 
 import csv
 import json
@@ -50,14 +50,11 @@ def test_plan_writes_a_campaign_to_be_measured(tmp_path, run):
     assert told["planned"] > told["random"]
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "says"),
-    [
-        ("--rows", "7", "--rows: found 7, expected at least 8"),
-        ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
-        ("--temperature", "hot", 'temperature: found "hot", expected swing'),
-    ],
-)
+@pytest.mark.parametrize(("option", "value", "says"), [
+    ("--rows", "7", "--rows: found 7, expected at least 8"),
+    ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
+    ("--temperature", "hot", 'temperature: found "hot", expected swing'),
+])  # fmt: skip
 def test_plan_refuses_wrong_options(tmp_path, run, option, value, says):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)

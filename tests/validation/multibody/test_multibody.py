@@ -187,7 +187,7 @@ def test_a_couple_of_dead_forces_does_the_work_of_its_sine():
 
 
 def test_an_infinite_stiffness_locks_its_axis():
-    """A drive that yields only about z, by M / k; the other axes do not move."""
+    """A drive that is compliant only about z, by M / k."""
     K = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     frames = (
         Frame(

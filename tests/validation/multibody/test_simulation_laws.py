@@ -32,11 +32,6 @@ from validation.multibody.simulation import (
 pytestmark = pytest.mark.exudyn
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng(7)
-
-
 def overconstrained(rng, errors):
     """A table on three legs: clamped beams, joint springs and a free slide."""
     legs, closures = [], []
@@ -144,7 +139,7 @@ def test_rigid_parts_that_do_not_fit_are_a_named_failure():
 
 
 def test_a_load_that_nothing_resists_is_a_named_failure():
-    """A free pin under 10 N m: at once, and it says when."""
+    """A free pin under 10 N m."""
     frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
     posture = home_posture(Robot("pendulum", "tip", frames))
     with pytest.raises(SimulationFailed, match="no equilibrium while closures are pul"):
@@ -183,7 +178,7 @@ def test_the_logarithm_undoes_the_exponential(rng):
 
 
 def test_closing_sequence_closes_gaps_evenly(rng):
-    """First what the errors alone do, last the assembly; gaps shrink evenly."""
+    """From the open robot with errors to the assembly, in even steps."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     robot = posture.robot
     sequence = closing_sequence(posture, steps=5)
@@ -223,7 +218,7 @@ def test_repeated_simulations_do_not_leak_memory(rng):
 
 @pytest.mark.slow
 def test_simulations_with_contacts_and_failures_do_not_leak_memory():
-    """Functions that Exudyn calls hold their model; those of a hundred are let go.
+    """User functions of Exudyn hold their model until it is released.
 
     Every other one runs out of time; a leaked model is half a MiB.
     """

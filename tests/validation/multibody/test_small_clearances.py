@@ -19,11 +19,7 @@ POSE = {"tz": 0.8, "rx": 0.32, "ry": 0.22}
 @pytest.mark.exudyn
 @pytest.mark.parametrize("scale", [0.25, 0.125])
 def test_a_tripod_with_clearances_of_a_micrometre_is_simulated(scale):
-    """Three of ten cases had no equilibrium under loads at these scales.
-
-    Exechon: 2-UPR and SPR, overconstrained twice; clearances of 8 um, a quarter and
-    an eighth.  The energy is that of the linear model, to the compliance of contacts.
-    """
+    """Exechon, overconstrained twice; clearances of 8 um, a quarter and an eighth."""
     posture = place_robot(read_robot(EXECHON), pose=POSE)
     load = scale * np.array([0, 0, 0, 0, 0, -200.0])
     found = simulate_assembly(
@@ -37,11 +33,7 @@ def test_a_tripod_with_clearances_of_a_micrometre_is_simulated(scale):
 @pytest.mark.slow
 @pytest.mark.exudyn
 def test_contact_energy_is_small_at_every_scale():
-    """Self-similar: load, errors and clearances times s, contacts store s^2 as much.
-
-    Steps of 1 um were accepted beside clearances of 1 um: contacts then stored twice
-    the energy of the springs at an eighth, and 2e-3 of it at full size.
-    """
+    """Self-similar: load, errors and clearances times s, contacts store s^2 as much."""
     pose = {"tz": 0.7714, "rx": 0.3964, "ry": 0.2341}
     posture = place_robot(read_robot(EXECHON), pose=pose)
     for scale in (1.0, 0.5, 0.125):

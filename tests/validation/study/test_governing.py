@@ -1,4 +1,4 @@
-"""What governs the worst case: bounds with one imperfection removed."""
+"""Governing imperfections: bounds with one imperfection removed."""
 
 from dataclasses import replace
 

@@ -146,18 +146,15 @@ def test_a_grid_of_three_axes_is_drawn_where_its_largest_error_is(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("load = [1, 2]", "service.load: found [1, 2] of length 2"),
-        ("gravity = 9.81", "service.gravity: found 9.81"),
-        ("stiffness = 1", "service.stiffness: found 1, expected true or false"),
-        ("frequencies = -1", "service.frequencies: found -1, expected a whole number"),
-        ("frequencies = 2000", "service.frequencies: found 2000, expected at most"),
-        ("frequencies = 3", "service.frequencies: irsbot2: found no mass that moves"),
-        ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
-    ],
-)
+@pytest.mark.parametrize(("line", "message"), [
+    ("load = [1, 2]", "service.load: found [1, 2] of length 2"),
+    ("gravity = 9.81", "service.gravity: found 9.81"),
+    ("stiffness = 1", "service.stiffness: found 1, expected true or false"),
+    ("frequencies = -1", "service.frequencies: found -1, expected a whole number"),
+    ("frequencies = 2000", "service.frequencies: found 2000, expected at most"),
+    ("frequencies = 3", "service.frequencies: irsbot2: found no mass that moves"),
+    ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
+])  # fmt: skip
 def test_wrong_service_keys_are_refused_in_one_line(tmp_path, line, message):
     path = tmp_path / "study.toml"
     path.write_text(f'robot = "irsbot2"\n[service]\n{line}\n')

@@ -196,7 +196,7 @@ QUIET = "[checks]\npicture = false\n"
 def test_a_study_of_a_robot_without_errors_says_that_nothing_was_checked(
     tmp_path, name
 ):
-    """Every built-in robot; it once ended in a division by zero, or passed."""
+    """Every built-in robot."""
     text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
     if name == "irsbot2":
         text += "[pose]\ntx = 0.0\ntz = -0.5\n"
@@ -225,7 +225,7 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 @pytest.mark.exudyn
 def test_a_study_of_a_just_constrained_robot_says_what_could_not_be_checked(tmp_path):
-    """Its errors cost neither energy nor play: the simulation alone has a say."""
+    """Its errors store no energy: only the simulation can check it."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))
     assert results.verdicts == {"reference": "no signal", "crosscheck": "passed"}
@@ -270,11 +270,7 @@ def test_a_reference_without_an_answer_does_not_pass(tmp_path, monkeypatch):
 
 
 def test_headline_is_the_worst_clearance_over_the_map(tmp_path):
-    """A five-bar's play, free: least energy rests it in the middle.
-
-    The bound at a pose is that of ``assembly error``, over the map the largest of the
-    bounds there; a pose error with another play says which.
-    """
+    """At a pose the bound of ``assembly error``, over the map the largest of these."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"

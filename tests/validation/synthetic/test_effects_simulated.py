@@ -41,7 +41,7 @@ EFFECTS = {
     "load_gain": {"factor": 1.2, "offset.fx": 3.0},
     "drift": {"amplitude.tz": 1e-5, "time_constant": 60.0},
 }
-ELSEWHERE = {  # finite motions: test_synthetic_campaigns; play: test_generator
+ELSEWHERE = {  # finite motions: test_synthetic_campaigns; clearance: test_generator
     "geometric_stiffening", "joint_clearance"
 }  # fmt: skip
 

@@ -311,15 +311,12 @@ def test_impossible_noise_or_design_is_refused(make, message):
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--rotation", "-inf"], "rotation: found -inf"),
-        (["--error-size", "nan"], "--error-size: found nan"),
-        (["--outliers", "200"], "found 200, expected at most the 116 rows"),
-        (["--seed", "-1"], "--seed"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    (["--rotation", "-inf"], "rotation: found -inf"),
+    (["--error-size", "nan"], "--error-size: found nan"),
+    (["--outliers", "200"], "found 200, expected at most the 116 rows"),
+    (["--seed", "-1"], "--seed"),
+])  # fmt: skip
 def test_generate_refuses_wrong_options_and_writes_nothing(
     run, tmp_path, words, message
 ):
