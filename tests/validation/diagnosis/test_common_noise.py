@@ -5,19 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import with_second_order
 from assembly.robots import three_rrr
-from tests.bar_for_tests import BEAM, LONGER, along, bar, machine
+from tests.bar_for_tests import BEAM, LONGER, along, bar, columns_of, machine
 from tests.elastic_arm_for_tests import arm, with_errors
 from tests.points_for_tests import DEVICE, MACHINE, TARGETS, simulated, write_points
 from validation.campaign.campaign import number_rows
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
 from validation.diagnosis.diagnose import diagnose
 from validation.diagnosis.lack_of_fit import lack_of_fit
 from validation.diagnosis.results import table
 from validation.diagnosis.select import select
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.whitening import independent
 from validation.multibody.simulation import without_clearance
 from validation.synthetic.design import CampaignDesign
@@ -50,7 +46,7 @@ CAMPAIGN = three_points(time=60.0 * np.random.default_rng(0).permutation(VISITS)
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
+    return columns_of(CAMPAIGN)
 
 
 def moved(campaign, sizes, rng):

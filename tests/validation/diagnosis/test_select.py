@@ -5,14 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assembly.measurement.predict import with_second_order
-from tests.bar_for_tests import BEAM, LENGTH, along, bar
-from validation.diagnosis.columns import Columns
-from validation.diagnosis.derivatives import Derivatives
+from tests.bar_for_tests import BEAM, LENGTH, along, bar, columns_of
 from validation.diagnosis.elements import Dense
 from validation.diagnosis.search import Search
 from validation.diagnosis.select import select
-from validation.diagnosis.signatures import conditions_of
 from validation.diagnosis.weighted_readings import WeightedReadings
 
 ROWS = 40
@@ -24,7 +20,7 @@ ACROSS = np.cross([0, 0, 1], along(CAMPAIGN))
 
 @pytest.fixture(scope="module")
 def columns():
-    return Columns(CAMPAIGN, Derivatives(with_second_order(conditions_of(CAMPAIGN))))
+    return columns_of(CAMPAIGN)
 
 
 def turned(angle):
@@ -108,7 +104,7 @@ def test_places_seen_by_rounding_alone_are_excluded():
     measured = np.full((ROWS, 6), np.nan)
     measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
     campaign = replace(campaign, measured=measured)
-    known = Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
+    known = columns_of(campaign)
     assert (("drive", "rz", "screw"),) not in known.functions.places.names
     assert (("tip", "tx", "screw"),) in known.functions.places.names + [
         p for equal in known.functions.places.equal for p in equal
