@@ -57,13 +57,6 @@ def test_small_screws_are_derivatives_of_finite_motions(rng, size):
     assert np.linalg.norm(moved - screw[3:]) <= angle**2 * np.linalg.norm(point)
 
 
-def test_rotation_vectors_return(rng):
-    vectors = rng.normal(size=(2, 5, 3)) / 2
-    matrices = rotation_matrix(vectors)
-    assert matrices.shape == (2, 5, 3, 3)
-    np.testing.assert_allclose(rotation_vector(matrices), vectors, atol=1e-14)
-
-
 @pytest.mark.parametrize("angle", [1e-14, 1e-7, 1e-3, 0.5, 2.1, 3.1, np.pi - 1e-9])
 def test_rotations_are_those_of_scipy(rng, angle):
     """To rounding, in the matrix and relative to the angle."""

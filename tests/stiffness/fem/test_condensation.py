@@ -18,17 +18,6 @@ SIZE = np.array([0.05, 0.08, 0.2])
 CENTERS = np.array([[0.02, 0.05, 0.01], [0.03, 0.02, 0.23]])
 
 
-def test_a_screw_moves_a_point_by_its_shift_and_its_turn_about_the_centre(rng):
-    points, center, screw = (
-        rng.normal(size=(5, 3)),
-        rng.normal(size=3),
-        rng.normal(size=6),
-    )
-    moved = rigid_motions(points, center) @ screw
-    expected = screw[3:] + np.cross(screw[:3], points - center)
-    np.testing.assert_allclose(moved, expected, atol=1e-14)
-
-
 @pytest.mark.parametrize("order", [2, 3])
 def test_the_mean_motion_of_an_interface_is_the_nearest_rigid_one_over_its_area(
     rng, order

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from stiffness.fem.elements import isoparametric
-from stiffness.mesh.lagrange import lattice, numbered, shape_functions
-from stiffness.mesh.solid import Solid
-from tests.solids_for_tests import bar_solid, box_solid
+from stiffness.mesh.lagrange import lattice, shape_functions
+from tests.solids_for_tests import box_solid
 
 ORDERS = (1, 2, 3)
 CORNERS = (3, 4)
@@ -54,20 +53,6 @@ def test_derivatives_are_those_of_central_differences(rng, degree, corners):
         np.testing.assert_allclose(dN[:, :, k - 1], difference, atol=1e-8)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_elements_share_the_nodes_of_what_they_share_and_no_others(order):
-    """Any two elements with k common corners: a lattice of k corners in common."""
-    cells = np.sort(box_solid((2, 2, 1), (1.0, 1.0, 1.0)).cells, axis=1)
-    numbers, count = numbered(cells, order)
-    assert set(numbers.ravel()) == set(range(count))
-    np.testing.assert_array_equal(numbers[:, :4], cells)
-    for i in range(len(cells)):
-        for j in range(i):
-            common = len(np.intersect1d(cells[i], cells[j]))
-            expected = len(lattice(order, common)) if common else 0
-            assert len(np.intersect1d(numbers[i], numbers[j])) == expected
-
-
 @pytest.mark.parametrize("order", [2, 3])
 def test_a_shared_node_has_one_place(order):
     """Every element computes the same place for it, in any order; and the
@@ -78,18 +63,3 @@ def test_a_shared_node_has_one_place(order):
     corners = np.sort(solid.cells, axis=1)
     own = np.einsum("nk,tkx->tnx", lattice(order) / order, solid.points[corners])
     np.testing.assert_allclose(mesh.nodes[mesh.cells], own, atol=1e-15)
-
-
-def test_the_numbers_of_the_corners_do_not_matter(rng):
-    """Renumbered corners give the same places, in other orders."""
-    solid = bar_solid(1, 2, 0.02, 0.06)
-    name = rng.permutation(len(solid.points))
-    points = np.empty_like(solid.points)
-    points[name] = solid.points
-    other = Solid(
-        points, name[solid.cells], name[solid.faces], solid.patch, solid.shapes
-    )
-    one, two = (isoparametric(s, 3) for s in (solid, other))
-    assert len(one.nodes) == len(two.nodes)
-    gap = np.linalg.norm(one.nodes[:, None] - two.nodes[None], axis=2).min(axis=1)
-    assert gap.max() < 1e-12
