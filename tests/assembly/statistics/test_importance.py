@@ -7,7 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment
@@ -22,6 +22,7 @@ from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.summary import summarise, summary_text
+from tests.tolerances_for_tests import arm, rigid_pair
 
 
 def test_ishigamis_function_has_its_known_indices():
@@ -115,15 +116,6 @@ def test_without_play_the_closed_form_holds():
     np.testing.assert_allclose(found.variance, spread, rtol=0.1)
 
 
-def test_a_result_that_does_not_vary_has_no_indices():
-    found = sobol_importance(
-        lambda x: np.ones((len(x), 1)),
-        lambda stream, k: np.random.default_rng(stream).random((k, 2)),
-        [("a", np.array([0])), ("b", np.array([1]))], 100,
-    )  # fmt: skip
-    assert np.isnan(found.first).all()
-
-
 def failing(x, share):
     """A sum; no answer where the last number, which it does not use, is small."""
     value = 2 * x[:, 0] + x[:, 1]
@@ -163,13 +155,6 @@ def test_intervals_are_as_wide_as_their_confidence(rng):
         assert widths[1] / widths[0] == pytest.approx(1.960 / 0.674, rel=0.1)
 
 
-def test_where_many_draws_fail_there_are_no_indices_and_a_reason():
-    found = sobol_importance(lambda x: failing(x, 0.3), three, THREE, 500)
-    assert np.isnan(found.first).all()
-    assert np.isnan(found.total).all()
-    assert (found.failed > 0.4).all()
-
-
 @pytest.fixture(scope="module")
 def stiff():
     """Two springs 9e6 and 1e6 N/m hold a platform: it follows errors by 0.9 and 0.1."""
@@ -205,11 +190,7 @@ def test_random_play_is_not_taken_for_importance():
 
     One um for each um whatever is assumed of it; alone it moves the tip by up to 100.
     """
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=1e-4)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
+    robot = arm(radial=1e-4)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
     for play in CLEARANCE_MODELS:
         experiment = Experiment(
@@ -225,13 +206,9 @@ def test_random_play_is_not_taken_for_importance():
 
 
 @pytest.mark.slow
-def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices(stiff):
+def test_a_robot_that_often_cannot_be_assembled_says_why_it_has_no_indices():
     """Rigid parts that meet within clearances of 0.1 mm: errors of 0.3 may not."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], clearance=Clearance(radial=1e-4)),
-        Frame("two", translation=[0.5, 0, 0]),
-    )
-    robot = Robot("rigid", "one", frames, (("one", "two"),))
+    robot = rigid_pair(radial=1e-4)
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     data = run_draws(Experiment(home_posture(robot), sources), 200,
                      importance=ImportanceOptions(100, "source"))  # fmt: skip
@@ -263,20 +240,6 @@ def test_groups_by_kind_join_the_legs():
     assert [len(c) for _, c in source_groups(sources, "frame")] == [2] * 4
     with pytest.raises(ValueError, match="by is 'leg'"):
         source_groups(sources, "leg")
-
-
-def test_intervals_are_of_95_per_cent_unless_asked_otherwise(stiff):
-    tables = [
-        run_draws(stiff, 4, importance=options)["total_index"]
-        for options in (
-            ImportanceOptions(64),
-            ImportanceOptions(64, "kind", 0.95),
-            ImportanceOptions(64, "kind", 0.5),
-        )
-    ]
-    widths = [t.sel(estimate="upper") - t.sel(estimate="lower") for t in tables]
-    assert tables[0].equals(tables[1])
-    assert float(widths[2].sum()) < float(widths[0].sum())
 
 
 def test_shares_of_linear_results_are_their_squared_slopes_times_variances(stiff):

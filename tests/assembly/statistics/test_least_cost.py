@@ -108,9 +108,3 @@ def test_squares_that_add_up_cost_least_by_cube_roots(weights):
     t, _ = least_cost(Norm([weights]), CORNERS, np.array([1.0, 1.0]), silent)
     assert np.sqrt(squares @ t**2) == pytest.approx(1.0, rel=1.1e-3)
     assert (COSTS / t).sum() == pytest.approx((COSTS / best).sum(), rel=3e-3)
-
-
-def test_logarithms_share_a_sum_by_the_costs_themselves():
-    requirement = Sums([[2.0, 3.0, 5.0]], cost="logarithm")
-    t, _ = least_cost(requirement, CORNERS, np.array([1.0, 1.0]), silent)
-    np.testing.assert_allclose(t, COSTS / 5 / [2.0, 8.0], rtol=0.03)

@@ -60,33 +60,6 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
 
 
-def test_a_draw_is_what_one_solve_says(experiment):
-    data = run_draws(experiment, 5)
-    robot, sources = experiment.posture.robot, experiment.sources
-    values = sources.draw(0, 5, experiment.seed)
-    for i, errors in enumerate(sources.errors(values)):
-        posture = replace(experiment.posture, robot=robot.with_errors(errors))
-        answer = solve_assembly(posture)
-        one = data.isel(draw=i)
-        allowed = 2e-8 * answer.energy + 2e-12 * answer.energy_without_clearance
-        assert float(one["energy"]) == pytest.approx(answer.energy, abs=allowed)
-        if answer.energy > 1e-6 * answer.energy_without_clearance:
-            sizes = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
-            assert float(one["force"]) == pytest.approx(sizes.max(), rel=1e-3)
-            stress = peak_stresses(robot, answer.wrenches)
-            np.testing.assert_allclose(one["stress"], stress, rtol=1e-2)
-
-
-@pytest.mark.parametrize("model", ["least", "contact"])
-def test_pose_errors_of_a_draw_are_the_sizes_of_its_screw(experiment, model):
-    data = run_draws(replace(experiment, clearance_model=model), 4)
-    screw = data["platform_screw"].values
-    for k, name in enumerate(("rotation", "translation")):
-        sizes = np.sqrt((screw[:, 3 * k : 3 * k + 3] ** 2).sum(axis=1))
-        assert sizes.max() > 0
-        np.testing.assert_allclose(data[name].values, sizes, rtol=1e-12)
-
-
 def test_a_run_that_was_killed_goes_on_and_ends_the_same(
     experiment, small_blocks, tmp_path
 ):
@@ -189,28 +162,6 @@ def test_another_seed_does_not_go_on_from_this_ones_journal(
     other = Experiment(experiment.posture, experiment.sources, seed=6)
     with pytest.raises(BadInput, match="seed"):
         run_draws(other, 300, path)
-
-
-def test_yields_and_limits_add_up(experiment):
-    data = run_draws(experiment, 400)
-    said = summarise(data, {"energy": 0.05, "rotation": 3e-3}, strength=1e6)
-    met = (
-        (data["energy"] <= 0.05) & (data["rotation"] <= 3e-3)
-        & (data["stress"].max("link") <= 1e6)
-    )  # fmt: skip
-    assert said["within_limits"]["probability"] == float(met.mean())
-    free = said["assembles"]["rigid_compliant_free"]["probability"]
-    # where it goes together by clearance alone it does so without energy
-    assert float((data["energy"] <= 1e-12).mean()) <= free
-    assert said["assembles"]["forced"]["probability"] == 1.0
-    with pytest.raises(BadInput, match="limit torque"):
-        summarise(data, {"torque": 1.0})
-
-
-@pytest.mark.parametrize("text", ["energy", "energy=-1", "enrgy=2", "energy=nan"])
-def test_limits_that_are_none_are_refused(text):
-    with pytest.raises(BadInput, match="--limit"):
-        parse_limit(text)
 
 
 @pytest.mark.slow

@@ -69,17 +69,6 @@ def test_slopes_of_a_utilisation_are_those_of_its_quantity_over_its_limit(requir
         np.testing.assert_allclose(found, slope * np.array([[1, -1], [-1, 1]]), 1e-6)
 
 
-def test_the_worst_corner_of_a_posture_is_that_of_tolerances_added(requirement):
-    """Tolerances of 2 and 3 plays let the bars miss each other by 5."""
-    corners = np.array([[1.0, 1.0], [1.0, -1.0]])
-    t = np.array([2.0, 3.0]) * PLAY
-    for i in (0, 1):
-        corner = requirement.worst_corner("force", i, t, corners)
-        assert corner.value == pytest.approx(K[i] / 2 * 4 * PLAY, rel=1e-6)
-        assert corner.signs.prod() == -1
-        np.testing.assert_allclose(np.abs(corner.slopes), K[i] / 2, rtol=1e-6)
-
-
 def test_what_does_not_close_exceeds_every_limit():
     """Rigid parts without play: only equal errors of both fit."""
     frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))

@@ -45,33 +45,6 @@ def test_without_clearances_errors_times_slopes_are_the_quantity(stiff, key, pla
     np.testing.assert_allclose(same, -degree * slopes, atol=1e-5 * scale)
 
 
-@pytest.mark.parametrize("key", QUANTITIES)
-def test_slopes_without_clearances_are_quotients_of_differences(stiff, key):
-    """Along a random direction, a thousandth of the errors."""
-    prepared, sources, values = stiff
-    step = 1e-3 * sources.draw(9, 1, seed=3)
-    slopes = respond(prepared, sources, values, key)[1]
-    above, below = (
-        respond(prepared, sources, values + s, key)[0] for s in (step, -step)
-    )
-    along = (slopes * step).sum(axis=1)
-    scale = np.linalg.norm(slopes * step, axis=1)
-    np.testing.assert_allclose((above - below) / 2, along, atol=1e-3 * scale.max())
-
-
-def test_a_peak_stress_is_its_slopes_times_the_wrench(rng):
-    """Euler again, for each wrench by itself; its size is no matter to the slopes."""
-    links = stressed_links(load_robot("irsbot2"))
-    wrenches = rng.normal(size=(8, 6)) * [1, 2, 3, 40, 50, 60]
-    for link in (links[0], links[-1]):
-        slopes, peak = _stress_slopes(link, wrenches), link.peak(wrenches)
-        np.testing.assert_allclose((slopes * wrenches).sum(axis=1), peak, rtol=1e-6)
-        scale = np.abs(slopes).max()
-        for size in (2.0, 1e-6):
-            same = _stress_slopes(link, size * wrenches)
-            np.testing.assert_allclose(same, slopes, atol=1e-5 * scale)
-
-
 def arm(play=PLAY):
     """An arm of 0.4 m whose pin has play, and errors of its tip."""
     frames = (
@@ -166,13 +139,3 @@ def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(compone
     size, slopes = respond(prepared, sources, values, "translation", "least")
     np.testing.assert_allclose(size, np.abs(values[:, 1]), rtol=1e-6)
     np.testing.assert_allclose(slopes, [[0, 1], [0, -1]], atol=1e-6)
-
-
-def test_a_margin_is_homogeneous_of_degree_one():
-    robot = load_robot("irsbot2")
-    sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
-    zone = prepare_margins(place_robot(robot, {"tx": 0.1, "tz": -0.5}), "free")
-    values = sources.draw(0, 4, seed=3)
-    margin, slopes = respond(zone, sources, values)
-    assert (margin > 0).all()
-    np.testing.assert_allclose((values * slopes).sum(axis=1), margin, rtol=1e-6)

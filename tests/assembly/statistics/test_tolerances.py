@@ -61,47 +61,6 @@ def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
     assert found.verification["verdict"] == "no draw failed"
 
 
-@pytest.mark.slow
-def test_an_allocation_that_was_killed_asks_again_and_ends_the_same(tmp_path):
-    """Killed at its 5th and 9th result; each is computed once, all in all."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
-                    asked_yield=0.9, draws=500)  # fmt: skip
-    postures, path = [place_robot(robot)], tmp_path / "t.nc"
-    whose, counted = identity_of(postures, plan, 50), []
-
-    class Killed(Exception):
-        pass
-
-    def counting(self, *given):
-        counted.append(len(given))
-        if len(counted) in {5, 9}:
-            raise Killed
-        return original(self, *given)
-
-    original = Requirement._quantities
-    plain = allocate(postures, plan, fresh=50)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Requirement, "_quantities", counting)
-        for _ in range(2):
-            with pytest.raises(Killed), journalled(path, whose) as replay:
-                allocate(postures, plan, fresh=50, replay=replay)
-            assert journal_path(path).exists()
-        with journalled(path, whose) as replay:
-            found = allocate(postures, plan, fresh=50, replay=replay)
-    with pytest.MonkeyPatch.context() as patch:
-        once = []
-        patch.setattr(
-            Requirement, "_quantities",
-            lambda self, *given: once.append(1) or original(self, *given),
-        )  # fmt: skip
-        allocate(postures, plan, fresh=50)
-    assert len(counted) == len(once) + 2
-    assert not journal_path(path).exists()
-    np.testing.assert_array_equal(found.tolerances, plain.tolerances)
-    assert found.verification == plain.verification
-
-
 def test_logarithmic_costs_share_the_play_by_the_costs_themselves():
     robot = two_bars()
     plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
@@ -240,14 +199,6 @@ def test_several_limits_of_every_kind_cost_no_more_than_scaling(several):
     assert np.isnan(found.price_bound)
     assert found.price <= found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
-
-
-def test_an_allocation_is_a_data_set_and_a_few_lines(several):
-    _, plan, found = several
-    data = found.to_xarray()
-    np.testing.assert_array_equal(data["tolerance"], found.tolerances)
-    assert list(data["class"].values) == list(plan.names)
-    assert all(len(repr(thing)) < 1000 for thing in (found, plan, plan.sources))
 
 
 @pytest.mark.slow

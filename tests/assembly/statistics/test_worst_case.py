@@ -182,11 +182,3 @@ def test_one_start_finds_the_worst_of_all_corners(key):
         (row,) = np.flatnonzero((every == corner.signs).all(axis=1))
         assert values[row] == pytest.approx(corner.value, rel=1e-6)
         np.testing.assert_allclose(corner.slopes, slopes[row], rtol=1e-4, atol=1e-3)
-
-
-def test_corners_are_signs_of_either_kind():
-    corners = random_corners(500, 3, 2)
-    assert set(np.unique(corners)) == {-1.0, 1.0}
-    assert np.abs(corners.mean(axis=0)).max() < 0.2
-    np.testing.assert_array_equal(corners, random_corners(500, 3, 2))
-    assert not np.array_equal(corners, random_corners(500, 3, 3))

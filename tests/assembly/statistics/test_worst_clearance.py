@@ -42,29 +42,6 @@ def papers(share, **options):
     return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
 
 
-def test_one_disc_of_play_adds_its_radius_along_the_error():
-    """The tip is off by e and a disc about it: hypot(|e_xy| + radius, e_z) at most."""
-    robot = chain()
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
-                            precision=(1e-9, 1e-9))  # fmt: skip
-    values = experiment.sources.draw(0, 50, seed=1)
-    rows = experiment.evaluate(values, range(50))
-    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
-    assert (rows["translation_lower"] <= worst * (1 + 1e-12)).all()
-    assert (rows["translation"] >= worst * (1 - 1e-12)).all()
-    np.testing.assert_allclose(rows["translation"], worst, atol=1.1e-9)
-    assert not rows["rotation"].any()
-
-
-def test_tilt_swings_the_tip_on_its_arm():
-    """Tilt b about y moves a tip at distance L along x by L b; no radial play."""
-    robot = chain(0.0, TILT)
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 0.0))
-    rows = experiment.evaluate(np.zeros((1, 0)), range(1))
-    assert rows["rotation"][0] == pytest.approx(TILT, abs=1e-6)
-    assert rows["translation"][0] == pytest.approx(ARM * TILT, abs=1e-6)
-
-
 def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
     """A disc p of play and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
 
@@ -169,38 +146,6 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
     assert share["least"] > 0.99
     assert share["worst"] == 0.0
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
-
-
-def test_of_draws_none_of_which_assemble_nothing_is_said():
-    """Rigid, without play: no error but zero can be closed."""
-    frames = (Frame("one", translation=[0.5, 0, 0]), Frame("two", "base", [0.5, 0, 0]))
-    robot = Robot("rigid", "one", frames, (("one", "two"),))
-    sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
-    said = summarise(run_draws(Experiment(home_posture(robot), sources), 20))
-    lines = summary_text(said).splitlines()
-    (last,) = [line for line in lines if "draws that assemble" in line]
-    assert last == "of the 0 of 20 draws that assemble: nothing to say"
-    assert sum("nothing to say" in line for line in lines) == 1
-    assert said["assembles"]["forced"]["probability"] == 0.0
-
-
-def test_draws_between_the_bounds_are_counted_as_undecided():
-    """Rough bounds: each draw is surely within, surely not, or said to be open."""
-    robot = chain()
-    experiment = Experiment(home_posture(robot), tip_errors(robot, 3e-4),
-                            margins=False, precision=(1e-6, 3e-5))  # fmt: skip
-    data, limit = run_draws(experiment, 400), 3e-4
-    said = summarise(data, {"translation": limit})
-    found, over = said["within_limits"], said["exceeds"]["translation"]
-    values = experiment.sources.draw(0, 400, 1)
-    worst = np.hypot(np.hypot(values[:, 0], values[:, 1]) + RADIAL, values[:, 2])
-    truth = float((worst <= limit).mean())
-    assert 0 < found["undecided"] < 200
-    assert found["probability"] <= truth <= 1 - over["probability"]
-    both = found["probability"] + over["probability"] + found["undecided"] / 400
-    assert both == pytest.approx(1.0)
-    assert found["lower"] < truth < found["upper"]
-    assert f"{found['undecided']} draws undecided" in summary_text(said)
 
 
 def test_a_load_that_takes_up_all_play_leaves_nothing_to_the_worst():
