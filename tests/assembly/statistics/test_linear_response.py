@@ -7,18 +7,13 @@ import pytest
 
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import CannotAssemble, solve_assembly
-from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
+from tests.tolerances_for_tests import drawn_errors
 
 ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod"]
-
-
-def some_errors(robot, scale=1.0, count=6):
-    sources = tolerance_sources(robot, scale * np.array([1e-3] * 3 + [1e-4] * 3))
-    return sources.errors(sources.draw(0, count, seed=4))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -27,7 +22,7 @@ def test_draws_agree_with_one_solve_at_a_time(name, scale):
     """Both certify 1e-8 of the energy, so wrenches agree to about its root, 1e-4."""
     robot = load_robot(name)
     posture = place_robot(robot)
-    errors = some_errors(robot, scale)
+    errors = drawn_errors(robot, scale)
     one = linear_response(posture)
     found = one.solve(errors)
     wrenches = found.wrenches
@@ -49,7 +44,7 @@ def test_where_no_play_is_left_screws_agree(rng):
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
     )
     posture = place_robot(robot)
-    errors = some_errors(robot)
+    errors = drawn_errors(robot)
     found = linear_response(posture).solve(errors)
     for i, own in enumerate(errors):
         answer = solve_assembly(replace(posture, robot=robot.with_errors(own)))

@@ -22,14 +22,10 @@ from assembly.statistics.monte_carlo import run_draws
 from forcefit.commands.assembly import app
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import random_robot
+from tests.tolerances_for_tests import drawn_errors
 
 LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]
 GRAVITY = [1.0, 2.0, -9.81]
-
-
-def some_errors(robot, count=8):
-    sources = tolerance_sources(robot, [4e-3] * 3 + [2e-4] * 3)
-    return sources.errors(sources.draw(0, count, seed=4))
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "five_bar", "3rrr", "hexapod", "arm6"])
@@ -38,7 +34,7 @@ def test_draws_under_load_agree_with_one_solve_at_a_time(name, gravity):
     """Both certify 1e-8 of the energy and 1e-12 of that without play."""
     robot = load_robot(name)
     posture = place_robot(robot)
-    errors = some_errors(robot)
+    errors = drawn_errors(robot, 4.0)
     one = linear_response(posture, LOAD, gravity)
     found = one.solve(errors)
     wrenches = found.wrenches
@@ -103,7 +99,7 @@ def test_play_that_is_left_does_no_work_on_the_load(play, load):
     """Else the least of energy minus work would have used it."""
     robot = load_robot("3rrr")
     one = linear_response(home_posture(robot), load)
-    found = one.solve(some_errors(robot) / 50)
+    found = one.solve(drawn_errors(robot, 4.0) / 50)
     generators = [draw_generator(1, d, 1) for d in range(8)]
     settled, mixed = position_clearances(one, found, play, generators)
     assert mixed.all()
@@ -149,7 +145,7 @@ def test_the_command_takes_load_and_gravity(tmp_path):
 def test_errors_drawn_replace_the_robots_own(load):
     """A robot with errors and one without: the same draws, the same answers."""
     robot = load_robot("irsbot2")
-    posture, errors = place_robot(robot), some_errors(robot, 2)
+    posture, errors = place_robot(robot), drawn_errors(robot, 4.0, 2)
     own = replace(posture, robot=robot.with_errors(0.5 * errors[::-1][0]))
     plain, other = (linear_response(p, load).solve(errors) for p in (posture, own))
     np.testing.assert_allclose(other.energy, plain.energy, rtol=1e-6)

@@ -18,9 +18,9 @@ from assembly.statistics.tolerances import (
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
 from tests.three_upu_for_tests import three_upu
-from tests.tolerances_for_tests import plan_for
+from tests.tolerances_for_tests import PLAY, plan_for
 
-K, PLAY = 1e6, 1e-4  # [N/m], [m]
+K = 1e6  # [N/m]
 
 
 def bars(play, errors):
@@ -90,14 +90,6 @@ def test_what_fits_by_clearance_alone_stores_no_energy_and_none_is_told_if_rigid
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
     assert within["assemblable_share"] == 1.0
-    # a margin of 1 but for rounding goes together
-    for gap, share in ((1 + 5e-7, 1.0), (1 + 2e-6, 0.0)):
-        assert (
-            present_errors([bars(PLAY, {"one": gap * PLAY})], "rigid")[
-                "assemblable_share"
-            ]
-            == share
-        )
     frames = (
         Frame("one", translation=[0.5, 0, 0], geometric_error=[0, 0, 0, 3e-4, 0, 0]),
         Frame("two", "base", [0.5, 0, 0]),

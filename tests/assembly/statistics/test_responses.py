@@ -7,15 +7,14 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import stressed_links
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
+from assembly.model.robot import Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.linear_response import linear_response
-from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.responses import _stress_slopes, respond
+from assembly.statistics.responses import respond
+from tests.tolerances_for_tests import PLAY, arm, rigid_pair
 
-PLAY, STIFFNESS = 1e-4, 1e6  # [m], [N/m]
+STIFFNESS = 1e6  # [N/m]
 QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
 
 
@@ -45,20 +44,16 @@ def test_without_clearances_errors_times_slopes_are_the_quantity(stiff, key, pla
     np.testing.assert_allclose(same, -degree * slopes, atol=1e-5 * scale)
 
 
-def arm(play=PLAY):
-    """An arm of 0.4 m whose pin has play, and errors of its tip."""
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=Clearance(radial=play)),
-        Frame("tip", "pin", [0.4, 0, 0]),
-    )
-    robot = Robot("arm", "tip", frames)
-    return home_posture(robot), tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3,
-                                                  ("tip",))  # fmt: skip
+def tip():
+    """An arm with clearance of its pin, and errors of its tip."""
+    robot = arm(radial=PLAY)
+    sources = tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3, ("tip",))
+    return home_posture(robot), sources
 
 
 def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
     """R = hypot(e_xy + p, e_z): dR/dx = (e_xy + p) x / (e_xy R), dR/dz = z / R."""
-    posture, sources = arm()
+    posture, sources = tip()
     values = sources.draw(0, 20, seed=1)
     size, slopes = respond(
         linear_response(posture), sources, values, "translation", "worst"
@@ -85,7 +80,7 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
 @pytest.mark.parametrize("key", ["rotation", "translation"])
 def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
     """Draw by draw; the slopes are the direction of the platform's error."""
-    posture, sources = arm()
+    posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
     rows = Experiment(
         posture, sources, seed=1, clearance_model=play, margins=False
@@ -125,12 +120,7 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
 @pytest.mark.parametrize("component", [3, 4])
 def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
     """Rigid parts: the pin's play takes up what the errors of its own side do."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0]),
-        Frame("two", "base", [0.5, 0, 0]),
-        Frame("end", "one", clearance=Clearance(radial=PLAY)),
-    )
-    robot = Robot("pin", "end", frames, (("end", "two"),))
+    robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY
     sources = tolerance_sources(robot, widths, ("one", "two"))

@@ -7,7 +7,7 @@ import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
+from assembly.model.robot import Clearance
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment, precision_for
@@ -16,19 +16,10 @@ from assembly.statistics.monte_carlo import run_draws
 from assembly.statistics.responses import respond
 from assembly.statistics.summary import summarise, summary_text
 from assembly.statistics.worst_clearance import bound_worst_errors
+from tests.tolerances_for_tests import ARM, arm
 
-ARM, RADIAL, TILT = 0.4, 1e-4, 2e-3
+RADIAL, TILT = 1e-4, 2e-3
 POSE = {"tx": 0.1, "tz": -0.5}
-
-
-def chain(radial=RADIAL, tilt=0.0):
-    """One driven joint with clearance, and an arm of 0.4 m across its axis."""
-    play = Clearance(radial=radial, tilt=tilt)
-    frames = (
-        Frame("pin", joint="revolute", actuated=True, clearance=play),
-        Frame("tip", "pin", [ARM, 0, 0]),
-    )
-    return Robot("arm", "tip", frames)
 
 
 def tip_errors(robot, size):
@@ -47,7 +38,7 @@ def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
 
     Beside errors e along x; a draw without an answer has no bounds.
     """
-    posture = home_posture(chain(RADIAL, TILT))
+    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared = linear_response(posture)
     errors = np.zeros((3, 2, 6))
     errors[:, 1, 3] = 0.0, 2e-4, 0.0
@@ -67,7 +58,7 @@ def test_the_screws_of_the_bounds_attain_them_part_by_part(rng):
 @pytest.mark.parametrize("part", [0, 1])
 def test_a_part_that_is_not_asked_for_is_not_less_than_the_solution_s(part):
     """Its bounds enclose the truth, however far apart they are."""
-    posture = home_posture(chain(RADIAL, TILT))
+    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared, errors = linear_response(posture), np.zeros((4, 2, 6))
     errors[:, 1] = np.linspace(1e-4, 4e-4, 4)[:, None] * [1, 0, 0, 1, 0, 0]
     draws = prepared.solve(errors)
@@ -150,7 +141,7 @@ def test_a_yield_of_all_draws_becomes_none_when_the_worst_play_counts():
 
 def test_a_load_that_takes_up_all_play_leaves_nothing_to_the_worst():
     """A weight pushes the pin to one side of its disc: sideways it may not move."""
-    robot = chain()
+    robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
     rows = Experiment(home_posture(robot), sources, load=load, margins=False).evaluate(
