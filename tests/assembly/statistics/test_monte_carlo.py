@@ -3,16 +3,12 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 
-import numpy as np
 import pytest
 import xarray
 
 from assembly.kinematics.posture import place_robot
-from assembly.linear.energy import solve_assembly
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.link_stress import peak_stresses
 from assembly.robots import load_robot
 from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
@@ -23,10 +19,7 @@ from assembly.statistics.plot import (
     histogram_figure,
     tornado_figure,
 )
-from assembly.statistics.quantities import parse_limit
-from assembly.statistics.summary import summarise
 from assembly.sweeps.sweep import journal_path
-from forcefit.inputs.table import BadInput
 
 ERRORS = """
 [[errors]]
@@ -55,61 +48,29 @@ def experiment():
     return Experiment(posture, sources, seed=5)
 
 
-@pytest.fixture
-def small_blocks(monkeypatch):
+@pytest.mark.parametrize("at", [60, 200])
+def test_a_run_that_was_killed_goes_on_and_ends_in_the_same_bytes(
+    experiment, monkeypatch, tmp_path, at
+):
+    """Killed among its 100 draws, and while importance is computed."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
-
-
-def test_a_run_that_was_killed_goes_on_and_ends_the_same(
-    experiment, small_blocks, tmp_path
-):
-    whole = run_draws(experiment, 300)
-    path = tmp_path / "draws.nc"
-
-    class Killed(Exception):
-        pass
-
-    def kill(done, total):
-        if done > 130:
-            raise Killed
-
-    with pytest.raises(Killed):
-        run_draws(experiment, 300, path, progress=kill)
-    assert not path.exists()
-    kept = journal_path(path).stat().st_size
-    seen = []
-    run_draws(experiment, 300, path, workers=2, progress=lambda d, n: seen.append(d))
-    assert seen[0] >= 130
-    assert kept > 0
-    assert not journal_path(path).exists()
-    with xarray.open_dataset(path, engine="h5netcdf") as found:
-        for name in whole:
-            np.testing.assert_array_equal(found[name], whole[name])
-
-
-def test_a_kill_while_importance_is_found_loses_no_draw(
-    experiment, small_blocks, tmp_path
-):
-    """The whole file, importance too, ends in the same bytes."""
     groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
     run_draws(experiment, 100, whole, importance=groups)
-    total = []
 
-    def kill(done, all_):
-        total.append(all_)
-        if done > 200:
+    def kill(done, total):
+        if done > at:
             raise RuntimeError
 
     with pytest.raises(RuntimeError):
         run_draws(experiment, 100, path, progress=kill, importance=groups)
-    assert total[0] > 200
     assert not path.exists()
     seen = []
-    run_draws(experiment, 100, path, progress=lambda d, n: seen.append(d),
-              importance=groups)  # fmt: skip
-    assert seen[0] > 200
+    run_draws(experiment, 100, path, workers=2, importance=groups,
+              progress=lambda done, total: seen.append(done))  # fmt: skip
+    assert seen[0] > at
     assert path.read_bytes() == whole.read_bytes()
+    assert not journal_path(path).exists()
 
 
 @pytest.mark.slow
@@ -146,22 +107,6 @@ def test_commands_killed_again_and_again_end_in_the_same_bytes(command, tmp_path
         if path.exists():  # killed once it was written, perhaps
             break
     assert path.read_bytes() == whole
-
-
-def test_another_seed_does_not_go_on_from_this_ones_journal(
-    experiment, small_blocks, tmp_path
-):
-    path = tmp_path / "draws.nc"
-
-    def kill(done, total):
-        if done:
-            raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        run_draws(experiment, 300, path, progress=kill)
-    other = Experiment(experiment.posture, experiment.sources, seed=6)
-    with pytest.raises(BadInput, match="seed"):
-        run_draws(other, 300, path)
 
 
 @pytest.mark.slow

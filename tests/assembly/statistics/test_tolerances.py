@@ -16,19 +16,14 @@ from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
 from assembly.statistics.linear_response import linear_response
 from assembly.statistics.posture_margins import prepare_margins
-from assembly.statistics.replay import journalled
-from assembly.statistics.requirement import Plan, Requirement
+from assembly.statistics.requirement import Plan
 from assembly.statistics.responses import respond
-from assembly.statistics.tolerances import (
-    identity_of,
-)
 from assembly.statistics.worst_case import (
     bound_energy,
     bound_margin,
     random_corners,
     worst_corner,
 )
-from assembly.sweeps.sweep import journal_path
 from forcefit.inputs.table import BadInput
 from tests.tolerances_for_tests import PLAY, plan_for
 

@@ -47,16 +47,13 @@ def test_the_diagnosis_is_that_of_the_textbook(length, correlation, rng):
 
 
 def test_chains_are_mixed_where_every_component_that_varies_is(rng):
-    """Criteria: an R-hat of 1.05 at most, 100 independent points at least."""
-    apart = 0.05 * np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
+    """Neither chains of correlated points, nor chains about different means."""
+    apart = np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
     slow = rng.normal(size=(4, 64))
     for t in range(1, 64):
         slow[:, t] += 0.6 * slow[:, t - 1]
     good = rng.normal(size=(4, 64))
-    assert diagnose(slow)[0] < 1.05 < diagnose(good + 20 * apart)[0]
-    assert diagnose(slow)[1] < 100 < diagnose(good)[1]
-    assert diagnose(good + 20 * apart)[1] < 256
-    for one, mixed in ((good, True), (slow, False), (good + 20 * apart, False)):
+    for one, mixed in ((good, True), (slow, False), (good + apart, False)):
         for size in (1.0, 1e-9):
             trace = np.zeros((4, 64, 6))
             trace[:, :, 0] = size * good
