@@ -3,7 +3,7 @@
 import numpy as np
 
 from assembly.model.error_distributions import tolerance_sources
-from assembly.model.robot import Clearance, Frame, Robot
+from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.statistics.requirement import Plan
 
 PLAY = 1e-4  # [m] radial clearance
@@ -28,6 +28,21 @@ def rigid_pair(**clearance):
         Frame("end", "one", clearance=Clearance(**clearance) if clearance else None),
     )
     return Robot("rigid", "end", frames, (("end", "two"),))
+
+
+def pairs_of_bars(stiffnesses, radial=None):
+    """Pairs of elastic bars that meet at (0.5, 0, 0), each by itself."""
+    frames, closures = [], []
+    for i, k in enumerate(stiffnesses):
+        link = MatrixLink(np.eye(6) * k)
+        clearance = None if radial is None else Clearance(radial=radial)
+        frames += [
+            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"two{i}", translation=[0.5, 0, 0], link=link),
+            Frame(f"joint{i}", f"one{i}", clearance=clearance),
+        ]
+        closures.append((f"joint{i}", f"two{i}"))
+    return Robot("pairs", "joint0", tuple(frames), tuple(closures))
 
 
 def silent(*_):

@@ -11,7 +11,6 @@ from assembly.linear.energy import solve_assembly
 from assembly.linear.pose_error import bound_pose_error
 from assembly.linear.zone import zone_margin
 from assembly.model.link_stress import peak_stresses
-from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from assembly.robots import load_robot
 from assembly.statistics.allocation import allocate
 from assembly.statistics.linear_response import linear_response
@@ -25,59 +24,46 @@ from assembly.statistics.worst_case import (
     worst_corner,
 )
 from forcefit.inputs.table import BadInput
-from tests.tolerances_for_tests import PLAY, plan_for
+from tests.robots_for_tests import coaxial_beams
+from tests.tolerances_for_tests import PLAY, pairs_of_bars, plan_for, rigid_pair
+
+ENDS = [("one", 3), ("two", 3)]
 
 
-def two_bars(stiffness=None):
-    """Bars from two walls that meet; play in the x-y plane, or springs instead."""
-    link = None if stiffness is None else MatrixLink(np.eye(6) * stiffness)
-    play = Clearance(radial=PLAY) if stiffness is None else None
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], link=link),
-        Frame("mount", translation=[1.0, 0, 0]),
-        Frame("two", "mount", [-0.5, 0, 0], link=link),
-        Frame("joint", "one", clearance=play),
-        Frame("end_one", "joint"),
-        Frame("end_two", "two"),
-    )
-    return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
+@pytest.mark.parametrize(
+    ("places", "costs", "cost", "expected"),
+    [
+        (ENDS, [1, 4], "reciprocal", np.array([1, 2]) / 3),
+        (ENDS, [1, 4], "logarithm", np.array([1, 4]) / 5),
+        ([("one", 3), ("two", 4)], [1, 1], "reciprocal", np.full(2, np.sqrt(0.5))),
+    ],
+    ids=["roots of costs", "costs", "right angles"],
+)
+def test_two_lengths_share_the_clearance_by_their_costs(places, costs, cost, expected):
+    """Minimise c1/t1 + c2/t2, or -c1 log t1 - c2 log t2, with t1 + t2 = clearance.
 
-
-def test_two_lengths_in_a_row_share_the_play_by_the_roots_of_their_costs():
-    """Minimise c1/t1 + c2/t2 with t1 + t2 = play: t_i = play sqrt(c_i) / sum sqrt."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0})
+    At right angles with equal costs t1^2 + t2^2 = clearance^2.
+    """
+    robot = rigid_pair(radial=PLAY)
+    plan = plan_for(robot, places, costs, {"margin": 1.0}, cost=cost)
     found = allocate([place_robot(robot)], plan, fresh=200)
-    np.testing.assert_allclose(found.tolerances, [PLAY / 3, 2 * PLAY / 3], rtol=2e-3)
-    assert found.price_bound <= found.price <= 1.002 * found.price_bound
+    np.testing.assert_allclose(found.tolerances, PLAY * expected, rtol=2e-3)
+    assert found.price_bound <= found.price
+    assert found.price - found.price_bound <= 2e-3 * abs(found.price_bound)
     assert found.worst["margin"][0] == pytest.approx(1.0, rel=1e-3)
-    assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
-    assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
     assert found.verification["verdict"] == "no draw failed"
-
-
-def test_logarithmic_costs_share_the_play_by_the_costs_themselves():
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 4], {"margin": 1.0},
-                    cost="logarithm")  # fmt: skip
-    found = allocate([place_robot(robot)], plan, fresh=0)
-    np.testing.assert_allclose(found.tolerances, [PLAY / 5, 4 * PLAY / 5], rtol=2e-3)
-
-
-def test_errors_at_right_angles_share_a_disc():
-    """t1^2 + t2^2 = play^2 with equal costs: play / sqrt(2) each."""
-    robot = two_bars()
-    plan = plan_for(robot, [("one", 3), ("two", 4)], [1, 1], {"margin": 1.0})
-    found = allocate([place_robot(robot)], plan, fresh=0)
-    np.testing.assert_allclose(found.tolerances, PLAY / np.sqrt(2), rtol=2e-3)
-    # play in proportion adds sizes of vectors, not components: t1 + t2 = sqrt(2) play
-    assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
+    if places == ENDS:
+        assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
+        assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
+    else:
+        # the bound adds sizes of vectors, not components: t1 + t2 = sqrt(2) clearance
+        assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
 
 
 def test_springs_in_a_row_share_the_energy():
     """1/2 (k/2) (t1 + t2)^2 = E, equal costs: sqrt(E / k) each."""
-    robot = two_bars(stiffness=1e6)
-    plan = plan_for(robot, [("one", 3), ("two", 3)], [1, 1], {"energy": 1e-3})
+    robot = coaxial_beams(np.zeros(6))
+    plan = plan_for(robot, ENDS, [1, 1], {"energy": 1e-3})
     found = allocate([place_robot(robot)], plan, fresh=0)
     np.testing.assert_allclose(found.tolerances, np.sqrt(1e-3 / 1e6), rtol=2e-3)
     lower, upper = found.worst["energy"]
@@ -91,7 +77,7 @@ def test_with_a_yield_a_single_error_may_leave_the_play_that_often():
 
     Of 20000 training draws so many may fail that a yield of 0.8 is held with 95 %.
     """
-    robot = two_bars()
+    robot = rigid_pair(radial=PLAY)
     plan = plan_for(robot, [("one", 3)], [1], {"margin": 1.0}, asked_yield=0.8,
                     draws=20_000)  # fmt: skip
     found = allocate([place_robot(robot)], plan, fresh=5000)
@@ -129,25 +115,6 @@ def test_the_worst_corner_is_found_and_bounded(paper, kind):
     assert respond(ready, sources, inside * t)[0].max() <= truth
 
 
-def springs_apart(stiffnesses, plays=None):
-    """Pairs of bars as in ``two_bars``, one pair beside the other, on one platform."""
-    plays = plays or [None] * len(stiffnesses)
-    frames, closures = [], []
-    for i, (k, play) in enumerate(zip(stiffnesses, plays, strict=True)):
-        link = MatrixLink(np.eye(6) * k)
-        clearance = None if play is None else Clearance(radial=play)
-        frames += [
-            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"mount{i}", translation=[1.0, 0, 0]),
-            Frame(f"two{i}", f"mount{i}", [-0.5, 0, 0], link=link),
-            Frame(f"joint{i}", f"one{i}", clearance=clearance),
-            Frame(f"end_one{i}", f"joint{i}"),
-            Frame(f"end_two{i}", f"two{i}"),
-        ]
-        closures.append((f"end_one{i}", f"end_two{i}"))
-    return Robot("apart", "end_one0", tuple(frames), tuple(closures))
-
-
 @pytest.mark.parametrize("play", [None, 1e-4])
 def test_a_force_is_shared_by_lagranges_multipliers(play):
     """Two springs k in a row carry (k/2) (t1 + t2 - play): at most F in each pair.
@@ -157,7 +124,7 @@ def test_a_force_is_shared_by_lagranges_multipliers(play):
     pairs of springs of 1e6 and 1e5 N/m then do not both reach the limit.
     """
     k, F, c = np.array([1e6, 1e5]), 50.0, np.array([1.0, 4.0, 1.0, 1.0])
-    robot = springs_apart(k, None if play is None else [play, play])
+    robot = pairs_of_bars(k, play)
     places = [("one0", 3), ("two0", 3), ("one1", 3), ("two1", 3)]
     plan = plan_for(robot, places, c, {"force": F}, draws=100)
     found = allocate([place_robot(robot)], plan, fresh=500)

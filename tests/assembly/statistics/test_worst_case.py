@@ -17,7 +17,7 @@ from assembly.statistics.worst_case import (
     worst_corner,
 )
 from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import PLAY, arm, plan_for, rigid_pair
+from tests.tolerances_for_tests import PLAY, arm, pairs_of_bars, plan_for, rigid_pair
 
 K = 1e6  # [N/m]
 PLACES = [("one", 3), ("two", 3), ("one", 4), ("two", 4)]
@@ -136,16 +136,7 @@ def test_play_of_one_pair_is_not_spent_on_another():
 
     Each takes its own play; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
     """
-    frames, closures = [], []
-    for i in (0, 1):
-        link = MatrixLink(np.eye(6) * K)
-        frames += [
-            Frame(f"one{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"two{i}", translation=[0.5, 0, 0], link=link),
-            Frame(f"joint{i}", f"one{i}", clearance=Clearance(radial=PLAY)),
-        ]
-        closures.append((f"joint{i}", f"two{i}"))
-    robot = Robot("pairs", "joint0", tuple(frames), tuple(closures))
+    robot = pairs_of_bars([K, K], PLAY)
     prepared = linear_response(home_posture(robot))
     sources = plan_for(robot, [("one0", 3), ("one1", 3)], [1, 1], {}).sources
     found = bound_energy(prepared, sources, np.array([1.5, 10.0]) * PLAY)
