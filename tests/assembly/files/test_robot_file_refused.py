@@ -288,10 +288,7 @@ CONTENTS = {
     "prose": (b"Dear all, the robot is", "not valid TOML: Expected '=' after a key in"),
     "lists in lists": (b"a = " + b"[" * 9999, "not valid TOML: nested too deeply"),
     "tables in tables": (b"a." * 50_000 + b"a = 1", "not valid TOML: nested too"),
-    "two values": (
-        b"a = 1\na = 2",
-        "not valid TOML: Cannot overwrite a value",
-    ),
+    "two values": (b"a = 1\na = 2", "not valid TOML: Cannot overwrite a value"),
     "a gigantic key": (
         b'"' + b"key" * 10**6 + b'" = 1\nplatform = "a"',
         "unknown key ",

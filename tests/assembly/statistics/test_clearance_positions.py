@@ -15,9 +15,7 @@ from assembly.statistics.clearance_positions import (
     position_clearances,
 )
 from assembly.statistics.linear_response import linear_response
-from assembly.statistics.uniform_clearance import (
-    sample_uniform_position,
-)
+from assembly.statistics.uniform_clearance import sample_uniform_position
 from tests.robots_for_tests import in_millimetres
 
 

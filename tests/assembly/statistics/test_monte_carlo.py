@@ -14,11 +14,7 @@ from assembly.statistics import monte_carlo
 from assembly.statistics.experiment import Experiment
 from assembly.statistics.importance_table import ImportanceOptions
 from assembly.statistics.monte_carlo import run_draws
-from assembly.statistics.plot import (
-    allocation_figure,
-    histogram_figure,
-    tornado_figure,
-)
+from assembly.statistics.plot import allocation_figure, histogram_figure, tornado_figure
 from assembly.sweeps.sweep import journal_path
 
 ERRORS = """

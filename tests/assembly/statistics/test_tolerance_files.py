@@ -12,11 +12,7 @@ from assembly.linear.zone import zone_margin
 from assembly.robots import load_robot
 from assembly.statistics import verification
 from assembly.statistics.tolerance_file import read_plan
-from assembly.statistics.tolerances import (
-    grid_postures,
-    present_errors,
-    present_text,
-)
+from assembly.statistics.tolerances import grid_postures, present_errors, present_text
 from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
