@@ -13,7 +13,6 @@ import pytest
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
 from assembly.sweeps.cluster import cluster_solver, solve_task
-from assembly.sweeps.identity import question_hash
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import run_sweep
@@ -30,18 +29,6 @@ def drawn_sweep(grid):
     sources = tolerance_sources(robot, np.array([1e-2] * 3 + [1e-3] * 3))
     question = Question(robot, None, (), targets.names, sources, 7)
     return Sweep(question, targets, (), 3, block_size=32)
-
-
-def test_a_task_is_its_blocks():
-    """What a worker does, without one."""
-    import pickle
-
-    sweep = drawn_sweep("tx=0:0.02:0.01,ty=0.12:0.14:0.01")
-    question = pickle.dumps(sweep.question), question_hash(sweep.question)
-    seconds, found = solve_task(*question, [(0, sweep.points(0))])
-    assert seconds > 0
-    assert found[0][0] == 0
-    assert np.isfinite(found[0][1].records["energy"]).all()
 
 
 def test_a_worker_with_another_question_refuses_it():
@@ -70,18 +57,6 @@ def test_workers_with_other_sources_are_refused():
         cluster._check_workers(Client(program_sha256=64 * "0"))
     # another commit of the same sources
     cluster._check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
-
-
-def test_draws_do_not_depend_on_who_makes_them():
-    """Draw 2 of posture 5 is draw 2 of posture 0, in whatever block it falls."""
-    from assembly.sweeps.points import solve_points
-
-    sweep = drawn_sweep("tx=0,ty=0.13")
-    many = drawn_sweep("tx=-0.02:0.02:0.01,ty=0.13")
-    one = solve_points(sweep.question, sweep.points(0)).records
-    all_ = solve_points(many.question, many.points(0)).records
-    assert (all_["energy"][6:9] == one["energy"]).all()  # tx = 0 is the third posture
-    assert len(set(one["energy"].tolist())) == 3
 
 
 @pytest.mark.slow

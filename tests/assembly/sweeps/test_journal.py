@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from assembly.robots import load_robot
-from assembly.sweeps.dataset import slabs
 from assembly.sweeps.journal import open_journal
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question, record_type
@@ -66,15 +65,6 @@ def go_on(sweep, folder, journal):
     return path.read_bytes(), solved
 
 
-def test_a_journal_holds_each_block_as_soon_as_it_is_finished(whole, tmp_path):
-    sweep, _, kept = whole
-    assert list(kept) == [0, 4, 8, 12, 15]
-    for blocks, journal in enumerate(kept.values()):
-        path = tmp_path / "map.nc.journal"
-        path.write_bytes(journal)
-        assert kept_blocks(sweep, path) == list(range(blocks))
-
-
 def test_a_journal_cut_anywhere_loses_no_block_before_the_cut(whole, tmp_path):
     """Every byte of the file is a place where a power failure may cut it."""
     sweep, _, kept = whole
@@ -95,14 +85,6 @@ def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path
     found, solved = go_on(sweep, tmp_path, torn)
     assert found == expected
     assert solved == list(range(-(-done // 4), 4))
-
-
-def test_a_damaged_record_is_solved_again(whole, tmp_path):
-    sweep, expected, kept = whole
-    spoilt = bytearray(kept[15])
-    spoilt[len(kept[8]) + 100] ^= 1
-    found, solved = go_on(sweep, tmp_path, bytes(spoilt))
-    assert (found, solved) == (expected, [2])
 
 
 def test_whatever_bit_of_a_journal_is_flipped_only_its_record_is_solved_again(
@@ -235,18 +217,6 @@ def test_blocks_may_come_in_any_order(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_the_file_is_what_memory_holds(whole, tmp_path):
-    import xarray
-
-    sweep, content, _ = whole
-    (tmp_path / "map.nc").write_bytes(content)
-    with xarray.open_dataset(tmp_path / "map.nc") as data:
-        xarray.testing.assert_equal(data, sweep_in_memory(sweep))
-        assert data.attrs["robot_sha256"] == sweep.provenance["robot_sha256"]
-        assert data.margin.attrs["units"] == "1"
-        assert data.singular_distance.dims == ("tx", "ty", "kind")
-
-
 @pytest.mark.parametrize(
     ("other", "message"),
     [
@@ -265,18 +235,6 @@ def test_a_journal_of_another_sweep_is_refused(whole, tmp_path, other, message):
     assert str(error.value).startswith(f"{path}: journal of another sweep: found ")
     assert message in str(error.value)
     assert path.read_bytes() == kept[8]
-
-
-@pytest.mark.parametrize("shape", [(7,), (3, 4), (2, 3, 4), (2, 1, 5, 3), (4, 1, 1)])
-def test_slabs_hold_consecutive_points_in_their_order(shape):
-    """All stretches of all lengths: the boxes, read one after the other, are them."""
-    numbers = np.arange(int(np.prod(shape))).reshape(shape)
-    for first in range(numbers.size):
-        for last in range(first + 1, numbers.size + 1):
-            boxes = list(slabs(shape, first, last))
-            found = np.concatenate([numbers[box].ravel() for box in boxes])
-            assert found.tolist() == list(range(first, last))
-            assert len(boxes) <= 2 * len(shape) - 1
 
 
 def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
@@ -301,15 +259,6 @@ def test_block_size_changes_no_number():
     other = sweep_in_memory(replace(small, block_size=15))
     assert one.identical(other)
     assert np.isfinite(one.rotation_error_clearance).any()
-
-
-@pytest.mark.slow
-def test_commands_stopped_at_random_moments_lose_nothing():
-    """The benchmark does hundreds; here some."""
-    kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
-    run = [*kills, "--seed", "5"]
-    done = subprocess.run(run, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
