@@ -96,6 +96,21 @@ REFUSED_LINKS = {
         "mass = 1.2", f"[[frame]]\nname = 'x'\nparent = 'base'\n{LINK}",
         'frame "x".link: found no distance from the parent; expected a '
         'translation, or a beam with "length" and "axis"'),
+    "no pieces": (
+        "poisson = 0.3 }", "poisson = 0.3, pieces = 0 }",
+        'frame "coupler".link.pieces: found 0, expected a finite number >= 1'),
+    "too many pieces": (
+        "poisson = 0.3 }", "poisson = 0.3, pieces = 101 }",
+        'frame "coupler".link.pieces: found 101, expected a finite number >= 1'),
+    "half a piece": (
+        "poisson = 0.3 }", "poisson = 0.3, pieces = 2.5 }",
+        'frame "coupler".link.pieces: found 2.5, expected a whole number'),
+    "a word for pieces": (
+        "poisson = 0.3 }", "poisson = 0.3, pieces = 'a' }",
+        "frame \"coupler\".link.pieces: found 'a', expected a finite number"),
+    "pieces of a stiffness": (
+        LINK, f"link = {{ stiffness = {rows({})}, pieces = 4 }}",
+        'frame "coupler".link: unknown key "pieces"'),
     "a mesh without a surface": (
         BEAM, 'mesh = { base = "z=0", tip = "z=0.5" }',
         'frame "coupler".link.mesh.surface: missing; expected a string'),

@@ -174,6 +174,9 @@ REFUSED = {
         "spin = 3.0", "spin = inf",
         'frame "elbow".clearance.spin: found inf, expected a finite number >= 0 '
         "[rad]"),
+    "a clearance whose square is no number": (
+        "radial = 29e-6", "radial = 1e-200",
+        'frame "elbow".clearance.radial: found 1e-200, expected 0 or'),
     "a number for a clearance": (
         PLAY, "clearance = 1e-5",
         'frame "elbow".clearance: found 1e-05, expected a table'),

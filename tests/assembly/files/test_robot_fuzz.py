@@ -5,7 +5,6 @@ The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.p
 
 import math
 import tomllib
-from contextlib import suppress
 from copy import deepcopy
 
 import pytest
@@ -13,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from assembly.files.robot_file import read_robot
-from assembly.kinematics.posture import home_posture, place_robot
+from assembly.kinematics.posture import home_posture
 from forcefit.inputs.table import BadInput
 from tests.robot_files_for_tests import FOUR_BAR
 
@@ -155,18 +154,6 @@ def mangled_tables(draw):
 
 
 @st.composite
-def mangled_numbers(draw):
-    """A robot with some of its numbers changed to others of any size."""
-    data = deepcopy(draw(st.sampled_from(SEEDS)))
-    numbers = [p for p in places(data) if isinstance(at(data, p), float | int)]
-    for _ in range(draw(st.integers(1, 4))):
-        path = draw(st.sampled_from(numbers))
-        sizes = st.floats(-10, 10) | st.floats(-1e6, 1e6) | st.floats(-1e-9, 1e-9)
-        at(data, path[:-1])[path[-1]] = draw(sizes)
-    return data
-
-
-@st.composite
 def mangled_families(draw):
     """A robot whose frames were shuffled, with parents and names exchanged."""
     data = deepcopy(draw(st.sampled_from(SEEDS)))
@@ -187,24 +174,9 @@ def mangled_families(draw):
     return data
 
 
-@st.composite
-def mangled_text(draw):
-    """The bytes of a robot file, some of them removed, repeated or garbled."""
-    content = toml(draw(st.sampled_from(SEEDS))).encode()
-    for _ in range(draw(st.integers(1, 4))):
-        start = draw(st.integers(0, max(0, len(content) - 1)))
-        stop = start + draw(st.integers(0, 40))
-        piece = content[start:stop]
-        new = draw(
-            st.sampled_from([b"", piece * 2, b"\x00", b"\xff", b"\r", b"'", b"9", b"["])
-            | st.text("0123456789.-e_[]{}=#,'\" \n", max_size=6).map(str.encode)
-        )
-        content = content[:start] + new + content[stop:]
-    return content
-
-
-def assert_works_or_says_why(path):
+def assert_works_or_says_why(data, path):
     """Read and place; the only way out is one line that names the file."""
+    path.write_text(toml(data), encoding="utf-8")
     try:
         home_posture(read_robot(path))
     except BadInput as error:
@@ -218,35 +190,13 @@ def assert_works_or_says_why(path):
 @LIGHT
 @given(data=mangled_tables())
 def test_a_robot_with_odd_values_works_or_one_line_says_why(data, tmp_path):
-    path = tmp_path / "robot.toml"
-    path.write_text(toml(data), encoding="utf-8")
-    assert_works_or_says_why(path)
-
-
-@settings(LIGHT, max_examples=80)
-@given(data=mangled_numbers())
-def test_a_robot_with_other_numbers_is_placed_or_one_line_says_why(data, tmp_path):
-    path = tmp_path / "robot.toml"
-    path.write_text(toml(data), encoding="utf-8")
-    assert_works_or_says_why(path)
-    with suppress(BadInput):  # that of the file again, or out of reach
-        place_robot(read_robot(path), pose={"tx": 0.4, "rz": 0.1})
+    assert_works_or_says_why(data, tmp_path / "robot.toml")
 
 
 @LIGHT
 @given(data=mangled_families())
 def test_a_robot_with_exchanged_parents_works_or_one_line_says_why(data, tmp_path):
-    path = tmp_path / "robot.toml"
-    path.write_text(toml(data), encoding="utf-8")
-    assert_works_or_says_why(path)
-
-
-@LIGHT
-@given(content=mangled_text())
-def test_a_file_with_garbled_bytes_works_or_one_line_says_why(content, tmp_path):
-    path = tmp_path / "robot.toml"
-    path.write_bytes(content)
-    assert_works_or_says_why(path)
+    assert_works_or_says_why(data, tmp_path / "robot.toml")
 
 
 @pytest.mark.parametrize("data", SEEDS, ids=lambda d: d["name"])
