@@ -76,10 +76,6 @@ def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
     return robot.with_errors(errors)
 
 
-def test_the_home_pose_closes(robot):
-    assert home_posture(robot).mismatch < 1e-12
-
-
 def test_every_joint_plays_once(name, robot):
     playing = [f for f in robot.frames if f.clearance is not None]
     assert len(playing) == PLAYING[name]

@@ -143,17 +143,6 @@ def test_delta_platform_is_where_three_spheres_meet(rng):
         assert np.abs(posture.platform[:3, 3] - found).max() < 1e-10
 
 
-def test_delta_drive_angle_is_the_drives_coordinate(rng):
-    robot = BUILT_IN["delta"]()
-    for _ in range(5):
-        posture = place_robot(robot, pose=random_pose("delta", rng))
-        for azimuth, q in zip((-90, 30, 150), joints_of(posture).values(), strict=True):
-            found = drive_angle(
-                DeltaParameters(), math.radians(azimuth), posture.platform[:3, 3]
-            )
-            assert found == pytest.approx(q, abs=1e-11)
-
-
 def lower_meeting_point(centres, radius):
     """Of three equal spheres: below the circumcentre of their centres."""
     a, b = centres[1] - centres[0], centres[2] - centres[0]
