@@ -179,6 +179,9 @@ def test_other_files_are_included(tmp_path):
     mechanism = read_mjcf(path)
     assert mechanism.joints[1].parent == "a"
     assert compare(mechanism, path).difference < 1e-12
+    file_of(tmp_path, '<worldbody><include file="none.xml"/></worldbody>')
+    with pytest.raises(BadInput, match="none.xml: cannot be read"):
+        read_mjcf(path)
     file_of(tmp_path, '<worldbody><include file="robot.xml"/></worldbody>')
     with pytest.raises(BadInput, match="found files more than 10 deep"):
         read_mjcf(path)
@@ -279,46 +282,6 @@ def test_a_drive_on_a_follower_leads(tmp_path):
     robot = read_robot(tmp_path / "robot.toml")
     assert robot.frame("b").position == 0.5
     assert robot.frame("a").position == pytest.approx(0.2, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("<worldbody><composite/></worldbody>", "composite: found it; expected rigid"),
-        (
-            '<worldbody><replicate count="0.5"/></worldbody>',
-            "replicate.count: found 0.5, expected a whole number from 1",
-        ),
-        (
-            '<worldbody><body name="a">[M]</body><attach model="m"/></worldbody>',
-            'attach.model: found "m", no model asset',
-        ),
-        (
-            '<worldbody><frame name="f"/><attach frame="g" prefix="p"/></worldbody>',
-            'attach.frame: found "g", no frame of it',
-        ),
-        (
-            TWO + '<equality><weld body1="a" body2="a"/></equality>',
-            'weld: found "a" twice, expected two bodies',
-        ),
-        (
-            TWO + '<equality><joint joint1="j" joint2="j"/></equality>',
-            'joint "j": found that it follows itself',
-        ),
-        (TWO + '<equality><flex flex="c"/></equality>', "flex: found it"),
-        (
-            '<worldbody><site name="s" pos="0 0 0" fromto="0 0 0 1 0 0"/></worldbody>',
-            'site "s".fromto: expected two different points, and no pos',
-        ),
-        ('<worldbody><include file="none.xml"/></worldbody>', "none.xml: cannot be"),
-    ],
-)
-def test_what_cannot_be_converted_is_refused_by_name(run, text, message, tmp_path):
-    path = file_of(tmp_path, text)
-    status, out, err = run("convert", path, "-o", tmp_path / "out.toml")
-    assert (status, out) == (2, "")
-    assert message in err.splitlines()[-1]
-    assert not (tmp_path / "out.toml").exists()
 
 
 def test_tendons_and_their_drives_are_named(run, tmp_path):

@@ -5,7 +5,6 @@ import pytest
 
 from assembly.exchange.mechanism import WORLD, body_poses
 from assembly.exchange.sdf import read_sdf
-from forcefit.inputs.errors import BadInput
 
 ARM = """<link name="base"/><joint name="fix" type="fixed"><parent>world</parent>
 <child>base</child></joint>"""
@@ -222,35 +221,3 @@ def test_axes_follow_axes(tmp_path):
     mechanism = model(tmp_path, text)
     home = {one.name: one.position for one in mechanism.joints}
     assert (home["k"], home["l"]) == pytest.approx((0.3, 0.9))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            '<frame name="f" attached_to="base"/>' + joint("j", "f", "base"),
-            'joint "j".child: found "base", which is also its parent',
-        ),
-        (
-            '<link name="a"/>' + joint("j", "base", "a")
-            + "<drake:linear_bushing_rpy><drake:bushing_frameA name='base'/>"
-            "<drake:bushing_frameC name='a'/></drake:linear_bushing_rpy>",
-            'drake:linear_bushing_rpy: found it between "base" and "a": it may tie',
-        ),
-        (joint("j", "base", "frme") + '<frame name="frame"/>', 'did you mean "frame"?'),
-        (
-            "<include><uri>model://x</uri></include>",
-            'include.uri: found "model://x", no file or folder near this',
-        ),
-        (
-            '<link name="a"><inertial auto="true"/><collision name="c"><geometry>'
-            "<mesh/></geometry></collision></link>" + joint("j", "base", "a"),
-            "geometry: found mesh, of which no automatic inertia is made here",
-        ),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_converted_is_refused_by_name(text, message, tmp_path):
-    with pytest.raises(BadInput) as error:
-        model(tmp_path, ARM + text)
-    assert message in str(error.value)
-    assert "\n" not in str(error.value)
