@@ -92,6 +92,17 @@ KINDS = {
     "masses of a mesh": """<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
         </asset><worldbody><body name="a"><joint/><geom type="mesh" mesh="m"/></body>
         </worldbody>""",
+    "every way to place a body": """<compiler angle="degree" eulerseq="XYz"/><default>
+        <joint axis="0 1 0"/><default class="slides"><joint type="slide"/></default>
+        </default><worldbody><body name="a" pos="0.1 0.2 0.3" euler="10 20 30">[M]
+        <joint name="j1" pos="0.05 0 0.02" ref="15"/><joint name="j2" class="slides"
+        axis="1 2 0" pos="0 0.1 0"/><body name="b" axisangle="1 1 0 40" pos="0 0.3 0">
+        [M]<joint name="j3" axis="1 0 1" pos="-0.1 0 0"/><frame pos="0 0 0.2"
+        xyaxes="0 1 0 -1 0 0.2"><body name="c" zaxis="1 0 1" pos="0.1 0 0"
+        childclass="slides">[M]<joint name="j4"/><body name="d" quat="1 2 0 1">
+        <site name="s" pos="0 0 1"/></body></body></frame></body></body></worldbody>
+        <equality><connect name="c" body1="b" anchor="0.1 0.2 0.3"/>
+        <weld name="w" body1="d" body2="a"/></equality>""",
     "degrees": """<worldbody><body name="a" axisangle="1 2 3 40">[M]
         <joint name="j" ref="30"/></body></worldbody><keyframe>
         <key name="home" qpos="0.2"/></keyframe>""",

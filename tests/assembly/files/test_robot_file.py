@@ -294,7 +294,7 @@ def test_the_documentations_bearing_turns_freely_and_yields_as_its_data_sheet_sa
 ):
     """Radial 1.2e8 N/m, axial 6e7 N/m: under 60 N the hub moves by F/k, worked by hand.
 
-    Its play is taken up first; about its axis nothing resists.
+    Its clearance is taken up first; about its axis nothing resists.
     """
     text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
     example = text.split("```toml\n")[2].split("```")[0]

@@ -81,7 +81,7 @@ def test_hexapod_struts_carry_forces_along_themselves_only(rng):
 
 
 def assert_pose_error_is_of_64_corners(posture, lines, joints):
-    """(27) in closed form: six lines give by their joints' play along them.
+    """(27) in closed form: six lines give by their joints' clearance along them.
 
     The platform's errors are J^-1 of a box, the farthest at one of its corners.
     """

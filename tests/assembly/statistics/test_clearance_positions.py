@@ -153,7 +153,7 @@ def drawn():
 
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
-def test_play_changes_neither_energy_nor_bounds(drawn, play):
+def test_clearance_changes_neither_energy_nor_bounds(drawn, play):
     """Screws moved by clearances that leave every spring as it was."""
     one, found = drawn
     loaded = loaded_clearances(one, found)
@@ -182,7 +182,7 @@ def test_an_unknown_way_is_refused(drawn, play):
     assert str(error.value).endswith("expected one of ('uniform', 'contact', 'least')")
 
 
-def test_contact_play_knows_no_unit_of_length():
+def test_contact_clearance_knows_no_unit_of_length():
     """The same random pushes in metres and in millimetres: the same positions."""
     robot = load_robot("3rrr")
     frames = (replace(f, link=None, joint_stiffness=None) for f in robot.frames)

@@ -1,4 +1,4 @@
-"""Records of draws: two springs in a row, and an arm with play at its pin."""
+"""Records of draws: two springs in a row, and an arm with clearance at its pin."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ STIFFNESS = 1e6  # [N/m]
 
 
 def springs(clearance=PLAY, **options):
-    """Two bars of 0.5 m that meet on the x axis, with play between them."""
+    """Two bars of 0.5 m that meet on the x axis, with clearance between them."""
     play = Clearance(radial=clearance)
     robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
     sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
@@ -37,7 +37,7 @@ def tip(**options):
 
 
 def test_pressed_springs_carry_one_force_and_its_moment_at_the_mount():
-    """Beyond the play p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half a metre of it.
+    """Beyond the clearance p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half of that.
 
     Margins are d/p in both readings, as no joint is compliant; nothing is short of
     the least energy by more than rounding.
@@ -80,7 +80,7 @@ def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
 
 
 def test_what_does_not_close_has_a_status_and_no_numbers():
-    """Rigid parts without play fit where both errors are equal."""
+    """Rigid parts without clearance fit where both errors are equal."""
     robot = rigid_pair()
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     rows = Experiment(home_posture(robot), sources, margins=False).evaluate(
@@ -116,7 +116,7 @@ def test_a_pose_error_is_the_size_of_its_part_of_the_screw(model):
 
 
 def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
-    """An error e about x and play: rotation |e|, and hypot(e_xy + p, e_z)."""
+    """An error e about x and clearance: rotation |e|, and hypot(e_xy + p, e_z)."""
     experiment = tip(precision=(1e-8, 1e-7))
     values = experiment.sources.draw(0, 30, seed=2)
     rows = experiment.evaluate(values, range(30))
@@ -129,7 +129,7 @@ def test_the_worst_pose_errors_have_bounds_of_the_precision_asked_for():
         assert (lower <= size * (1 + 1e-12)).all()
         assert (size <= upper * (1 + 1e-12)).all()
         assert (upper - lower).max() <= 1.001 * width
-    # beside them the screw is that of the solution, which leaves the play alone
+    # beside them the screw is that of the solution, which leaves the clearance alone
     np.testing.assert_allclose(rows["platform_screw"][:, 3:], values[:, 1:], atol=1e-12)
 
 

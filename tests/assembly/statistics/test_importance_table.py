@@ -30,7 +30,7 @@ def arm(**options):
 
 
 def solved(by="source", draws=400, **options):
-    """The data set of an arm without play, and its plain values."""
+    """The data set of an arm without clearance, and its plain values."""
     experiment = arm(clearance_model="least", **options)
     design = importance_design(experiment, ImportanceOptions(draws, by))
     rows = importance_rows(experiment, design, 0, len(design))

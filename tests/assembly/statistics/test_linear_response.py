@@ -37,7 +37,7 @@ def test_draws_agree_with_one_solve_at_a_time(name, scale):
             assert off <= 3e-4 * size
 
 
-def test_where_no_play_is_left_screws_agree(rng):
+def test_where_no_clearance_is_left_screws_agree(rng):
     """Without clearances the answer is unique and linear: only rounding is allowed."""
     robot = load_robot("irsbot2")
     robot = replace(
@@ -81,7 +81,7 @@ def test_errors_of_another_shape_are_refused():
 
 
 def test_a_joint_at_the_end_of_its_motion_carries_its_share_of_the_wrench():
-    """Robots whose passive joints have play only: the stop's wrench is the solver's."""
+    """Passive joints with clearance only: the stop's wrench is the solver's."""
     seen = 0
     for seed in (1, 4, 16, 24):
         robot = random_robot(np.random.default_rng(seed))

@@ -31,7 +31,7 @@ GRAVITY = [1.0, 2.0, -9.81]
 @pytest.mark.parametrize("name", ["irsbot2", "five_bar", "3rrr", "hexapod", "arm6"])
 @pytest.mark.parametrize("gravity", [None, GRAVITY])
 def test_draws_under_load_agree_with_one_solve_at_a_time(name, gravity):
-    """Both certify 1e-8 of the energy and 1e-12 of that without play."""
+    """Both certify 1e-8 of the energy and 1e-12 of that without clearance."""
     robot = load_robot(name)
     posture = place_robot(robot)
     errors = drawn_errors(robot, 4.0)
@@ -95,7 +95,7 @@ def test_a_cantilever_stores_f2_l3_over_6ei_whatever_its_errors():
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
 @pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -1], [0, 0, 0, 1, 0, 0]])
-def test_play_that_is_left_does_no_work_on_the_load(play, load):
+def test_clearance_that_is_left_does_no_work_on_the_load(play, load):
     """Else the least of energy minus work would have used it."""
     robot = load_robot("3rrr")
     one = linear_response(home_posture(robot), load)

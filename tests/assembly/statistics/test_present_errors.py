@@ -1,4 +1,4 @@
-"""The errors that a robot has, at several postures: bars in a row with play."""
+"""The errors that a robot has, at several postures: bars in a row with clearance."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ K = 1e6  # [N/m]
 
 
 def bars(play, errors):
-    """Two bars that meet with play, whose ends are off by some lengths along x."""
+    """Two bars that meet with clearance, whose ends are off by some lengths along x."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(radial=play))
     delta = np.zeros((len(robot.frames), 6))
     for name, length in errors.items():
@@ -35,11 +35,11 @@ def bars(play, errors):
 ERRORS = {"one": 3 * PLAY, "two": -1 * PLAY, "mount": 0.5 * PLAY}
 
 
-def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_play():
-    """A gap of 3 + 1 - 0.5 plays; at the other posture the play is four times wider.
+def test_the_tightest_posture_tells_how_much_each_error_takes_of_its_clearance():
+    """A gap of 3 + 1 - 0.5 clearances; at the other posture they are four times wider.
 
     The errors that open the gap have 3 / 3.5 and 1 / 3.5 of it, the other less than
-    none; the springs are pressed by 2.5 plays.
+    none; the springs are pressed by 2.5 clearances.
     """
     seen = []
     postures = [bars(4 * PLAY, ERRORS), bars(PLAY, ERRORS), bars(2 * PLAY, {})]

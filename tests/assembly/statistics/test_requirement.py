@@ -22,7 +22,7 @@ LIMITS = {"margin": 2.0, "energy": 1e-3, "force": 50.0}
 
 
 def springs(k, clearance=PLAY):
-    """Two bars that meet on the x axis, with play between them."""
+    """Two bars that meet on the x axis, with clearance between them."""
     play = None if clearance is None else Clearance(radial=clearance)
     return coaxial_beams(np.zeros(6), (k, k), clearance=play)
 
@@ -35,7 +35,7 @@ def requirement():
 
 
 def test_utilisations_are_quantities_over_limits_posture_by_posture(requirement, rng):
-    """Beyond the play p springs are pressed: d/p, k (d - p)^2 / 4, k (d - p) / 2."""
+    """Beyond the clearance p: d/p, k (d - p)^2 / 4, k (d - p) / 2."""
     values = rng.uniform(-4, 4, size=(530, 2)) * PLAY
     d = np.abs(values[:, 0] - values[:, 1])
     pressed = np.maximum(d - PLAY, 0.0)
@@ -49,7 +49,7 @@ def test_utilisations_are_quantities_over_limits_posture_by_posture(requirement,
 
 
 def test_slopes_of_a_utilisation_are_those_of_its_quantity_over_its_limit(requirement):
-    """At d = 3 plays: 1/p, k (d - p) / 2 and k / 2, of either sign."""
+    """At d = 3 clearances: 1/p, k (d - p) / 2 and k / 2, of either sign."""
     values = np.array([[2.0, -1.0], [-1.0, 2.0]]) * PLAY
     for case, (key, i) in enumerate(requirement.cases):
         slope = {
@@ -60,7 +60,7 @@ def test_slopes_of_a_utilisation_are_those_of_its_quantity_over_its_limit(requir
 
 
 def test_what_does_not_close_exceeds_every_limit():
-    """Rigid parts without play: only equal errors of both fit."""
+    """Rigid parts without clearance: only equal errors of both fit."""
     robot = rigid_pair()
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1.0, "force": 1.0})
     requirement = Requirement([home_posture(robot)], plan)
@@ -68,8 +68,8 @@ def test_what_does_not_close_exceeds_every_limit():
         np.testing.assert_array_equal(np.isinf(found), [[False, True]] * 2)
 
 
-def test_draws_of_random_play_are_the_same_in_one_batch_and_in_several():
-    """The play of draw 515 is its own, whatever is solved with it."""
+def test_draws_of_random_clearance_are_the_same_in_one_batch_and_in_several():
+    """The clearance of draw 515 is its own, whatever is solved with it."""
     posture = home_posture(arm(radial=PLAY))
     plan = plan_for(posture.robot, [("tip", 3)], [1], {"translation": 1e-3},
                     clearance_model="contact")  # fmt: skip
@@ -79,7 +79,7 @@ def test_draws_of_random_play_are_the_same_in_one_batch_and_in_several():
         values, range(516)
     )
     np.testing.assert_allclose(found[0], rows["translation"] / 1e-3, rtol=1e-9)
-    # play of 0.1 mm beside an error of 1 mm
+    # clearance of 0.1 mm beside an error of 1 mm
     assert np.ptp(found[0, -8:] - np.abs(values[-8:, 0]) / 1e-3) > 0.01
 
 
@@ -113,10 +113,10 @@ def test_a_limit_that_no_result_meets_is_refused_before_the_work():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_a_limit_within_the_play_of_perfect_parts_is_refused(
+def test_a_limit_within_the_clearance_of_perfect_parts_is_refused(
     limits, worst_play, refused
 ):
-    """Of two postures the one of more play is named; only where all play counts."""
+    """Of two postures that of more clearance is named; only where all of it counts."""
     postures = [home_posture(arm(radial=0.5 * PLAY)), home_posture(arm(radial=PLAY))]
     plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
                     clearance_model="worst" if worst_play else "least")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Quantities and their slopes: Euler's theorem, and an arm with play at its pin."""
+"""Quantities and their slopes: Euler's theorem, and an arm with clearance."""
 
 from dataclasses import replace
 
@@ -78,7 +78,7 @@ def test_the_largest_error_of_an_arm_has_the_slopes_of_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_random_play_of_a_response_is_that_of_the_first_experiment(play, key):
+def test_random_clearance_of_a_response_is_that_of_the_first_experiment(play, key):
     """Draw by draw; the slopes are the direction of the platform's error."""
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
@@ -119,7 +119,7 @@ def test_draws_without_an_answer_have_neither_a_quantity_nor_slopes():
 
 @pytest.mark.parametrize("component", [3, 4])
 def test_a_platform_beyond_a_pin_follows_the_part_that_it_is_closed_with(component):
-    """Rigid parts: the pin's play takes up what the errors of its own side do."""
+    """Rigid parts: the pin's clearance takes up what the errors of its own side do."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY

@@ -49,7 +49,7 @@ def test_a_jump_is_bracketed_from_within(start, within, beyond):
 
 
 def test_a_steep_law_with_an_end_is_met():
-    """Energy beyond a play of 1: (t - 1)^2 = 4 at 3, nothing at all below 1."""
+    """Energy beyond a clearance of 1: (t - 1)^2 = 4 at 3, nothing at all below 1."""
     for start in (1e-3, 0.5, 1.5, 40.0):
         known = Known(lambda size: np.maximum(size - 1.0, 0.0) ** 2 / 4)
         (found,) = scale_uniformly(known, ONE, np.array([start]))

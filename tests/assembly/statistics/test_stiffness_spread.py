@@ -34,9 +34,9 @@ def spring(row, stiffness):
 
 
 def test_a_bush_is_stiff_where_a_gap_presses_it_and_free_where_none_does():
-    """Two springs k that a gap e forces together through a play c: 2 k if e > c, or k.
+    """Two springs k that a gap forces together: 2 k if it exceeds the clearance, or k.
 
-    With e < c the platform hangs on its own spring alone: the other is within its play.
+    With less the platform hangs on its own spring alone.
     """
     k, c = 1e5, 1e-4
     frames = (

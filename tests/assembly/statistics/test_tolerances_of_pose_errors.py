@@ -66,7 +66,7 @@ def test_with_a_yield_pose_errors_add_up_as_squares():
     assert found.verification["verdict"] != "contradicted"
 
 
-def test_the_worst_play_takes_its_share_of_a_limit_on_the_pose():
+def test_the_worst_clearance_takes_its_share_of_a_limit_on_the_pose():
     """A serial arm: errors e and a clearance disc r reach e + r, so e <= limit - r."""
     robot = arm(radial=PLAY)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)

@@ -24,12 +24,12 @@ PLACES = [("one", 3), ("two", 3), ("one", 4), ("two", 4)]
 
 
 def bars(clearance=None):
-    """Bars in a row, springs alike in every direction, with or without play."""
+    """Bars in a row, springs alike in every direction, with or without clearance."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=clearance)
     return home_posture(robot), plan_for(robot, PLACES, [1] * 4, {}).sources
 
 
-def test_springs_without_play_are_worst_where_all_errors_add_up(rng):
+def test_springs_without_clearance_are_worst_where_all_errors_add_up(rng):
     """k ((t1 + t2)^2 + (t3 + t4)^2) / 4, and the bound is no more than that at least.
 
     The bound adds up sizes: k (t1 + t2 + t3 + t4)^2 / 4.
@@ -47,8 +47,8 @@ def test_springs_without_play_are_worst_where_all_errors_add_up(rng):
 
 
 @pytest.mark.parametrize("directions", [1, 2])
-def test_play_along_all_errors_is_taken_from_their_sum(directions):
-    """In one direction k (t1 + t2 - p)^2 / 4; play as affine functions do no better."""
+def test_clearance_along_all_errors_is_taken_from_their_sum(directions):
+    """In one direction k (t1 + t2 - p)^2 / 4; affine clearances do no better."""
     posture, sources = bars(Clearance(radial=PLAY))
     prepared = linear_response(posture)
     t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
@@ -64,7 +64,7 @@ def test_play_along_all_errors_is_taken_from_their_sum(directions):
 
 
 def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
-    """hypot(t1 + t2, t3 + t4) / p; affine play reaches (t1 + t2 + t3 + t4) / p."""
+    """hypot(t1 + t2, t3 + t4) / p; affine clearance reaches (t1 + t2 + t3 + t4) / p."""
     posture, sources = bars(Clearance(radial=PLAY))
     zone, t = prepare_margins(posture, "rigid"), np.array([3.0, 2, 1, 4]) * PLAY
     corner = worst_corner(zone, sources, t, random_corners(4, 4))
@@ -73,8 +73,8 @@ def test_a_margin_is_worst_and_bounded_by_sums_along_each_axis():
     assert bound_margin(zone, sources, t * [1, 1, 0, 0]) == pytest.approx(5.0, rel=1e-6)
 
 
-def test_the_bound_of_a_margin_shares_errors_among_several_plays():
-    """Two pins in a row, of 1 and 3 plays: an error x takes x / 4 of either.
+def test_the_bound_of_a_margin_shares_errors_among_several_clearances():
+    """Two pins in a row, of 1 and 3 clearances: an error x takes x / 4 of either.
 
     Across their axis and along it, which are cones of their own.
     """
@@ -131,10 +131,10 @@ def test_a_spring_along_one_axis_bounds_the_energy_of_errors_along_it():
             assert found == pytest.approx(bound, rel=1e-6)
 
 
-def test_play_of_one_pair_is_not_spent_on_another():
-    """Two pairs of bars side by side: gaps of 1.5 and 10 plays leave 0.5 and 9.
+def test_clearance_of_one_pair_is_not_spent_on_another():
+    """Two pairs of bars side by side: gaps of 1.5 and 10 clearances leave 0.5 and 9.
 
-    Each takes its own play; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
+    Each takes its own clearance; the bound adds up what is left: k (0.5 + 9)^2 p^2 / 4.
     """
     robot = pairs_of_bars([K, K], PLAY)
     prepared = linear_response(home_posture(robot))
