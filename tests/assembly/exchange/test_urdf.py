@@ -96,9 +96,9 @@ def test_a_loop_of_the_file_itself_is_closed(kind, run, tmp_path):
     """One freedom, whatever closes it; and the coupler only shifts."""
     closing, redundant = CLOSING[kind]
     path = four_bar(closing, tmp_path)
-    loops = "closed_loop: []\nname_mot: [p]\nplatform: c\n"
-    (tmp_path / "robot.yaml").write_text(loops)
+    (tmp_path / "robot.yaml").write_text("closed_loop: []\nname_mot: [p]\n")
     answer = convert(path, tmp_path / "out.toml")
+    assert answer.robot.platform == "c"  # no part of the closing joint
     assert answer.open_before < 1e-12
     status, _, _ = run("assembly", "solve", tmp_path / "out.toml",
                        "--json", tmp_path / "o.json")  # fmt: skip
@@ -133,13 +133,6 @@ def test_an_axis_in_gazebo_is_seen_from_the_child_or_the_model(
     found = (poses[closing.parent] @ closing.placement)[:3, :3] @ closing.axis
     assert found == pytest.approx(expected, abs=1e-12)
     assert mechanism.loops[0].second == "b"
-
-
-@pytest.mark.parametrize("kind", CLOSING)
-def test_no_part_of_a_closing_joint_is_taken_for_the_platform(kind, tmp_path):
-    """The coupler is the end of the longest chain, whatever closes its loop."""
-    answer = convert(four_bar(CLOSING[kind][0], tmp_path), tmp_path / "out.toml")
-    assert answer.robot.platform == "c"
 
 
 def test_joints_of_drake_have_axes_of_their_own(tmp_path):

@@ -21,27 +21,6 @@ def plan(cost="reciprocal", **options):
                 **options)  # fmt: skip
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e6])
-def test_one_plane_is_shared_by_lagranges_multipliers(unit):
-    """Minimise sum c/t with a.t = 1: t ~ sqrt(c/a); of -sum c log t: t = c/(a sum c).
-
-    In any unit of the tolerances.
-    """
-    a, most = PLANE / unit, LOOSE * unit
-    found = cheapest_within(plan(), [a], NONE, most)
-    best = np.sqrt(COSTS / a) / np.sqrt(COSTS * a).sum()
-    np.testing.assert_allclose(found, best, rtol=1e-4)
-    found = cheapest_within(plan("logarithm"), [a], NONE, most)
-    np.testing.assert_allclose(found, COSTS / a / COSTS.sum(), rtol=1e-4)
-
-
-@pytest.mark.parametrize("cost", ["reciprocal", "logarithm"])
-def test_planes_of_one_tolerance_each_leave_all_at_their_planes(cost):
-    planes = [row for row in np.diag([10.0, 20.0, 40.0])] + [np.array([-5.0, 0, 0])]
-    found = cheapest_within(plan(cost), planes, NONE, LOOSE)
-    np.testing.assert_allclose(found, [0.1, 0.05, 0.025], rtol=1e-5)
-
-
 def test_tolerances_at_a_bound_leave_the_rest_of_the_plane_to_the_others():
     """The first no looser than 5e-4, the second no tighter than 0.15."""
     best = np.sqrt(COSTS / PLANE) / np.sqrt(COSTS * PLANE).sum()
