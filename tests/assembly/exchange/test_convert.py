@@ -216,7 +216,7 @@ def test_an_overlay_adds_what_a_urdf_cannot_hold(tmp_path):
         ('platform = "efector"\n', 'did you mean "effector"?'),
     ],
 )
-def test_what_no_overlay_may_say(run, text, message, tmp_path):
+def test_wrong_overlays_are_refused(run, text, message, tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(text)
     status, out, err = run(

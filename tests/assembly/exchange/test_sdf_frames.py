@@ -117,7 +117,7 @@ def test_a_model_stands_on_a_frame_of_its_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
-def test_what_stands_still_beside_the_robot_is_passed_over(tmp_path):
+def test_static_models_of_a_world_are_left_out(tmp_path):
     path = tmp_path / "robot.sdf"
     ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
     arm = joint("j", "base", "arm")

@@ -218,7 +218,7 @@ def test_universal_joints_of_every_order_of_axes(axes, tmp_path):
     assert found == pytest.approx(expected, abs=1e-12)
 
 
-def test_what_a_plugin_or_a_spring_of_gazebo_may_tie_is_said(tmp_path):
+def test_plugins_and_springs_of_gazebo_are_reported(tmp_path):
     text = joint("j", "a", "b", Z) + joint("k", "b", "c", Z)
     text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
         </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>

@@ -115,7 +115,7 @@ def test_effects_of_a_file_act_in_solve(tmp_path, run):
     assert after[3] - before[3] == pytest.approx(2e-5 * 6 * L, rel=1e-9)
 
 
-def test_what_the_device_adds_is_the_reading_not_the_pose(tmp_path, run):
+def test_drift_of_a_device_changes_the_reading_not_the_pose(tmp_path, run):
     drift = 'name = "drift"\nparameters = { "amplitude.tz" = 1e-5, time_constant = 10 }'
     path = arm_with(tmp_path, drift)
     found = solved(run, path, "--under", "time=10")

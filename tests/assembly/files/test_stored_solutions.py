@@ -125,7 +125,7 @@ def test_stored_solution_equals_the_solved_one_to_the_last_bit(
     assert_same(again.solution, solved_once[1])
 
 
-def test_where_a_surface_lies_and_how_its_mesh_is_turned_run_nothing_again(
+def test_moved_files_and_turned_meshes_are_not_solved_again(
     surface, cache, tmp_path, runs
 ):
     """The solution is in the mesh's axes."""
@@ -247,7 +247,7 @@ def test_solutions_that_were_not_used_for_months_are_removed(surface, cache, run
     assert mesh.exists()
 
 
-def test_what_is_refused_stays_refused_and_leaves_nothing_behind(surface, cache):
+def test_refused_links_stay_refused_and_leave_no_file(surface, cache):
     before = {file.name for file in cache.iterdir()}
     for _ in range(2):
         with pytest.raises(BadInput, match="no face"):

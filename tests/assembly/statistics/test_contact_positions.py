@@ -41,7 +41,7 @@ def test_equations_are_kept_with_what_they_were():
     np.testing.assert_allclose(found, [[1, 0.5, 1], [-0.5, -1, -1]], atol=1e-5)
 
 
-def test_what_is_loaded_stays_where_it_is():
+def test_loaded_clearances_stay_in_place():
     """Its direction does not count, nor does it enter the equations."""
     start = np.array([[0.6, 0.8, 0.1, -0.2]])
     row = np.array([[0.0, 0.0, 1.0, 1.0]]) / np.sqrt(2)

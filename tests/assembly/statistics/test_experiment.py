@@ -79,7 +79,7 @@ def test_bars_that_are_turned_against_each_other_carry_a_moment_alone(axis):
     np.testing.assert_allclose(rows["force"], 0.0, atol=1e-3)
 
 
-def test_what_does_not_close_has_a_status_and_no_numbers():
+def test_draws_that_do_not_close_have_a_status_and_no_numbers():
     """Rigid parts without clearance fit where both errors are equal."""
     robot = rigid_pair()
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))

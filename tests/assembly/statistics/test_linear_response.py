@@ -37,7 +37,7 @@ def test_draws_agree_with_one_solve_at_a_time(name, scale):
             assert off <= 3e-4 * size
 
 
-def test_where_no_clearance_is_left_screws_agree(rng):
+def test_screws_of_robots_without_clearance_agree(rng):
     """Without clearances the answer is unique and linear: only rounding is allowed."""
     robot = load_robot("irsbot2")
     robot = replace(

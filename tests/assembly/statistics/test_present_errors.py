@@ -85,7 +85,7 @@ def test_the_lines_tell_the_five_largest_errors_and_where():
     assert home.endswith("largest margin 1.235 at the origin")
 
 
-def test_what_fits_by_clearance_alone_stores_no_energy_and_none_is_told_if_rigid():
+def test_errors_within_clearance_store_no_energy_and_rigid_parts_have_none():
     """Rigid parts too far apart have a margin and no energy."""
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)

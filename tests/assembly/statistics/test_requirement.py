@@ -59,7 +59,7 @@ def test_slopes_of_a_utilisation_are_those_of_its_quantity_over_its_limit(requir
         np.testing.assert_allclose(found, slope * np.array([[1, -1], [-1, 1]]), 1e-6)
 
 
-def test_what_does_not_close_exceeds_every_limit():
+def test_draws_that_do_not_close_exceed_every_limit():
     """Rigid parts without clearance: only equal errors of both fit."""
     robot = rigid_pair()
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1.0, "force": 1.0})

@@ -40,7 +40,7 @@ def test_a_power_law_is_met(power, start):
 @pytest.mark.parametrize("start", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("within", [0.0, 0.5])
 @pytest.mark.parametrize("beyond", [2.0, np.inf])
-def test_a_jump_is_bracketed_from_within(start, within, beyond):
+def test_a_jump_is_approached_from_within(start, within, beyond):
     """Nothing is between: the largest factor that fits, to the precision asked for."""
     known = Known(lambda size: np.where(size <= 3.0, within, beyond))
     for precision in (1e-2, 1e-4):
@@ -78,7 +78,7 @@ def test_all_samples_fit_but_those_that_may_fail(allowed):
 
 
 @pytest.mark.parametrize("least", [0.0, 0.7])
-def test_what_fits_at_no_scale_is_refused(least):
+def test_limits_met_at_no_scale_are_refused(least):
     """Perfect parts that use twice a limit; or those as tight as they may be."""
     constant = Known(lambda size: 2.0 + 0 * size, least)
     beyond = Known(lambda size: 2.0 + size, least)

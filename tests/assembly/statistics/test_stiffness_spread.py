@@ -110,7 +110,7 @@ def test_the_command_gives_the_spread_and_writes_it(run, tmp_path):
     assert '--state: found "linear"' in err
 
 
-def test_what_resists_a_little_is_not_free():
+def test_small_stiffnesses_are_not_free_motions():
     """0.01 N m/rad is a spring; zero is none, and NaN no answer."""
     stiffnesses = np.full((6, 6), 2.0)
     stiffnesses[:, 2] = 0.01, 0.02, 0.03, 0.0, 0.0, np.nan

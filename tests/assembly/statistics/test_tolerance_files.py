@@ -221,7 +221,7 @@ def test_errors_of_a_plan_are_within_their_tolerances_and_as_wide_as_it_says(
     assert np.std(drawn) == pytest.approx(deviation, rel=0.02)
 
 
-def test_what_a_tolerance_file_leaves_out_is_as_documented(write_file):
+def test_defaults_of_a_tolerance_file_are_as_documented(write_file):
     """A price of 1, from 0 to 0.1 rad or 10 mm, and to go together by clearance."""
     tables = [f'[[tolerance]]\nframes = ["link_a"]\ncomponents = ["{c}"]\n' for c in
               ("RX", "TX")]  # fmt: skip

@@ -112,7 +112,7 @@ def test_functions_act_at_every_point(load):
         assert np.abs(change).max() > 0.02 * np.abs(other[3:]).max()
 
 
-def test_what_a_device_reads_stands_beside_the_pose():
+def test_readings_of_a_device_are_stored_with_the_pose():
     """A device shifted by b reads b less nothing: R = 1, so b more."""
     shift = {"base.tx": 3e-5, "base.tz": -1e-5}
     robot = irsbot2_with(NUMBERS["cases"][0])

@@ -33,6 +33,6 @@ def test_each_point_has_the_frequencies_of_its_posture_and_design():
         ("irsbot2", 2, "found no mass that moves"),
     ],
 )
-def test_what_has_no_frequencies_is_refused(robot, count, message):
+def test_robots_without_frequencies_are_refused(robot, count, message):
     with pytest.raises(BadInput, match=message):
         sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)

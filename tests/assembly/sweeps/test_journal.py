@@ -87,9 +87,7 @@ def test_a_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(whole, tmp_path
     assert solved == list(range(-(-done // 4), 4))
 
 
-def test_whatever_bit_of_a_journal_is_flipped_only_its_record_is_solved_again(
-    whole, tmp_path
-):
+def test_a_flipped_bit_of_a_journal_costs_only_its_record(whole, tmp_path):
     """The first line and the records' numbers and lengths are covered too."""
     sweep, expected, kept = whole
     journal, first_line = kept[15], kept[15].index(b"\n") + 1
@@ -189,7 +187,7 @@ def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
     "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
                {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
 )  # fmt: skip
-def test_whatever_is_asked_is_in_the_questions_hash(change):
+def test_every_option_changes_the_questions_hash(change):
     from dataclasses import replace
 
     from assembly.sweeps.identity import question_hash
