@@ -200,17 +200,18 @@ def every_link(rng):
 def every_joint(rng):
     """Joints of every kind."""
     K = np.diag(rng.uniform(1, 1e8, 6))
-    bearing, locked = K.copy(), np.diag([math.inf] * 6)
-    bearing[2, 2] = 0.0
+    bearing, slide, locked = K.copy(), K.copy(), np.diag([math.inf] * 6)
+    bearing[2, 2] = slide[5, 5] = 0.0
     yield {}
     yield {"joint": "revolute", "actuated": True, "limits": (-1.5, 2.0)}
     yield {"joint": "prismatic", "clearance": Clearance(1e-30, None, 0.0, 1.0)}
     yield {"joint": "revolute", "joint_stiffness": bearing}
+    yield {"joint": "prismatic", "joint_stiffness": slide}
     yield {"joint": "prismatic", "actuated": True, "joint_stiffness": locked}
     yield {"joint": "revolute", "joint_stiffness": K, "clearance": Clearance(1 / 3)}
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(7))
 def test_a_robot_of_every_kind_reads_back_as_it_was_written(seed, tmp_path):
     """A serial arm in which links meet other joints at each seed."""
     rng, frames, parent = np.random.default_rng(seed), [], "base"
