@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from assembly.kinematics.mobility import mobility
-from assembly.kinematics.posture import place_robot
+from assembly.kinematics.posture import place_many, place_robot
 from assembly.linear.energy import solve_assembly
 from assembly.linear.zone import zone_margin
+from assembly.model.links import link_compliance
 from assembly.model.random_errors import ErrorDraw, draw_errors, frames_named
 from assembly.robots.irsbot2 import (
     ERROR_FRAMES,
@@ -152,8 +153,6 @@ def test_euler_and_timoshenko_links_store_the_same_energy():
 
 def test_link_beam_axis_is_the_links_own_x(robot):
     """C_E is written with the beam along local x, up to the link's roll."""
-    from assembly.model.links import link_compliance
-
     K = np.linalg.inv(link_compliance(robot.frame("leg1.link_a")))
     size = np.sqrt(np.diag(NUMBERS["K_E"]))
     assert np.abs((K - NUMBERS["K_E"]) / np.outer(size, size)).max() < 1e-13
@@ -171,8 +170,6 @@ def test_the_seed_draws_the_reference_errors(robot):
 
 def test_every_point_of_the_papers_grid_is_reached_or_refused(robot):
     """1113 of the 25 mm half workspace; here one row of it, by the reach formula."""
-    from assembly.kinematics.posture import place_many
-
     x = np.arange(-0.7, 0.7001, 0.05)
     poses = np.full((len(x), 6), np.nan)
     poses[:, 0], poses[:, 2] = x, -0.4

@@ -1,6 +1,7 @@
 """A sweep on many processes gives the numbers of one, also when a worker dies."""
 
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -12,7 +13,7 @@ import pytest
 
 from assembly.model.error_distributions import tolerance_sources
 from assembly.robots import load_robot
-from assembly.sweeps.cluster import cluster_solver, solve_task
+from assembly.sweeps.cluster import _check_workers, cluster_solver, solve_task
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question
 from assembly.sweeps.sweep import run_sweep
@@ -33,16 +34,12 @@ def drawn_sweep(grid):
 
 def test_a_worker_with_another_question_refuses_it():
     """As when a mesh differs there: its content is in the hash."""
-    import pickle
-
     question = drawn_sweep("tx=0,ty=0.13").question
     with pytest.raises(BadInput, match="a worker reads another robot"):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
 def test_workers_with_other_sources_are_refused():
-    from assembly.sweeps import cluster
-
     class Client:
         def __init__(self, **theirs):
             self.theirs = theirs
@@ -54,9 +51,9 @@ def test_workers_with_other_sources_are_refused():
             return {"tcp://h:1": program() | self.theirs}
 
     with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
-        cluster._check_workers(Client(program_sha256=64 * "0"))
+        _check_workers(Client(program_sha256=64 * "0"))
     # another commit of the same sources
-    cluster._check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
+    _check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,10 @@ import numpy as np
 import pytest
 
 from assembly.robots import load_robot
+from assembly.sweeps import identity
+from assembly.sweeps.identity import question_hash
 from assembly.sweeps.journal import open_journal
+from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
 from assembly.sweeps.quantities import Question, record_type
 from assembly.sweeps.sweep import journal_path, run_sweep, solve_here, sweep_in_memory
@@ -164,8 +168,6 @@ def test_a_killed_run_holds_no_journal(whole, tmp_path):
 
 def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
     """The version is the same; a line of the sources is not."""
-    from assembly.sweeps import identity
-
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
     shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
@@ -188,19 +190,12 @@ def test_a_journal_of_other_sources_is_refused(whole, tmp_path, monkeypatch):
                {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
 )  # fmt: skip
 def test_every_option_changes_the_questions_hash(change):
-    from dataclasses import replace
-
-    from assembly.sweeps.identity import question_hash
-
     asked = small_sweep().question
     assert question_hash(asked) == question_hash(small_sweep().question)
     assert question_hash(replace(asked, **change)) != question_hash(asked)
 
 
 def test_designs_of_other_numbers_have_other_hashes(tmp_path):
-    from assembly.sweeps.identity import question_hash
-    from assembly.sweeps.parameters import load_design
-
     design = load_design("five_bar")
     path = next(p for p in design.paths if p.endswith("link.young"))
     other = type(design)(design.changed({path: 1e11}), design.file, design.name)
@@ -245,8 +240,6 @@ def test_a_file_that_is_no_journal_is_refused_and_left(tmp_path):
 
 def test_block_size_changes_no_number():
     """Points do not depend on their neighbours: blocks of 4 and of 15, bit for bit."""
-    from dataclasses import replace
-
     options = {
         "assumption": "frozen",
         "wrenches": ("left.elbow",),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assembly.model.robot import MatrixLink
 from assembly.robots import BUILT_IN, load_robot
 from assembly.sweeps.identity import robot_hash
 from assembly.sweeps.parameters import design_of, load_design, unit_of
@@ -57,8 +58,6 @@ def test_every_kind_of_number_has_a_path(design, path, value, read):
 
 
 def test_both_places_of_a_symmetric_matrix_change_together():
-    from assembly.model.robot import MatrixLink
-
     robot = load_robot("four_bar")
     K = np.diag([1e3, 1e3, 1e3, 1e6, 1e6, 1e6])
     design = design_of(robot.with_links({"middle": MatrixLink(K)}))

@@ -13,6 +13,7 @@ from assembly.linear.pose_error import bound_pose_error
 from assembly.model.error_distributions import read_sources
 from assembly.model.robot import BeamLink
 from assembly.robots import load_robot
+from assembly.sweeps import points
 from assembly.sweeps.maps import figure_of
 from assembly.sweeps.parameters import load_design
 from assembly.sweeps.plan import Sweep
@@ -168,8 +169,6 @@ def test_a_design_that_cannot_close_is_a_status_and_stops_nothing():
 
 def test_a_point_that_breaks_the_algebra_is_a_status_of_its_own(robot, monkeypatch):
     """The third of five postures raises in the middle of its block."""
-    from assembly.sweeps import points
-
     solve, axes = points.solve_assembly, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)
     bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]

@@ -6,6 +6,7 @@ import xarray
 
 from assembly.kinematics.posture import place_robot
 from assembly.linear.energy import solve_assembly
+from assembly.sweeps import points
 from assembly.sweeps.dataset import save_dataset
 from assembly.sweeps.maps import map_figure
 from assembly.sweeps.sweep import sweep_poses
@@ -102,8 +103,6 @@ def test_maps_need_two_axes(data):
 
 def test_a_margin_that_fails_is_a_status_of_its_point(monkeypatch):
     """The solver gives up on one reading of one point: its neighbour is not touched."""
-    from assembly.sweeps import points
-
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):
