@@ -5,6 +5,7 @@ import pytest
 
 from assembly.model.error_distributions import draw_generator
 from assembly.statistics.uniform_clearance import (
+    _ellipsoid,
     diagnose,
     is_mixed,
     sample_uniform_position,
@@ -70,6 +71,16 @@ def test_chains_that_are_each_stuck_elsewhere_are_not_mixed():
     trace[:, :, 1] = np.arange(4)[:, None]
     assert not is_mixed(trace)
     assert diagnose(trace[:, :, 1])[0] == np.inf
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 5])
+@pytest.mark.parametrize("start", [0.0, 0.6, 0.95, 1.0])
+def test_the_ellipsoid_of_a_box_is_a_ball_about_its_middle(dimensions, start):
+    """-sum log(1 - u_i^2) has the Hessian 2 I at 0: axes of 1 / sqrt 2."""
+    heads = np.arange(dimensions + 1)
+    u, M = _ellipsoid(np.eye(dimensions), heads, np.full(dimensions, start))
+    np.testing.assert_allclose(u, 0.0, atol=2e-3)
+    np.testing.assert_allclose(M @ M.T, np.eye(dimensions) / 2, atol=1e-4)
 
 
 def test_a_point_that_may_not_move_is_mixed_and_stays():
