@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from assembly.kinematics.nominal import size_of
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import draw_generator, tolerance_sources
 from assembly.model.robot import Clearance, Frame, MatrixLink, Robot
@@ -163,6 +164,20 @@ def test_clearance_changes_neither_energy_nor_bounds(drawn, play):
     assert mixed.all()
     assert np.isfinite(settled).all()
     assert np.abs(settled - found.platform_screw).max() > 1e-5
+
+
+@pytest.mark.slow
+def test_contact_goes_at_least_as_far_along_its_push_as_uniform_clearance(drawn):
+    one, found = drawn
+    push = np.array([rng.normal(size=6) for rng in generators(DRAWN)])
+    size = size_of(one.posture.robot)
+    push[:, 3:] /= size
+    at_contact, anywhere = (
+        position_clearances(one, found, model, generators(DRAWN))[0]
+        for model in ("contact", "uniform")
+    )
+    reach = (push * at_contact).sum(axis=1) - (push * anywhere).sum(axis=1)
+    assert reach.min() > -1e-9
 
 
 def test_the_least_clearances_are_those_of_the_solution(drawn):

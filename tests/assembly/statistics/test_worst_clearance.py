@@ -1,10 +1,13 @@
 """The worst clearance: closed forms, other readings, slopes against differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from assembly.kinematics.posture import home_posture, place_robot
 from assembly.model.error_distributions import tolerance_sources
+from assembly.model.robot import Clearance
 from assembly.robots import load_robot
 from assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from assembly.statistics.experiment import Experiment, precision_for
@@ -143,6 +146,35 @@ def test_the_largest_pose_error_has_slopes(key, share, rng):
         off.append(abs((above - below) / 2 - slopes @ step) / scale)
     assert np.sort(off)[2] < 0.02
     assert max(off) < 0.1
+
+
+def test_more_clearance_is_never_better_where_clearance_alone_suffices():
+    """Clearances that close without energy are nested sets; brackets are 1e-6 wide."""
+    robot, before = load_robot("irsbot2"), None
+    sources = tolerance_sources(robot, [1e-4] * 3 + [5e-6] * 3)
+    values = sources.draw(0, 40, seed=3)
+    for factor in (1.0, 1.1, 1.5):
+        looser = replace(robot, frames=tuple(
+            replace(f, clearance=None if f.clearance is None else Clearance(**{
+                k: factor * getattr(f.clearance, k) for k in ("radial", "axial", "tilt")
+            }, spin=f.clearance.spin))
+            for f in robot.frames
+        ))  # fmt: skip
+        posture, own = place_robot(looser, pose=POSE), replace_robot(sources, looser)
+        experiment = Experiment(posture, own, margins=False)
+        rows = experiment.evaluate(values, range(40))
+        assert rows["energy"].max() < 1e-20
+        if before is not None:
+            for name in ("rotation", "translation"):
+                assert (rows[name] >= before[f"{name}_lower"]).all()
+                assert np.median(rows[name] / before[name]) > 1.05
+        before = rows
+
+
+def replace_robot(sources, robot):
+    arrays = ("frame", "component", "kind", "centre", "scale", "least", "limit",
+              "signed")  # fmt: skip
+    return type(sources)(robot, *(getattr(sources, a) for a in arrays))
 
 
 def test_an_unknown_clearance_is_refused():

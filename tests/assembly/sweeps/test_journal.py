@@ -252,6 +252,15 @@ def test_block_size_changes_no_number():
     assert np.isfinite(one.rotation_error_clearance).any()
 
 
+@pytest.mark.slow
+def test_commands_stopped_at_random_moments_lose_nothing():
+    """The benchmark does hundreds; here some."""
+    kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
+    run = [*kills, "--seed", "5"]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "--grid",
            "tx=-0.045:0.045:0.0005,ty=0.10:0.15:0.001"]  # fmt: skip
 
