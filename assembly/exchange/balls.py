@@ -35,7 +35,7 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
     """Return whether three joints are the rotations of a file's passive ball joint."""
     name = turns[0].name.removesuffix(".rx")
-    made = {f"{name}.after_rx", f"{name}.rx.after"}  # by chain(), and of MJCF
+    made = {f"{name}.after_rx", f"{name}.rx.after"}  # names made by chain() and by MJCF
     return (
         turns[0].child in made
         and [turn.name for turn in turns] == [f"{name}.r{axis}" for axis in "xyz"]

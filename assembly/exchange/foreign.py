@@ -107,7 +107,7 @@ def _closed(
 
     Args:
         mechanism: mechanism as it was read.
-        source: its file.
+        source: path of the mechanism's file.
         beside: the loops file if its types may be generated defaults: its loops become
             points if they cannot close otherwise.  Else None.
 

@@ -226,9 +226,9 @@ def _parsed(text: str, path: Path | str) -> Any:
     from xml.parsers.expat import ExpatError, ParserCreate
 
     def refuse(*_: object) -> int:
-        raise BadInput(
-            f"{path}: found a document type or an entity, expected neither: what they "
-            "name would be read too"
+        raise ValueError(
+            "found a document type or an entity, expected neither: what they name "
+            "would be read too"
         )
 
     builder = TreeBuilder()

@@ -120,11 +120,10 @@ def declared_robot(root: Table, name: str) -> Robot:
             name, platform, frames, closures, description, learned_range=ranges,
             reference_point=point, diagnosis=diagnosis, remarks=remarks,
         )  # fmt: skip
-        robot = with_effects(robot, effects)
         _check_meeting_frames(robot)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
-    return robot
+    return with_effects(robot, effects)
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:

@@ -251,7 +251,7 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Return whether these loads, as of :func:`solve_assembly`, are its loads."""
+        """Return whether the assembly has these loads, see :func:`solve_assembly`."""
         other = all_loads(self.posture, load, bodies, gravity)
         return np.array_equal(other.body, self.frame_loads.body) and np.array_equal(
             other.joint, self.frame_loads.joint

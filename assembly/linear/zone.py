@@ -45,7 +45,7 @@ class Zone(PointResults, Generic[N]):
         method: (...) that solved it: ``"compiled"``, or ``"reference"``, numpy and
             Clarabel.
         forces: (..., nu) on the clearances, times the cones' sizes, that prove the
-        bound;
+            bound;
             the sizes on all cones add up to 1; zero where no clearance is needed, NaN
             where the reference solved it.
         reason: (...) message where the solver failed; else empty.
@@ -132,7 +132,7 @@ def zone_margin(
     Args:
         posture: the robot's configuration; or many postures of one robot.
         compliant: ``"rigid"`` or ``"free"``: passive joints with stiffness; see the
-        module.
+            module.
         errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
             a set for each of k postures, or k sets at one.
         method: ``"compiled"``, with the reference for points whose answer it does not

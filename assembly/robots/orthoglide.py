@@ -33,7 +33,7 @@ class OrthoglideParameters:
     """Parameters of the robot [m, N/m]; aluminium bars, preloaded ball bearings."""
 
     leg: float = 0.310
-    width: float = 0.080  # of the parallelograms
+    width: float = 0.080  # width of the parallelograms
     platform: float = 0.030  # from the platform's centre to the legs' ends
     drive: float = 5e7
     link: BeamLink = BeamLink(

@@ -33,10 +33,10 @@ class Allocation:
     Attributes:
         plan: costs and limits.
         tolerances: (G,) [rad or m].
-        price: their cost.
+        price: cost of the tolerances.
         uniformly_scaled: (G,) [rad or m] tolerances with the proportions of the convex
             programme, scaled uniformly to meet all limits.
-        price_uniformly_scaled: their cost, at least ``price``.
+        price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
         price_bound: lower bound of the cost of tolerances that always meet the convex
             limits; NaN for a yield below 1, or where a limit is not convex.
         cuts: planes in the convex programme.

@@ -60,7 +60,8 @@ def error_matrices(
         lam: (t,) [Pa] Lame's first constant.
         mu: (t,) [Pa] shear modulus.
         singular: (t,) whether an element touches a singular edge.
-        stiffness: (k, k) of the cases, which makes their energies comparable.
+        stiffness: (k, k) stiffness of the unit cases, which makes their energies
+            comparable.
 
     Returns:
         (t, k, k) [unit of the stiffness]; their sum estimates K_h - K.

@@ -66,7 +66,7 @@ class Step:
             effects"``.
         unknowns: [-] number of added unknowns; with a prior, those the readings
             determine.
-        error: on the held-out rows.
+        error: error on the held-out rows.
     """
 
     term: str

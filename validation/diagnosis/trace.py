@@ -1,13 +1,13 @@
-"""The search of a diagnosis, from readings to the unknown numbers of a machine.
+"""Search of a diagnosis, from readings to the unknown numbers of a machine.
 
 Steps:
 
-1. the measuring frame is found, where it is not known;
+1. the measuring frame is estimated if it is unknown;
 2. effects and functions are searched for together (:mod:`.select`);
-3. the machine that has them is fitted (:mod:`.fit`); what finite motions add to its
-   geometric errors is added to the model, and 2 is repeated until it stays.
+3. the machine with them is fitted (:mod:`.fit`); second-order terms of its geometric
+   errors are added to the model, and 2 is repeated until they do not change.
 
-It is given the rows to be fitted, and reads no others.
+The search reads only the rows to be fitted.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-r"""Rows of a campaign that tell candidate effects apart, before anything is measured.
+r"""Choice of a campaign's rows that discriminate between effects, before measurement.
 
 An exchange algorithm chooses, out of many possible rows, those for which
 

@@ -59,7 +59,7 @@ class Support:
         height: certified upper bound of direction . screw over the set.
         screw: (6,) [rad, m] screw of the set that (nearly) attains it.
         gradient: (nv,) of the component by v, less the part of the closures'
-        multipliers.
+            multipliers.
     """
 
     height: float

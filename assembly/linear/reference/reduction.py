@@ -61,16 +61,16 @@ class Reduction:
         h: (r,) [sqrt(2 J)] scaled strains with zero clearances and no loads.
         d: (nu,) [J] work of the load along the clearances.
         H: (p, nu) rows without springs.
-        k: (p,) their right sides.
+        k: (p,) right sides of the rows H.
         inconsistent: [-] scaled closure error that no motion can close; 0 if none.
-        frame_loads: on every small screw.
+        frame_loads: loads on every small screw.
         load_multipliers: (6 closures,) multipliers that balance the loads on free
-        motions.
+            motions.
         basis: (6 closures, m) orthonormal, orthogonal to all free motions.
         rigid: (m, p) rows of ``basis`` combined into those of H.
         elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
         spread: (ny, r) orthonormal map from the reduced problem's springs to all
-        springs.
+            springs.
         ranks: numbers of rows: free, elastic, rigid, redundant.
     """
 
@@ -212,7 +212,7 @@ def spring_deformations(
     Args:
         lin: the assembly constraints.
         joints: whose springs are computed.
-        frame_loads: on every small screw.
+        frame_loads: loads on every small screw.
         multipliers: (6 closures,) of the scaled closures.
 
     Returns:

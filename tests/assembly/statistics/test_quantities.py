@@ -21,7 +21,7 @@ def test_a_limit_that_is_no_number_above_zero_is_quoted(number):
     assert str(error.value) == expected
 
 
-def test_what_is_no_quantity_is_quoted_with_the_nearest():
+def test_unknown_quantities_are_quoted_with_the_nearest():
     with pytest.raises(BadInput, match='unknown quantity "enrgy".*energy'):
         parse_limit("enrgy=2")
     for name in ("translation_lower", "duality_gap", "platform_screw", ""):
