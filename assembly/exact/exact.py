@@ -67,13 +67,8 @@ from assembly.model.clearance import (
 )
 from assembly.solvers.cones import into_cones
 from assembly.solvers.method import Method, check_method
-from forcefit.results.display import (
-    Figures,
-    html_table,
-    numbers,
-    screw_text,
-    short_repr,
-)
+from forcefit.results.display import Figures, html_table, short_repr
+from forcefit.results.text import forced_lines
 from stiffness.screws import rotation_matrix, screw_map, transform
 
 if TYPE_CHECKING:
@@ -140,12 +135,10 @@ class ExactAssembly:
     def _figures(self) -> Figures:
         """Return the numbers that ``assembly solve --state exact`` prints."""
         return {
-            "pose": f"{numbers(self.posture.pose().values())} m, rad",
-            **({"load": f"{numbers(self.load)} N m, N"} if self.load.any() else {}),
-            "energy": f"{self.energy:.6g} J with finite motions",
-            "platform error": screw_text(self.platform_screw),
-            "certificate": f"closures hold to {self.closure_residual():.1e}, balance "
-            f"to {self.stationarity:.1e}; {self.iterations} steps",
+            **forced_lines(self),
+            "certificate": f"closure residual {self.closure_residual():.1e}, "
+            f"equilibrium residual {self.stationarity:.1e}; {self.iterations} "
+            "iterations",
         }
 
     def to_xarray(self) -> "xarray.Dataset":

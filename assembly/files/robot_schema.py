@@ -7,7 +7,7 @@ from assembly.files.function_file import FUNCTION
 from assembly.model.function import KINDS
 from assembly.model.robot import JOINTS
 from forcefit.results.quantities import flag, number, text
-from forcefit.results.records import Each, Either, Listed, Words, record
+from forcefit.results.records import Anything, Each, Either, Listed, Words, record
 from stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
@@ -81,7 +81,6 @@ _EFFECT = record(
     variables_=text("variables", "variable"), form_=Words((*FORMS, FORMULA)),
     formula_=text("formula"), std_=_NUMBERS,
 )  # fmt: skip
-_VALUE = Either((number("number", ""), flag("truth value"), text("text")))
 ROBOT_FILE = record(
     name_=text("name of the robot"), description_=text("description"),
     platform=text("name of the platform's frame"), frame=Listed(_FRAME),
@@ -89,6 +88,6 @@ ROBOT_FILE = record(
     effect_=Listed(_EFFECT),
     learned_range_=Each(number("least and largest value", "", "bound")),
     reference_point_="reference_point",
-    diagnosis_=Each(Either((_VALUE, Listed(_VALUE)))),
+    diagnosis_=Each(Anything()),
     covariance_=text("file of the covariance"),
 )  # fmt: skip

@@ -122,7 +122,7 @@ class PlatformStiffness:
             "state": self.state,
             "point": f"{numbers(self.point)} m, base axes",
             "free motions": str(self.free.shape[1]),
-            "eigen-stiffnesses": f"{numbers(eigen.values)} N/m",
+            "eigenstiffnesses": f"{numbers(eigen.values)} N/m",
             "length": f"{self.length:g} m",
         }
 

@@ -23,7 +23,7 @@ from assembly.report.beyond_linear import far_from_linear
 from assembly.solvers.conic import SolverFailed
 from forcefit.inputs.errors import plot_label
 from forcefit.results.display import numbers, rounded
-from forcefit.results.text import lines_of, listing, table_lines
+from forcefit.results.text import lines_of, listing, table_lines, value_text
 from stiffness.screws import SCREW, WRENCH
 
 if TYPE_CHECKING:
@@ -244,7 +244,8 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
     rows = dict(zip(WRENCH, np.where(np.isfinite(K), K, np.nan).tolist(), strict=True))
     eigen = " ".join(f"{one['stiffness']:.4g}" for one in values["eigen"])
-    about = lines_of(values, "state point") | {
+    point = f"{value_text('point', values['point'])}, base axes"
+    about = lines_of(values, "state") | {"read at": point} | {
         f"free motion {k}": numbers(screw)
         for k, screw in enumerate(values["free_motions"], 1)
     } | {
@@ -255,7 +256,8 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
         f"{eigen} N/m, angles times {values['characteristic_length']:.4g} m"
     )
     if np.isfinite(values["centre"]).all():
-        about |= lines_of(values, "centre")
+        centre = value_text("centre", values["centre"])
+        about["centre of stiffness"] = f"{centre}, base axes"
     units = "[N m/rad, N/rad, N m/m, N/m]; - where rigid"
     details = listing("", about).split("\n")[1:]
     return [f"stiffness K_C {units}", *table_lines(("", *SCREW), rows), *details]

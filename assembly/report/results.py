@@ -35,7 +35,14 @@ from assembly.solvers.conic import SolverFailed
 from forcefit.results.text import lines_of, listing, value_text
 
 # numbers of a certificate, relative ones and the gap in J
-_PROOF = "closure_residual clearance_excess duality_gap stationarity iterations"
+_PROOF = (
+    "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
+)
+# up to 1 of a margin the clearances alone suffice
+_ZONE = (
+    "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
+    "zone.reason"
+)
 _UNSTABLE = "the potential decreases along a motion, as beyond a critical load"
 
 
@@ -59,9 +66,13 @@ def _finite(value: float) -> float | None:
     return None if np.isinf(value) else value
 
 
-def zone_text(zone: dict[str, Any]) -> str:
-    """Return the margins as text; up to 1 clearances alone suffice."""
-    return listing("zone, eq. (21)", lines_of(zone, "margin margin_free status reason"))
+def zone_text(results: dict[str, Any]) -> str:
+    """Return the margins as text.
+
+    Args:
+        results: ``robot``, ``pose`` and ``zone``, of :func:`zone_of`.
+    """
+    return listing(results["robot"], lines_of(results, f"pose {_ZONE}"))
 
 
 def solution_of(
@@ -245,7 +256,7 @@ def solution_text(results: dict[str, Any]) -> str:
         Text without colours.
     """
     solved = results["energy"] is not None
-    lines = lines_of(results, "pose zone.margin zone.margin_free status reason")
+    lines = lines_of(results, f"pose {_ZONE} status reason")
     if solved:
         lines |= lines_of(results, "energy platform_screw reading")
         lines |= _linearisation_lines(results) | _bound_lines(results)
@@ -266,6 +277,10 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
+    # rounding of equal solutions is zero: 1e-12 rad, 1e-15 m, 1e-11 of the energy
+    least = (1e-12, 1e-15, 1e-11)
+    for name, small in zip(sizes, least, strict=True):
+        sizes[name] = sizes[name] if abs(sizes[name]) >= small else 0.0
     return lines_of(sizes, " ".join(sizes))
 
 
@@ -279,7 +294,7 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
     ):
         return lines
     lines |= lines_of(bound, "screw_rotation_open screw_translation_open")
-    if largest is None:
+    if largest is None or not np.isfinite([*largest.values()][1:]).any():
         return lines | {"certified largest error": "without bound"}
     sizes = ("rotation", "translation")
     known = ", ".join(value_text(size, largest[size]) for size in sizes)

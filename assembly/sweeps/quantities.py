@@ -175,7 +175,7 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
     """The variables of K_C and of its parts."""
     eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
-        "compliance": _variable("compliance", f", {STATES[state]}"),
+        "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),
         "stiffness": _variable("axis_stiffness"),
         "eigen_stiffness": _variable("eigen_stiffness", eigen=eigen),
         "stiffness_condition": _variable("stiffness_condition"),

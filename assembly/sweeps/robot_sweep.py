@@ -91,6 +91,8 @@ def sweep(
         BadInput: an option, a file it names or the robot breaks a rule; the journal is
             another sweep's, another run holds it, or a file cannot be written.
     """
+    if isinstance(quantities, str):
+        quantities = (quantities,)
     asked = ask_sweep(
         robot,
         SweepOptions(

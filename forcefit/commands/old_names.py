@@ -7,6 +7,8 @@ public formats stay valid, without a message.
 import sys
 from collections.abc import Sequence
 
+from forcefit.inputs.errors import BadInput
+
 # new words by the old words of a merged command
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
@@ -110,6 +112,8 @@ def _with_new_command(words: list[str]) -> list[str]:
         count = len(old.split())
         if words[:count] == old.split():
             print(f"forcefit: {old} is now {' '.join(new)}", file=sys.stderr)
+            if old.endswith("look-up") and not any(w.startswith("--at") for w in words):
+                raise BadInput("--at: missing; expected such as radius=0.02,length=0.4")
             return [*new, *words[count:]]
     return words
 

@@ -124,4 +124,6 @@ def _solve_margins(
     posture = posture_of(robot, pose, joint, rest, mismatch, links=False)
     margins = zone_of(posture) | singular_status(posture)
     results = {"robot": robot, "zone": margins}
-    _answer(results, zone_text(margins), margins["status"], json)
+    _answer(
+        results, zone_text(results | {"pose": posture.pose()}), margins["status"], json
+    )

@@ -144,7 +144,9 @@ def fea(
     from stiffness.report.results import link_results, link_text
     from stiffness.surface.surface import read_surface
 
-    if part == ["list"]:
+    if part and "list" in part:
+        if part != ["list"] or base or tip or mass or young or poisson:
+            raise BadInput("--part list: found other options, expected it alone")
         _list_solids(surface, json)
         return
     held, moved = parse_interfaces(base, tip)

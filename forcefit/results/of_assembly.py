@@ -72,8 +72,11 @@ _ALONG = record(
     blocked=number("stiffness, the others blocked", "N m/rad, N/m"),
 )
 _TANGENT = record(
-    "state point compliance stiffness free_motions rigid_wrenches "
+    "state stiffness free_motions rigid_wrenches "
     "characteristic_length centre",
+    point=number("point of the matrices and screws, base axes", "m", "axis"),
+    compliance=number("compliance of the platform at that point, base axes",
+                      "rad/(N m) .. m/N", "screw", "wrench_component"),
     eigen=Listed(record("screw pitch", stiffness=number("eigenstiffness", "N/m"))),
     condition=number("condition of the stiffness"), along=Each(_ALONG),
     shares=Each(_SHARES),

@@ -93,7 +93,9 @@ _DIAGNOSIS = record(
     ),
     next_measurement=Record({
         "why": text("reason"), "configuration": Each(number("coordinate", "rad or m")),
-        "load": "load", "covariates": Each(number("covariate", "")),
+        "load": number("load at the reference point, base axes", "N m, N",
+                       "wrench_component"),
+        "covariates": Each(number("covariate", "")),
         "power": number("non-centrality of one such reading"),
     }),
     calibration=Record({
@@ -133,7 +135,7 @@ _COVARIATE = record(
     correlation=Each(number("correlation")),
 )  # fmt: skip
 _READINGS_OF = record(
-    measured=count("rows measured"), missing=count("rows missing"), rms_="rms",
+    measured=count("rows measured"), missing=count("rows missing"), rms_=number("root mean square", "rad or m"),
     largest_=number("largest", "rad or m"), sigma_=number("sigma", "rad or m", "bound"),
 )  # fmt: skip
 _TESTED = record(

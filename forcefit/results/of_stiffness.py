@@ -20,10 +20,14 @@ _MESH = record(
     repairs_=text("repairs", "line"), parts_=Each(number("volume", "m^3")),
 )  # fmt: skip
 LINK = record(
-    "method stiffness compliance tip base relative_error_estimate relative_errors "
+    "method tip base relative_error_estimate relative_errors "
     "mass? center_of_mass? inertia?",
     screw=text("components of a screw", "screw"),
     wrench=text("components of a wrench", "wrench_component"), mesh=_MESH,
+    stiffness=number("K_E at the tip, axes of its mesh or beam", "N m/rad .. N/m",
+                     "wrench_component", "screw"),
+    compliance=number("inverse of K_E", "rad/(N m) .. m/N", "screw",
+                      "wrench_component"),
 )  # fmt: skip
 _MATRICES = number("stiffness", "N m/rad .. N/m", "length", "row", "column")
 _OVER_LENGTHS = number("difference", "1", "length", "row", "column")
@@ -67,7 +71,7 @@ STIFFNESS: Mapping[str, Content] = {
     "stiffness import": LINK,
     "stiffness compare": Either((_COMPARISON, _OVER_SLENDERNESS)),
     "stiffness stress": record(
-        "wrench", _STRESS, error=number("estimated error", "Pa"),
+        "", _STRESS, wrench=number("wrench at the tip", "N m, N", "wrench_component"), error=number("estimated error", "Pa"),
         region=text("region"), away=number("distance from the interfaces", "m"),
         beam_=record(
             "", _STRESS,

@@ -6,6 +6,7 @@ from forcefit.results.of_assembly import POSE, SOLUTION
 from forcefit.results.quantities import count, flag, number, text
 from forcefit.results.records import Content, Each, Either, Listed, Record, record
 
+_ASKED = Each(number("pose component or joint coordinate", "rad or m"))
 _SIDE = record(
     "platform_screw energy", links=Each("wrench"), joints=Each("wrench"),
     energy_between_ends_=number("energy of weights between the ends", "J"),
@@ -31,7 +32,10 @@ _POSE_CHECK = record(
 _BY_METHOD = Each(number("value"))
 CROSSCHECK = Either((
     _POSE_CHECK,
-    record("robot? status reason passed", pose_=POSE),
+    record(
+        "robot? status reason passed load? gravity? slope? verdict?", pose_=POSE,
+        links_=text("model of the links"), scales_=Listed(_SCALE),
+    ),
     record(
         "robot load tolerance passed", pose=POSE, links=text("model of the links"),
         compliance=Each("compliance"), difference=_BY_METHOD, uncertainty=_BY_METHOD,
@@ -43,7 +47,7 @@ CROSSCHECK = Either((
     record(
         "passed", reached=count("poses reached"),
         poses=Listed(Record(
-            {**_POSE_CHECK.content, "asked": POSE},
+            {**_POSE_CHECK.content, "asked": _ASKED},
             frozenset(_POSE_CHECK.content), closed=False,
         )),
     ),
@@ -54,7 +58,7 @@ _COST = record(
     pieces_=count("pieces of each beam with errors below the limits"),
 )  # fmt: skip
 _LIMITS = record("position", energy=number("relative energy"))
-_SPREAD = record(median=number("median", ""), largest=number("largest", ""), at=POSE)
+_SPREAD = record(median=number("median", ""), largest=number("largest", ""), at=_ASKED)
 _PART = Either((number("relative difference"), _SPREAD))
 _PLATFORM_COST = record(
     "reason?", compliance_=Each(_PART), by_link_=Each(_PART),
@@ -72,7 +76,7 @@ _VALIDITY = Either((
                    reasons=Each(count("poses")))
         ),
         platform=_PLATFORM_COST,
-        poses=Listed(record("status reason?", asked=POSE, costs_=Each(_COST),
+        poses=Listed(record("status reason?", asked=_ASKED, costs_=Each(_COST),
                             platform_=_PLATFORM_COST)),
     ),
 ))  # fmt: skip

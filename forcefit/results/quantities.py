@@ -199,22 +199,27 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "frames": text("frames", "frame"),
     "closure_residual": Quantity(
-        "closure residual", meaning="largest closure error, rad or reference lengths"
+        "closure residual", meaning="largest closure error, rad or reference lengths",
+        digits=2
     ),
     "reference_length": Quantity("reference length", "m"),
     "clearance_excess": Quantity(
-        "clearance excess", meaning="largest relative excess of a clearance"
+        "clearance excess", meaning="largest relative excess of a clearance",
+        digits=2
     ),
     "duality_gap": Quantity(
         "duality gap", "J", meaning="certified: the energy exceeds the minimum by at "
         "most this",
+        digits=2
     ),
-    "relative_gap": Quantity("relative duality gap"),
+    "relative_gap": Quantity("relative duality gap", digits=2),
     "screw_rotation": Quantity(
-        "certified error of the platform rotation", "rad", shown="mrad"
+        "certified error of the platform rotation", "rad", shown="mrad",
+        digits=2
     ),
     "screw_translation": Quantity(
-        "certified error of the platform translation", "m", shown="um"
+        "certified error of the platform translation", "m", shown="um",
+        digits=2
     ),
     "screw_rotation_open": Quantity(
         "undetermined rotation", "rad",
@@ -226,13 +231,15 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "screw_rotation_error": Quantity(
         "certified rotation error", "rad",
-        meaning="of the platform, without the undetermined rotation", shown="mrad"
+        meaning="of the platform, without the undetermined rotation", shown="mrad",
+        digits=2
     ),
     "screw_translation_error": Quantity(
         "certified translation error", "m",
-        meaning="of the platform, without the undetermined translation", shown="um"
+        meaning="of the platform, without the undetermined translation", shown="um",
+        digits=2
     ),
-    "stationarity": Quantity("equilibrium residual", meaning="relative"),
+    "stationarity": Quantity("equilibrium residual", meaning="relative", digits=2),
     "iterations": count("iterations"),
     "method": text("method", meaning="numerical method that found the result"),
     "free": count("free motions eliminated"),
@@ -317,7 +324,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     # stiffness of links and of the platform
     "compliance": Quantity(
         "compliance", "rad/(N m) .. m/N", _MATRIX,
-        "of the platform at its origin, base axes", "C",
+        "of the platform, base axes", "C",
     ),
     "stiffness": Quantity(
         "stiffness", "N m/rad .. N/m", ("wrench_component", "screw"),
@@ -325,7 +332,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "axis_stiffness": Quantity(
         "stiffness along an axis", "N m/rad, N/m", _WRENCH,
-        "along each axis, the others free",
+        "of the platform along each axis, the others free; 0 where free",
     ),
     "free_motions": Quantity(
         "free motions", "rad, m", ("motion", "screw"), "unit screws without resistance"

@@ -6,7 +6,9 @@ from typing import Union
 
 from forcefit.results.quantities import QUANTITIES, Quantity
 
-Content = Union[str, Quantity, "Record", "Each", "Listed", "Either", "Words"]
+Content = Union[
+    str, Quantity, "Record", "Each", "Listed", "Either", "Words", "Anything"
+]
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,11 @@ class Words:
     """One of several words."""
 
     words: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Anything:
+    """Any content."""
 
 
 def record(names: str = "", /, *merged: Record, **content: Content) -> Record:

@@ -8,6 +8,7 @@ from typing import Any
 
 from forcefit.results.quantities import LABELS, QUANTITIES, Quantity
 from forcefit.results.records import (
+    Anything,
     Content,
     Each,
     Either,
@@ -63,6 +64,8 @@ def _schema(content: Content) -> dict[str, Any]:
             return {"type": ["array", "null"], "items": _schema(inner)}
         case Either(contents):
             return {"anyOf": [_schema(one) for one in contents]}
+        case Anything():
+            return {}
         case Record():
             return _object(content)
 
@@ -84,7 +87,7 @@ def _object(content: Record) -> dict[str, Any]:
 def _array(one: Quantity, dims: tuple[str, ...]) -> dict[str, Any]:
     """Return the schema of values over dimensions."""
     if not dims:
-        return {"type": one.kind if one.kind == "boolean" else [one.kind, "null"]}
+        return {"type": [one.kind, "null"]}
     length = len(LABELS.get(dims[0], ()))
     size = {"minItems": length, "maxItems": length} if length else {}
     whole = ["array", "null"] if dims == one.dims else "array"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from forcefit.results.display import numbers, rounded
+from forcefit.results.display import numbers
 from forcefit.results.quantities import QUANTITIES, Quantity
 from forcefit.results.units import FACTORS
 
@@ -39,10 +39,10 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
     if np.ndim(value) == 0:
         if math.isinf(value):
             return "without bound"
-        return _with_unit(f"{rounded_in(value, units[0]):.{known.digits}g}", units[0])
+        return in_unit(value, units[0], known.digits)
     parts = np.split(np.asarray(value, dtype=float), len(units))
     if known.dims == ("bound",):
-        low, high = (f"{rounded_in(v, units[0]):.6g}" for v in parts[0])
+        low, high = (f"{FACTORS.get(units[0], 1.0) * v + 0.0:.6g}" for v in parts[0])
         return _with_unit(f"{low} to {high}", units[0])
     texts = (
         _with_unit(numbers(FACTORS.get(unit, 1.0) * part), unit)
@@ -51,14 +51,9 @@ def value_text(quantity: Quantity | str, value: Any) -> str:
     return ", ".join(texts)
 
 
-def rounded_in(value: float, unit: str) -> float:
-    """Return a number in a display unit; below 1e-9 of the unit it is zero."""
-    return rounded(FACTORS.get(unit, 1.0) * value)
-
-
 def in_unit(value: float, unit: str, digits: int = 4) -> str:
     """Return a number in SI as text in a display unit, such as ``um``."""
-    return _with_unit(f"{rounded_in(value, unit):.{digits}g}", unit)
+    return _with_unit(f"{FACTORS.get(unit, 1.0) * value + 0.0:.{digits}g}", unit)
 
 
 def readings_text(sizes: Mapping[str, float | None], digits: int = 4) -> str:
@@ -136,14 +131,18 @@ def table_lines(
     """
     first, *columns = head
     width = max(map(len, (first, *rows)))
-    wide = [max(len(column), digits + 6) + 2 for column in columns]
-    lines = [f"{first:{width}}" + "".join(map("{:>{}}".format, columns, wide))]
-    for name, cells in rows.items():
-        texts = (
-            cell if isinstance(cell, str) else _cell(cell, digits) for cell in cells
-        )
-        lines.append(f"{name:{width}}" + "".join(map("{:>{}}".format, texts, wide)))
-    return lines
+    table = {first: columns} | {
+        name: [c if isinstance(c, str) else _cell(c, digits) for c in cells]
+        for name, cells in rows.items()
+    }
+    wide = [
+        max(digits + 6, *map(len, column)) + 2
+        for column in zip(*table.values(), strict=True)
+    ]
+    return [
+        f"{name:{width}}" + "".join(map("{:>{}}".format, texts, wide))
+        for name, texts in table.items()
+    ]
 
 
 def _cell(value: float, digits: int) -> str:
