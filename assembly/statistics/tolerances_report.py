@@ -123,7 +123,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
         text += f", proven when scaled by {proven:.4f}"
     check = allocation["verification"]
     if check:
-        text += f"; {check['draws']} fresh draws at all postures: {check['verdict']}"
+        text += f"; {check['draws']} new draws at all postures: {check['verdict']}"
     return text + "."
 
 
