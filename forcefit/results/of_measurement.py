@@ -135,7 +135,8 @@ _COVARIATE = record(
     correlation=Each(number("correlation")),
 )  # fmt: skip
 _READINGS_OF = record(
-    measured=count("rows measured"), missing=count("rows missing"), rms_=number("root mean square", "rad or m"),
+    measured=count("rows measured"), missing=count("rows missing"),
+    rms_=number("root mean square", "rad or m"),
     largest_=number("largest", "rad or m"), sigma_=number("sigma", "rad or m", "bound"),
 )  # fmt: skip
 _TESTED = record(

@@ -71,7 +71,8 @@ STIFFNESS: Mapping[str, Content] = {
     "stiffness import": LINK,
     "stiffness compare": Either((_COMPARISON, _OVER_SLENDERNESS)),
     "stiffness stress": record(
-        "", _STRESS, wrench=number("wrench at the tip", "N m, N", "wrench_component"), error=number("estimated error", "Pa"),
+        "", _STRESS, wrench=number("wrench at the tip", "N m, N", "wrench_component"),
+        error=number("estimated error", "Pa"),
         region=text("region"), away=number("distance from the interfaces", "m"),
         beam_=record(
             "", _STRESS,

@@ -24,8 +24,8 @@ def options_of(command):
 
 @pytest.mark.parametrize(("old", "new"), COMMANDS.items())
 def test_an_old_command_becomes_one_that_there_is(old, new, capsys):
-    found = with_new_names([*old.split(), "file", "--json", "-"])
-    assert found == [*new, "file", "--json", "-"]
+    words = ["file", "--at", "radius=1", "--json", "-"]  # looking up needs a place
+    assert with_new_names([*old.split(), *words]) == [*new, *words]
     assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
     with pytest.raises(KeyError):
         options_of(old)
@@ -94,3 +94,9 @@ def test_an_old_flag_gives_the_answer_of_its_new_option(run):
     assert (status, silent) == (0, "")
     assert (old_status, old) == (status, new)
     assert err == "forcefit: --exact is now --state exact\n"
+
+
+def test_looking_up_without_a_place_is_refused(run):
+    status, out, err = run("stiffness", "library", "look-up", "folder")
+    assert (status, out) == (2, "")
+    assert "--at: missing; expected such as radius=0.02" in err

@@ -41,7 +41,7 @@ def test_a_display_unit_is_a_multiple_of_the_unit(name):
         ("margin", math.inf, "without bound"),
         ("margin", None, "none"),
         ("energy", math.nan, "none"),
-        ("energy", 1e-12, "0 J"),
+        ("energy", 1e-12, "1e-12 J"),
         ("passed", False, "no"),
         ("verdict", "explained", "explained"),
         ("names", [], "none"),
