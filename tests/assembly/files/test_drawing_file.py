@@ -1,0 +1,319 @@
+"""Files of bodies and joints: what they mean, and what is refused in one line."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from assembly.exchange.robot_files import load_robot
+from assembly.files.robot_file import read_robot
+from assembly.kinematics.mobility import mobility
+from assembly.kinematics.posture import home_posture
+from assembly.model.link_kinds import BeamLink
+from assembly.model.robot import BASE
+from assembly.platform_stiffness.platform_stiffness import platform_stiffness
+from forcefit.inputs.table import BadInput
+
+CASES = Path(__file__).parents[4] / "shared" / "cases" / "robots_drawn"
+TSAI = """
+format = 2
+name = "tsai"
+platform = "platform"
+platform_at = [0, 0, "450 mm"]
+
+[[body]]
+name = "platform"
+mass = 3.0
+centre = [0, 0, "450 mm"]
+inertia = [0.01, 0.01, 0.02, 0, 0, 0]
+
+[[leg]]
+name = "leg"
+repeat = { count = 3, about = [0, 0, 1] }
+
+[[leg.body]]
+name = "tube"
+[[leg.body]]
+name = "rod"
+link = { beam = { radius = "15 mm" }, young = 2.1e11, poisson = 0.3, density = 7800 }
+
+[[leg.joint]]
+name = "lower"
+type = "universal"
+between = ["base", "tube"]
+at = ["240 mm", 0, 0]
+axis = [0, 1, 0]
+axis2 = [-45, 0, -16]
+
+[[leg.joint]]
+name = "slide"
+type = "prismatic"
+between = ["tube", "rod"]
+at = ["240 mm", 0, 0]
+axis = [-16, 0, 45]
+actuated = true
+drive_stiffness = 2e7
+
+[[leg.joint]]
+name = "upper"
+type = "universal"
+between = ["rod", "platform"]
+at = ["80 mm", 0, "450 mm"]
+axis = [-45, 0, -16]
+axis2 = [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    """The robot of a text."""
+
+    def robot(text):
+        path = tmp_path / "drawn.toml"
+        path.write_text(text)
+        return read_robot(path)
+
+    return robot
+
+
+def test_the_stiffness_of_tsais_robot_is_that_of_another_program(read):
+    """K_C of a model of bodies' twists, printed to 6 digits."""
+    found = platform_stiffness(home_posture(read(TSAI))).stiffness
+    expected = np.diag([162410, 162410, 35817, 3.16338e6, 3.16338e6, 5.00457e7])
+    expected[0, 4] = expected[4, 0] = -711761
+    expected[1, 3] = expected[3, 1] = 711761
+    size = np.sqrt(np.diag(expected))
+    assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-5
+
+
+def test_tsais_robot_moves_as_another_program_counts(read):
+    found = mobility(home_posture(read(TSAI)))
+    assert (found.freedoms, found.platform_freedoms) == (3, 3)
+    assert found.freedoms_drives_locked == found.platform_freedoms_drives_locked == 0
+    assert (found.redundant_constraints, found.drives) == (0, 3)
+
+
+def test_the_example_file_loads():
+    path = CASES / "tsai.toml"
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    assert home_posture(load_robot(path)).mismatch < 1e-14
+
+
+def test_names_of_the_user_are_those_of_frames(read):
+    robot = read(TSAI)
+    leg = ["lower.first", "lower.second", "slide", "rod", "upper.first", "upper.second"]
+    names = [f"leg{k}.{name}" for k in (1, 2, 3) for name in leg]
+    ends = ["leg2.upper.end", "leg3.upper.end"]
+    assert {frame.name for frame in robot.frames} == {*names, *ends, "platform"}
+    assert robot.platform == "platform"
+
+
+def test_remarks_name_the_joints_after_which_loops_close(read):
+    cut, inertia = read(TSAI).remarks
+    assert cut == (
+        'loops close after "leg2.upper" (at "platform"), "leg3.upper" (at "platform")'
+    )
+    assert inertia == 'moments of inertia are not used: "platform"'
+
+
+def test_the_first_copy_of_a_leg_is_the_leg_as_written(read):
+    robot = read(TSAI)
+    home = home_posture(robot).transforms
+    first, second = (home[robot.index(f"leg{k}.slide"), :3, 3] for k in (1, 2))
+    assert first == pytest.approx([0.24, 0, 0], abs=1e-15)
+    assert second == pytest.approx([-0.12, 0.12 * np.sqrt(3), 0], abs=1e-15)
+
+
+def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
+    """Two legs, half a turn about the line x = 0.3: the second at 0.6 - 0.24."""
+    repeat = '{ count = 2, about = [0, 0, 2], at = ["300 mm", 0, 0] }'
+    text = re.sub(r"repeat = .*", f"repeat = {repeat}", TSAI)
+    text = text.replace(
+        'platform_at = [0, 0, "450 mm"]', "platform_at = [0.3, 0, 0.45]"
+    )
+    robot = read(text)
+    home = home_posture(robot).transforms
+    slide = home[robot.index("leg2.slide"), :3, 3]
+    assert slide == pytest.approx([0.36, 0, 0], abs=1e-15)
+
+
+@pytest.mark.parametrize(("written", "metres"), [
+    ('"240 mm"', 0.24), ('"24e4 um"', 0.24), ('"0.24 m"', 0.24), ('"240mm"', 0.24),
+    ('"10 in"', 0.254), ("0.24", 0.24),
+])  # fmt: skip
+def test_lengths_may_have_units(written, metres, read):
+    robot = read(TSAI.replace('at = ["240 mm", 0, 0]', f"at = [{written}, 0, 0]"))
+    assert robot.frames[0].translation == pytest.approx([metres, 0, 0], abs=1e-16)
+
+
+def test_angles_may_have_units(read):
+    text = ARM.replace("position = 0.5", 'position = "30 deg"')
+    assert read(text).frame("turn").position == pytest.approx(np.pi / 6, rel=1e-15)
+    text = ARM.replace("tilt = 2e-4", 'tilt = "0.2 mrad"')
+    assert read(text).frame("turn").clearance.tilt == pytest.approx(2e-4, rel=1e-15)
+
+
+ARM = """
+format = 2
+platform = "hand"
+platform_at = [0.6, 0, 0]
+
+[[body]]
+name = "arm"
+link = { beam = { width = "20 mm", height = "30 mm" }, young = 7e10, poisson = 0.3 }
+[[body]]
+name = "hand"
+mass = 2.0
+centre = [0.6, 0, 0.1]
+
+[[joint]]
+name = "turn"
+type = "revolute"
+between = ["base", "arm"]
+at = [0.1, 0, 0]
+axis = [0, 0, 1]
+actuated = true
+position = 0.5
+drive_stiffness = 1e4
+clearance = { radial = "20 um", tilt = 2e-4 }
+[[joint]]
+name = "bolts"
+type = "fixed"
+between = ["arm", "hand"]
+at = [0.6, 0, 0]
+"""
+
+
+def test_a_drawn_arm_has_its_frames_at_home(read):
+    """The drive's spring, the link from joint to joint, and the mass of the hand."""
+    robot = read(ARM)
+    turn, arm, hand = (robot.frame(name) for name in ("turn", "arm", "hand"))
+    assert np.diag(turn.joint_stiffness).tolist() == [*[np.inf] * 2, 1e4, *[np.inf] * 3]
+    assert isinstance(arm.link, BeamLink)
+    assert arm.link.length == pytest.approx(0.5, rel=1e-15)
+    assert (hand.mass, turn.parent) == (2.0, BASE)
+    assert home_posture(robot).platform[:3, 3] == pytest.approx([0.6, 0, 0])
+
+
+@pytest.mark.parametrize(("up", "soft"), [("", "TY"), (", up = [0, 1, 0]", "TZ")])
+def test_the_height_of_a_beam_is_along_the_bases_z(up, soft, read):
+    """A cantilever deflects by F L^3 / 3 E I: less where it is higher."""
+    text = ARM.replace('height = "30 mm"', f'height = "30 mm", theory = "euler"{up}')
+    text = text.replace("drive_stiffness = 1e4\n", "")
+    C = platform_stiffness(home_posture(read(text))).compliance
+    I = {"TY": 0.03 * 0.02**3 / 12, "TZ": 0.02 * 0.03**3 / 12}  # bending along y and z
+    if soft == "TZ":
+        I = {"TY": I["TZ"], "TZ": I["TY"]}
+    for k, key in ((4, "TY"), (5, "TZ")):
+        assert C[k, k] == pytest.approx(0.5**3 / (3 * 7e10 * I[key]), rel=1e-12)
+
+
+def test_a_file_of_bodies_needs_no_format_key(read):
+    assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
+
+
+def test_a_bound_along_free_motions_of_a_ball_is_refused(read):
+    text = TSAI.replace('type = "universal"', 'type = "spherical"')
+    text = text.replace("axis2 = [0, 1, 0]", "clearance = { tilt = 1e-4 }")
+    with pytest.raises(BadInput, match=r"clearance\.tilt: found a bound of a free "):
+        read(text)
+
+
+def test_a_universal_joint_has_numbers_for_each_bearing(read):
+    """One table for both, or a pair."""
+    both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5 }"
+    pair = "axis2 = [0, 1, 0]\nclearance = [{ radial = 1e-5 }, { axial = 2e-5 }]"
+    for text, expected in ((both, (1e-5, None)), (pair, (None, 2e-5))):
+        robot = read(TSAI.replace("axis2 = [0, 1, 0]", text))
+        first = robot.frame("leg1.upper.first").clearance
+        second = robot.frame("leg1.upper.second").clearance
+        assert first.radial == 1e-5
+        assert (second.radial, second.axial) == expected
+
+
+REFUSED = {
+    "format": ("format = 2", "format = 3", "format: found 3, expected 1 | 2"),
+    "unknown body": (
+        'between = ["tube", "rod"]', 'between = ["tube", "rud"]',
+        'leg "leg".joint "slide".between: found "rud", expected a body or "base"; did '
+        'you mean "rod"?'),
+    "unknown type": (
+        'type = "prismatic"', 'type = "prismatc"',
+        'leg "leg".joint "slide".type: found \'prismatc\', expected "fixed" | "revol'),
+    "helical": (
+        'type = "prismatic"', 'type = "helical"',
+        'leg "leg".joint "slide".type: found "helical", which is not supported yet'),
+    "unknown key": (
+        "drive_stiffness", "drive_stifness",
+        'leg "leg".joint "slide": unknown key "drive_stifness"; did you mean '),
+    "unknown key of a leg": (
+        'name = "leg"', 'name = "leg"\nrepeats = 3',
+        'leg "leg": unknown key "repeats"; did you mean "repeat"?'),
+    "unknown key of a body": (
+        "mass = 3.0", "weight = 3.0", 'body "platform": unknown key "weight"'),
+    "parallel axes": (
+        "axis2 = [0, 1, 0]", "axis2 = [-45, 1e-3, -16]",
+        'leg "leg".joint "upper".axis2: found it parallel to "axis", expected an '),
+    "missing second axis": (
+        "axis2 = [0, 1, 0]", "",
+        'leg "leg".joint "upper".axis2: missing; expected 3 finite numbers'),
+    "no direction": (
+        "axis = [-16, 0, 45]", "axis = [0, 0, 0]",
+        'leg "leg".joint "slide".axis: found no direction, expected 3 numbers, '),
+    "a body without joints": (
+        '[[leg]]', '[[body]]\nname = "lost"\n[[leg]]',
+        'body "lost": found no joint that connects it with "base", expected one'),
+    "two bodies of a name": (
+        '[[leg]]', '[[body]]\nname = "platform"\n[[leg]]',
+        'body: found "platform" twice, expected different names'),
+    "two joints of a name": (
+        'name = "upper"', 'name = "slide"',
+        'joint: found "leg1.slide" twice, expected different names'),
+    "base": (
+        'name = "tube"', 'name = "base"',
+        'leg "leg".body "base".name: found "base", which stands still; '),
+    "a body with itself": (
+        'between = ["tube", "rod"]', 'between = ["rod", "rod"]',
+        'leg "leg".joint "slide".between: found "rod" twice, expected two'),
+    "platform": (
+        'platform = "platform"', 'platform = "platfrom"',
+        'platform: found "platfrom", expected the name of a body; did you mean '),
+    "unit of another dimension": (
+        '"80 mm"', '"80 deg"',
+        'leg "leg".joint "upper".at: found \'80 deg\', expected a number, or a text '
+        'with a unit such as "200 mm" (m mm um in)'),
+    "unknown unit": (
+        '"80 mm"', '"80 furlong"', "found '80 furlong', expected a number"),
+    "drive of a universal joint": (
+        "axis2 = [0, 1, 0]", "axis2 = [0, 1, 0]\nactuated = true",
+        'leg "leg".joint "upper".actuated: found one on a universal joint, expected '),
+    "stiffness of a passive drive": (
+        "actuated = true", "",
+        'leg "leg".joint "slide".drive_stiffness: found one without actuated = true'),
+    "inertia of no body": (
+        "inertia = [0.01, 0.01, 0.02,", "inertia = [0.01, 0.01, 0.03,",
+        'body "platform".inertia: found principal moments 0.01, 0.01, 0.03; expected '),
+    "end of a link": (
+        'name = "rod"', 'name = "rod"\nto = "lower"',
+        'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
+    "copies": (
+        "count = 3", "count = 0",
+        'leg "leg".repeat.count: found 0, expected a whole number >= 1'),
+    "not a number": (
+        'at = ["80 mm", 0, "450 mm"]', 'at = ["80 mm", nan, "450 mm"]',
+        'leg "leg".joint "upper".at: found nan as number 2'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_mistake_in_a_drawing_is_one_line(case, read):
+    old, new, message = REFUSED[case]
+    assert old in TSAI
+    with pytest.raises(BadInput) as caught:
+        read(TSAI.replace(old, new))
+    text = str(caught.value)
+    assert "\n" not in text
+    assert message in text
+    assert "drawn.toml" in text
