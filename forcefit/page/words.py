@@ -3,6 +3,14 @@
 # key of the public format: words, SI unit
 WORDS: dict[str, tuple[str, str]] = {
     "freedoms": ("degrees of freedom", ""),
+    "platform_freedoms": ("degrees of freedom of the platform", ""),
+    "freedoms_drives_locked": ("degrees of freedom, drives locked", ""),
+    "platform_freedoms_drives_locked": (
+        "degrees of freedom of the platform, drives locked",
+        "",
+    ),
+    "redundant_constraints": ("constraints that others imply, drives locked", ""),
+    "drives": ("drives", ""),
     "locked_freedoms": ("degrees of freedom left when the drives are locked", ""),
     "overconstraint": ("closure equations that others already imply", ""),
     "smallest_singular_value": ("smallest singular value of the constraints", ""),
