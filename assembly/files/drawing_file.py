@@ -17,8 +17,9 @@ from assembly.drawing.drawing import (
     turned_body,
     turned_joint,
 )
+from assembly.drawing.parts import joint_axes
 from assembly.files.drawn_joint import read_drawn_joint
-from assembly.files.link_file import read_link
+from assembly.files.drawn_link import Curve, curve_link, read_drawn_link
 from assembly.files.written_units import without_units
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BASE
@@ -27,8 +28,6 @@ from stiffness.screws import rotation_matrix, transform
 
 MOST_COPIES = 200  # of a leg
 _LONGEST_NAME = 200  # characters
-_LENGTHS = ("radius", "inner_radius", "width", "height", "length")
-Ends = tuple[str | None, str | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +83,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         fault = f"found {quoted(platform)}, expected the name of a body{hint}"
         raise root.bad("platform", fault)
     bodies = [
-        _with_ends(body, copied, joints, body.name == platform)
+        _with_ends(body, copied, joints, at if body.name == platform else None)
         for body, copied in found
     ]
     return Drawing(name, platform, at, tuple(bodies), tuple(joints), description)
@@ -140,7 +139,7 @@ def _bodies(copied: _Copy) -> Iterator[DrawnBody]:
                 "name", f'found "{BASE}", which stands still; expected another'
             )
         without_units(table, "centre", "length")
-        _plain_link(table)
+        link = read_drawn_link(table)
         body = DrawnBody(
             copied.prefix + name,
             mass=table.number("mass", "kg", 0.0, least=0.0, largest=1e40),
@@ -148,10 +147,10 @@ def _bodies(copied: _Copy) -> Iterator[DrawnBody]:
                 "centre", (3,), "m", np.zeros(3), largest=LARGEST_LENGTH
             ),
             inertia=_inertia(table),
-            link=read_link(table),
+            link=None if isinstance(link, Curve) else link,
         )
         for key in ("from", "to"):
-            if table.has(key) and body.link is None:
+            if table.has(key) and link is None:
                 raise table.bad(key, 'found one without "link", expected both')
         table.finish()
         yield turned_body(body, copied.T)
@@ -160,16 +159,6 @@ def _bodies(copied: _Copy) -> Iterator[DrawnBody]:
 def _place(owner: Table, kind: str, name: str) -> str:
     """Place of a body or a joint in messages."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
-
-
-def _plain_link(table: Table) -> None:
-    """Lengths of a link's section without units."""
-    link = table.content.get("link")
-    beam = link.get("beam") if isinstance(link, dict) else None
-    if isinstance(beam, dict):
-        inner = Table(beam, table.file, f"{table.place}.link.beam")
-        for key in _LENGTHS:
-            without_units(inner, key, "length")
 
 
 def _inertia(table: Table) -> NDArray:
@@ -229,18 +218,57 @@ def _between(
 
 
 def _with_ends(
-    body: DrawnBody, copied: _Copy, joints: list[DrawnJoint], platform: bool
+    body: DrawnBody, copied: _Copy, joints: list[DrawnJoint], point: NDArray | None
 ) -> DrawnBody:
-    """The body with the joints between which its link is."""
-    if body.link is None:
-        return body
+    """The body with the joints between which its link is.
+
+    Args:
+        body: as read.
+        copied: where it is written.
+        joints: of the whole robot.
+        point: (3,) [m] the platform's point if the body is the platform.
+
+    Returns:
+        The body; a beam along a curve is a stiffness and a mass.
+
+    Raises:
+        BadInput: there are no such joints, or the curve does not lead from one to
+            the other.
+    """
     table = next(
         t for t in copied.table.tables("body")
         if copied.prefix + t.content["name"] == body.name
     )  # fmt: skip
     table.place = _place(copied.table, "body", table.content["name"])
-    here = [j.name for j in joints if body.name in (j.first, j.second)]
-    given = [_end(table, key, copied.prefix, here) for key in ("from", "to")]
+    link = read_drawn_link(table)
+    if link is None:
+        return body
+    here = {j.name: j for j in joints if body.name in (j.first, j.second)}
+    first, second = _ends(table, copied.prefix, list(here), point is not None)
+    body = replace(body, ends=(first, second))
+    if not isinstance(link, Curve):
+        return body
+    back = np.linalg.inv(copied.T)
+    start = (back @ [*here[first].at, 1.0])[:3]
+    if second is None:
+        assert point is not None
+        end = transform(point, np.eye(3))
+    else:
+        end = joint_axes(here[second])
+    matrix, mass, centre = curve_link(link, start, back @ end)
+    centre = (copied.T @ [*centre, 1.0])[:3]
+    total = body.mass + mass
+    if mass:
+        centre = (body.mass * body.centre + mass * centre) / total
+        body = replace(body, mass=total, centre=centre)
+    return replace(body, link=matrix)
+
+
+def _ends(
+    table: Table, prefix: str, here: list[str], platform: bool
+) -> tuple[str, str | None]:
+    """Full names of the joints at the two ends of a link."""
+    given = [_end(table, key, prefix, here) for key in ("from", "to")]
     left = [name for name in here if name not in given]
     first = given[0] or (left.pop(0) if left else None)
     second = given[1] or (left[0] if left else None)
@@ -249,7 +277,7 @@ def _with_ends(
         raise table.bad("link", f"{fault}, expected two, between which the link is")
     if first == second:
         raise table.bad("to", f"found {quoted(first)} at both ends, expected two")
-    return replace(body, ends=(first, second))
+    return first, second
 
 
 def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:

@@ -210,6 +210,85 @@ def test_the_height_of_a_beam_is_along_the_bases_z(up, soft, read):
         assert C[k, k] == pytest.approx(0.5**3 / (3 * 7e10 * I[key]), rel=1e-12)
 
 
+ARC = """
+format = 2
+platform = "hand"
+platform_at = [0, "100 mm", 0]
+
+[[leg]]
+name = "leg"
+repeat = { count = 1, about = [0, 0, 1] }
+[[leg.body]]
+name = "arc"
+[leg.body.link]
+young = 2.1e11
+poisson = 0.3
+density = 7800
+[[leg.body.link.curve]]
+center = [0, 0, 0]
+turn = [0, 0, "90 deg"]
+section = { radius = "5 mm" }
+[[leg.joint]]
+name = "foot"
+type = "fixed"
+between = ["base", "arc"]
+at = ["100 mm", 0, 0]
+[[leg.joint]]
+name = "wrist"
+type = "fixed"
+between = ["arc", "hand"]
+at = [0, "100 mm", 0]
+axis = [1, 2, 3]
+
+[[body]]
+name = "hand"
+"""
+
+
+def test_an_arc_of_a_quarter_turn_has_the_deflection_of_castigliano(read):
+    """Out of its plane: F r^3 (pi/4 / EI + (3 pi/4 - 2) / GJ) and the shear of F r."""
+    C = platform_stiffness(home_posture(read(ARC))).compliance
+    r, rho, E, nu = 0.1, 0.005, 2.1e11, 0.3
+    G, area, I = E / 2.6, np.pi * rho**2, np.pi * rho**4 / 4
+    bending = r**3 * (np.pi / 4 / (E * I) + (3 * np.pi / 4 - 2) / (G * 2 * I))
+    shear = np.pi / 2 * r / (G * area * 6 * (1 + nu) / (7 + 6 * nu))
+    assert C[5, 5] == pytest.approx(bending + shear, rel=1e-10)
+
+
+def test_an_arc_has_the_mass_and_the_centre_of_a_quarter_circle(read):
+    robot = read(ARC)
+    arc = robot.frame("leg1.arc")
+    mass = 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
+    T = home_posture(robot).transforms[robot.index("leg1.arc")]
+    centre = T[:3, :3] @ arc.centre_of_mass + T[:3, 3]
+    assert arc.mass == pytest.approx(mass, rel=1e-12)
+    assert centre == pytest.approx([0.2 / np.pi, 0.2 / np.pi, 0], abs=1e-14)
+
+
+def test_copies_of_an_arc_are_turned_with_their_leg(read):
+    """Two arcs side by side hold the hand in the middle twice as stiffly."""
+    one = read(ARC)
+    text = ARC.replace("count = 1, about = [0, 0, 1]", "count = 2, about = [0, 1, 0]")
+    two = read(text)
+    K, both = (platform_stiffness(home_posture(r)).stiffness for r in (one, two))
+    turned = np.diag([-1, 1, -1, -1, 1, -1])  # half a turn about y
+    expected = K + turned @ K @ turned
+    size = np.sqrt(np.diag(expected))
+    assert np.abs((both - expected) / np.outer(size, size)).max() < 1e-10
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ('"90 deg"]', '"80 deg"]', "link.curve: found that it ends 0.0174 m"),
+    ('section = {', 'sektion = {', "section"),
+    ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found it "),
+])  # fmt: skip
+def test_a_mistake_in_a_curve_is_one_line(old, new, message, read):
+    with pytest.raises(BadInput) as caught:
+        read(ARC.replace(old, new))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_file_of_bodies_needs_no_format_key(read):
     assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
 
