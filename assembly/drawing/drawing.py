@@ -116,6 +116,7 @@ class Drawing:
         bodies: in the order of the file.
         joints: likewise.
         description: one line.
+        remarks: defaults of its file that are easily overlooked.
     """
 
     name: str
@@ -124,6 +125,7 @@ class Drawing:
     bodies: tuple[DrawnBody, ...]
     joints: tuple[DrawnJoint, ...]
     description: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def unit(vector: NDArray) -> NDArray:

@@ -62,9 +62,10 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
         if step.closes:
             placed += _ends(plan, step)
             closures.append((placed[-1][0].name, _seat(plan, step)))
+    remarks = (*_cuts(steps), *_inertias(drawing), *drawing.remarks)
     return Robot(
         drawing.name, drawing.platform, place_frames(placed), tuple(closures),
-        drawing.description, remarks=(*_cuts(steps), *_inertias(drawing)),
+        drawing.description, remarks=remarks,
     )  # fmt: skip
 
 

@@ -118,6 +118,16 @@ def test_remarks_name_the_joints_after_which_loops_close(read):
     assert inertia == 'moments of inertia are not used: "platform"'
 
 
+def test_a_remark_says_between_which_of_many_joints_a_link_is(read):
+    """Of the platform, which has one in each leg; none where a key says it."""
+    link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
+    text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
+    remark = 'links from first to second joint: "platform" "leg1.upper" to "leg2.upper"'
+    assert remark in read(text).remarks
+    text = text.replace(link, f'{link}\nfrom = "leg1.upper"\nto = "leg2.upper"')
+    assert remark not in read(text).remarks
+
+
 def test_the_first_copy_of_a_leg_is_the_leg_as_written(read):
     robot = read(TSAI)
     home = home_posture(robot).transforms
