@@ -25,7 +25,7 @@ from assembly.files.drawn_joint import read_drawn_joint
 from assembly.files.written_units import without_units
 from assembly.model.largest import LARGEST_LENGTH
 from assembly.model.robot import BASE
-from forcefit.inputs.table import Table, nearest, quoted
+from forcefit.inputs.table import Table, describe, nearest, quoted
 from stiffness.screws import rotation_matrix, transform
 
 MOST_COPIES = 200  # of a leg
@@ -142,7 +142,9 @@ def _between(
     value = table.require("between", 'two names of bodies, or "base"')
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
     if not proper or len(value) != 2:
-        raise table.bad("between", f"found {value!r:.60}, expected two names of bodies")
+        raise table.bad(
+            "between", f"found {describe(value)}, expected two names of bodies"
+        )
     found = []
     for name in value:
         full = find(name)
