@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.drawing.drawing import FREE_ROWS, DrawnJoint, JointNumbers
-from stiffness.screws import rotation_matrix, transform
+from stiffness.screws import transform
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # half a turn about x
 _FLIP_SCREW = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
@@ -144,15 +144,6 @@ def _held(K: NDArray | None, kind: str) -> NDArray | None:
         if row != own and K[row, row] == 0.0:
             K[row, row] = np.inf
     return K
-
-
-def own_motion(kind: str, coordinate: float) -> NDArray:
-    """(4, 4) of a joint of one freedom about or along z at a coordinate [rad or m]."""
-    along = np.array([0.0, 0.0, coordinate])
-    if kind == "prismatic":
-        return transform(along, np.eye(3))
-    turn = rotation_matrix(along) if kind == "revolute" else np.eye(3)
-    return transform(np.zeros(3), turn)
 
 
 def _reversed(part: Part) -> Part:
