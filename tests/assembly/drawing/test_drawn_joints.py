@@ -15,6 +15,7 @@ from assembly.drawing.frames import robot_of_drawing
 from assembly.kinematics.mobility import mobility
 from assembly.kinematics.nominal import mobile, motion_screws
 from assembly.kinematics.posture import home_posture, place_robot
+from assembly.linear.closure import linearise
 from assembly.linear.energy import solve_assembly
 from assembly.model.link_kinds import MatrixLink
 from assembly.model.robot import Clearance
@@ -114,6 +115,36 @@ def test_a_joint_written_the_other_way_is_the_same(kind):
     np.testing.assert_allclose(
         found[1].platform_screw, found[0].platform_screw, rtol=0, atol=1e-15
     )
+
+
+@pytest.mark.parametrize("kind", FREE)
+def test_an_error_of_a_joint_is_in_its_axes(kind):
+    """Whatever frames it is made of: the screw moves the table as the joint's does."""
+    error = np.array([1e-4, -2e-4, 3e-4, 1e-5, -2e-5, 3e-5])
+    drawn = robot(
+        joint(kind, numbers=(JointNumbers(error=error, tolerance=2 * abs(error)),))
+    )
+    at = home_posture(drawn)
+    found = linearise(at).platform @ drawn.errors.ravel()
+    expected = screw_map(AT - at.platform[:3, 3], axes()) @ error
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-18)
+    sizes = [f.tolerance for f in drawn.frames if f.tolerance is not None]
+    assert [sorted(size) for size in sizes] == [sorted(2 * abs(error))]
+
+
+def test_an_error_of_a_bearing_is_in_its_axes():
+    """Of a cross: z is the bearing's axis, x the part of the other one across it."""
+    errors = np.diag(np.arange(1, 7) * 1e-5)[[0, 5]]
+    both = tuple(JointNumbers(error=error) for error in errors)
+    drawn = robot(joint("universal", numbers=both))
+    at = home_posture(drawn)
+    found = linearise(at).platform @ drawn.errors.ravel()
+    expected = np.zeros(6)
+    for z, x, error in ((AXIS, AXIS2, errors[0]), (AXIS2, AXIS, errors[1])):
+        across = perpendicular(z, x)
+        turn = np.column_stack([across, np.cross(z, across), z])
+        expected += screw_map(AT - at.platform[:3, 3], turn) @ error
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-18)
 
 
 @pytest.mark.parametrize("kind", ["spherical", "cylindrical", "planar"])
