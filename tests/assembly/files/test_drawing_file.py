@@ -149,6 +149,36 @@ def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
     assert slide == pytest.approx([0.36, 0, 0], abs=1e-15)
 
 
+def test_masses_of_a_leg_are_copied_with_it(read):
+    """Half a turn about the line x = 0.3, y = 0.1: (x, y) to (0.6 - x, 0.2 - y)."""
+    repeat = "{ count = 2, about = [0, 0, 1], at = [0.3, 0.1, 0] }"
+    text = ARC.replace("{ count = 1, about = [0, 0, 1] }", repeat)
+    text = text.replace(
+        'name = "arc"', 'name = "arc"\nmass = 0.4\ncentre = [0.1, 0.2, 0.3]'
+    )
+    text = text.replace('between = ["arc", "hand"]', 'between = ["arc", "end"]')
+    text = text.replace("[[leg.joint]]", '[[leg.body]]\nname = "end"\n[[leg.joint]]', 1)
+    text = text.replace('[[body]]\nname = "hand"\n', "")
+    robot = read(text.replace('platform = "hand"', 'platform = "leg1.end"'))
+    centres = []
+    for k in (1, 2):
+        frame = robot.frame(f"leg{k}.arc")
+        T = home_posture(robot).transforms[robot.index(frame.name)]
+        centres.append(T[:3, :3] @ frame.centre_of_mass + T[:3, 3])
+        assert frame.mass == pytest.approx(0.4 + 7800 * np.pi**2 / 20 * 0.005**2)
+    x, y, z = centres[0]
+    assert centres[1] == pytest.approx([0.6 - x, 0.2 - y, z], abs=1e-14)
+    assert z == pytest.approx(0.3 * 0.4 / robot.frame("leg1.arc").mass)
+
+
+def test_errors_may_have_units(read):
+    """The first three are angles, the last three lengths."""
+    written = '["1 mrad", "1 deg", 2, "1 mm", "1 um", "1 in"]'
+    text = ARM.replace("position = 0.5", f"geometric_error = {written}")
+    expected = [1e-3, np.pi / 180, 2, 1e-3, 1e-6, 0.0254]
+    assert read(text).frame("turn").geometric_error == pytest.approx(expected)
+
+
 @pytest.mark.parametrize(("written", "metres"), [
     ('"240 mm"', 0.24), ('"24e4 um"', 0.24), ('"0.24 m"', 0.24), ('"240mm"', 0.24),
     ('"10 in"', 0.254), ("0.24", 0.24),
@@ -324,6 +354,11 @@ def test_a_universal_joint_has_numbers_for_each_bearing(read):
 
 REFUSED = {
     "format": ("format = 2", "format = 3", "format: found 3, expected 1 | 2"),
+    "format of frames": (
+        "format = 2", "format = 1",
+        "format: found 1 in a file of bodies and joints, expected 2"),
+    "a frame": (
+        "[[leg]]", '[[frame]]\nname = "tip"\n[[leg]]', 'unknown key "frame"'),
     "unknown body": (
         'between = ["tube", "rod"]', 'between = ["tube", "rud"]',
         'leg "leg".joint "slide".between: found "rud", expected a body or "base"; did '
