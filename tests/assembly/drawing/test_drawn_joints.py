@@ -18,7 +18,7 @@ from assembly.kinematics.posture import home_posture, place_robot
 from assembly.linear.closure import linearise
 from assembly.linear.energy import solve_assembly
 from assembly.model.link_kinds import MatrixLink
-from assembly.model.robot import Clearance
+from assembly.model.robot import BASE, Clearance
 from assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from stiffness.screws import screw_map
 
@@ -108,8 +108,13 @@ def test_a_joint_written_the_other_way_is_the_same(kind):
     across = here.across
     there = DrawnJoint("j", kind, "table", "base", AT, -AXIS, across, across,
                        numbers=(other,))  # fmt: skip
-    held = joint("spherical", name="ball", at=np.array([0.7, 0.3, 0.1]))
-    found = [solve_assembly(home_posture(robot(one, held))) for one in (here, there)]
+    point = np.array([0.7, 0.3, 0.1])
+    held = joint("spherical", name="ball", at=point)
+    # no path leads from the base in the direction of these two
+    back = joint("spherical", "table", "base", "ball", point)
+    robots = robot(here, held), robot(there, back)
+    assert robots[1].frame("j").parent == BASE
+    found = [solve_assembly(home_posture(one)) for one in robots]
     assert found[0].energy > 1e-6
     assert found[1].energy == pytest.approx(found[0].energy, rel=1e-12)
     np.testing.assert_allclose(

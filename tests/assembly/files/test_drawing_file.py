@@ -329,6 +329,80 @@ def test_a_mistake_in_a_curve_is_one_line(old, new, message, read):
     assert "\n" not in str(caught.value)
 
 
+# rows of the free motions, and bounds that limit others
+SEVERAL = {
+    "cylindrical": ([2, 5], {"radial", "tilt"}),
+    "spherical": ([0, 1, 2], {"radial", "axial"}),
+    "planar": ([2, 3, 4], {"axial", "tilt"}),
+}
+STIFF = [2e3, 3e3, 5e3, 2e6, 3e6, 5e6]
+
+
+def held_by(kind, keys):
+    """A hand on one joint of several freedoms, with more keys."""
+    text = ARM.replace('type = "fixed"', f'type = "{kind}"\naxis = [0, 0, 1]\n{keys}')
+    return text.replace("drive_stiffness = 1e4\n", "")
+
+
+@pytest.mark.parametrize("full", [False, True], ids=["diagonal", "rows"])
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_springs_of_a_joint_of_several_freedoms_are_across_them(kind, full, read):
+    """Zero along the free motions; a number there is refused."""
+    free = SEVERAL[kind][0]
+    K = [0.0 if row in free else value for row, value in enumerate(STIFF)]
+    values = np.diag(K).tolist() if full else K
+    robot = read(held_by(kind, f"joint_stiffness = {values}"))
+    stiff = np.zeros(6)
+    for frame in robot.frames:
+        if frame.name.startswith("bolts") and frame.joint_stiffness is not None:
+            stiff = np.diag(frame.joint_stiffness)
+    soft = [row for row in range(6) if row not in free]
+    assert stiff[soft].tolist() == [STIFF[row] for row in soft]
+    assert mobility(home_posture(robot)).freedoms == 1 + len(free)
+    for row in free:
+        wrong = [STIFF[k] if k == row else value for k, value in enumerate(K)]
+        values = np.diag(wrong).tolist() if full else wrong
+        with pytest.raises(BadInput, match=r"found a stiffness as number \d .*along a"):
+            read(held_by(kind, f"joint_stiffness = {values}"))
+
+
+@pytest.mark.parametrize("bound", ["radial", "axial", "tilt", "spin"])
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_bounds_of_a_joint_of_several_freedoms_are_across_them(kind, bound, read):
+    text = held_by(kind, f"clearance = {{ {bound} = 1e-5 }}")
+    if bound in SEVERAL[kind][1]:
+        frames = [f for f in read(text).frames if f.name.startswith("bolts")]
+        bounds = [getattr(f.clearance, bound) for f in frames if f.clearance]
+        assert bounds == [1e-5]
+    else:
+        with pytest.raises(
+            BadInput, match=rf"clearance\.{bound}: found a bound of a f"
+        ):
+            read(text)
+
+
+def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
+    """A cantilever: its point deflects by F L^3 / 3 E I."""
+    text = ARM[: ARM.index('[[joint]]\nname = "bolts"')].replace('"hand"', '"arm"', 1)
+    text = text.replace(
+        '[[body]]\nname = "hand"\nmass = 2.0\ncentre = [0.6, 0, 0.1]', ""
+    )
+    text = text.replace("drive_stiffness = 1e4\n", "")
+    text = text.replace('height = "30 mm"', 'height = "30 mm", theory = "euler"')
+    C = platform_stiffness(home_posture(read(text))).compliance
+    I = 0.02 * 0.03**3 / 12
+    assert C[5, 5] == pytest.approx(0.5**3 / (3 * 7e10 * I), rel=1e-12)
+
+
+def test_a_rod_may_have_no_inertia_about_itself(read):
+    text = TSAI.replace("inertia = [0.01, 0.01, 0.02,", "inertia = [0, 0.01, 0.01,")
+    assert "moments of inertia" in read(text).remarks[1]
+
+
+def test_coordinates_of_passive_joints_are_zero_at_home(read):
+    assert np.abs(home_posture(read(TSAI)).coordinates).max() < 1e-12
+
+
 def test_a_file_of_bodies_needs_no_format_key(read):
     assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
 
@@ -342,7 +416,7 @@ def test_a_bound_along_free_motions_of_a_ball_is_refused(read):
 
 def test_a_universal_joint_has_numbers_for_each_bearing(read):
     """One table for both, or a pair."""
-    both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5 }"
+    both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, tilt = 1e-4 }"
     pair = "axis2 = [0, 1, 0]\nclearance = [{ radial = 1e-5 }, { axial = 2e-5 }]"
     for text, expected in ((both, (1e-5, None)), (pair, (None, 2e-5))):
         robot = read(TSAI.replace("axis2 = [0, 1, 0]", text))
@@ -419,6 +493,12 @@ REFUSED = {
     "inertia of no body": (
         "inertia = [0.01, 0.01, 0.02,", "inertia = [0.01, 0.01, 0.03,",
         'body "platform".inertia: found principal moments 0.01, 0.01, 0.03; expected '),
+    "negative tolerance": (
+        "drive_stiffness = 2e7", "tolerance = [0, 0, 0, -1e-5, 0, 0]",
+        'leg "leg".joint "slide".tolerance: found -1e-05 in it, expected 6 numbers >='),
+    "one body": (
+        'between = ["tube", "rod"]', 'between = ["tube"]',
+        'leg "leg".joint "slide".between: found [\'tube\'], expected two names'),
     "end of a link": (
         'name = "rod"', 'name = "rod"\nto = "lower"',
         'leg "leg".body "rod".to: found "lower", expected a joint of this body'),
