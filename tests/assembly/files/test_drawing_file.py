@@ -189,6 +189,8 @@ def test_lengths_may_have_units(written, metres, read):
 
 
 def test_angles_may_have_units(read):
+    text = ARM.replace("position = 0.5", 'position = "0.4 rad"')
+    assert read(text).frame("turn").position == 0.4
     text = ARM.replace("position = 0.5", 'position = "30 deg"')
     assert read(text).frame("turn").position == pytest.approx(np.pi / 6, rel=1e-15)
     text = ARM.replace("tilt = 2e-4", 'tilt = "0.2 mrad"')
